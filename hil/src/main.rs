@@ -1,0 +1,2 @@
+//! Hardware in the loop.
+fn main() {}

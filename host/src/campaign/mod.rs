@@ -1,0 +1,70 @@
+//! Campaigns of circular tests: what was measured, checked at the border, in SI units.
+pub use giotto_shared::Direction;
+
+/// A set of circular tests of one machine.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Campaign {
+    /// Name of the campaign.
+    pub name: String,
+    /// Machine under test.
+    pub machine: String,
+    /// The runs in file order; the order of time is that of `started_s`.
+    pub runs: Vec<Run>,
+}
+
+/// One circular test.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Run {
+    /// File name as the campaign gives it; identifies the run.
+    pub file: String,
+    /// Programmed radius, m.
+    pub radius_m: f64,
+    /// Programmed feed (TCP speed), m/s.
+    pub feed_m_s: f64,
+    /// Direction of travel.
+    pub direction: Direction,
+    /// Polar angle of the first sample, rad.
+    pub start_angle_rad: f64,
+    /// Start since the campaign began, s.
+    pub started_s: Option<f64>,
+    /// Temperature of the machine, °C.
+    pub temperature_c: Option<f64>,
+    /// Programmed centre in the machine, m.
+    pub centre_m: Option<[f64; 3]>,
+    /// What the instrument recorded.
+    pub samples: Samples,
+}
+
+/// One turn of samples. All vectors have the same length.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Samples {
+    /// Polar angle of each sample about the nominal centre, rad, unwrapped: grows CCW, falls CW.
+    /// Inferred at a constant rate over the measured turn where the instrument gives time only.
+    pub angle_rad: Vec<f64>,
+    /// Measured distance from the centre of measurement minus programmed radius, m.
+    pub deviation_m: Vec<f64>,
+    /// Time since the first sample, s, where recorded.
+    pub time_s: Option<Vec<f64>>,
+    /// Whether the angle was inferred from time (a ballbar) rather than measured.
+    pub angle_inferred: bool,
+}
+
+impl Run {
+    /// Angular rate ω = f/R of the programmed circle, rad/s.
+    pub fn omega_rad_s(&self) -> f64 {
+        self.feed_m_s / self.radius_m
+    }
+
+    /// `d`: +1.0 CCW, −1.0 CW.
+    pub fn sign(&self) -> f64 {
+        f64::from(self.direction.sign())
+    }
+
+    /// Duration of the recorded turn (n samples last n spacings), s; `None` without time stamps.
+    pub fn turn_s(&self) -> Option<f64> {
+        let time = self.samples.time_s.as_ref()?;
+        let (first, last) = (time.first()?, time.last()?);
+        let n = time.len() as f64;
+        (n > 1.0).then(|| (last - first) * n / (n - 1.0))
+    }
+}

@@ -1,0 +1,2 @@
+//! The `giotto` command.
+fn main() {}

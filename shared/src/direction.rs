@@ -1,0 +1,55 @@
+//! Sense of rotation and axis names.
+use serde::{Deserialize, Serialize};
+
+/// Sense in which a circle is travelled, seen from +Z.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Direction {
+    /// Counter-clockwise (G3): the polar angle grows.
+    Ccw,
+    /// Clockwise (G2): the polar angle falls.
+    Cw,
+}
+
+impl Direction {
+    /// `d` of the formulas: +1 counter-clockwise, −1 clockwise.
+    pub const fn sign(self) -> i8 {
+        match self {
+            Self::Ccw => 1,
+            Self::Cw => -1,
+        }
+    }
+
+    /// The opposite sense.
+    pub const fn reversed(self) -> Self {
+        match self {
+            Self::Ccw => Self::Cw,
+            Self::Cw => Self::Ccw,
+        }
+    }
+}
+
+/// One of the two linear axes of the plane of the circle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Axis {
+    /// First axis of the plane.
+    X,
+    /// Second axis of the plane.
+    Y,
+}
+
+impl Axis {
+    /// 0 for X, 1 for Y.
+    pub const fn index(self) -> usize {
+        self as usize
+    }
+
+    /// The other axis of the plane.
+    pub const fn other(self) -> Self {
+        match self {
+            Self::X => Self::Y,
+            Self::Y => Self::X,
+        }
+    }
+}

@@ -1,0 +1,30 @@
+//! What host and controller share: the laws of giotto, without an operating system.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`circle`] | mergeable moments of a point set, algebraic and geometric circle, plane of 3-D points |
+//! | [`model`] | the radius model ΔR = β1 f²/R + β2 f⁴/R³ (Eq. 15 of the source paper), cumulants, inverse |
+//! | [`term`] | the profile terms that diagnosis fits, the table carries and the engine evaluates |
+//! | [`path`] | time laws with limited jerk, circles, arcs, lines; derivatives in closed form |
+//! | [`law`] | the compensating operator p − (κ2/2) p″ + (κ2²/8 − κ4/24) p⁗ |
+//! | [`table`] | the correction table: layout, bounds, CRC |
+//! | [`wire`] | messages and frames between host and controller |
+//!
+//! The source paper is Slamani, Nubiola, Bonev, "Effect of servo systems on the contouring errors in
+//! industrial robots", Trans. CSME 36(1), 2012. SI units throughout unless a name says otherwise.
+#![no_std]
+#![forbid(unsafe_code)]
+
+#[cfg(any(test, feature = "std"))]
+extern crate std;
+
+pub mod circle;
+pub mod direction;
+pub mod law;
+pub mod model;
+pub mod path;
+pub mod table;
+pub mod term;
+pub mod wire;
+
+pub use direction::{Axis, Direction};

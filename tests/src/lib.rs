@@ -1,0 +1,1 @@
+//! Machines and helpers for the cross-crate tests.
