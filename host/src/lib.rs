@@ -3,5 +3,6 @@
 
 pub mod campaign;
 pub mod causes;
+pub mod cli;
 pub mod model_file;
 pub mod simulation;
