@@ -1,1 +1,85 @@
-//! (being built)
+//! Circles through measured points.
+//!
+//! [`fit`] is what most callers want: one pass of [`Moments`], the algebraic [`hyper`] circle as the start,
+//! then Newton steps on the geometric distances. Everything is centred on the data, so a 100 mm circle
+//! 100 m from the origin is fitted as well as one at the origin.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `points` | [`Points`]: what can be walked again and again, in blocks |
+//! | `moments` | [`Moments`]: centred, mergeable, one pass |
+//! | `algebraic` | [`kasa`] and [`hyper`]: closed circles from moments |
+//! | `geometric` | [`refine`]: least squares of the distances, with a report |
+//! | `plane` | [`Plane`] of 3-D points, projection, tilt, flatness |
+mod algebraic;
+mod geometric;
+mod moments;
+mod plane;
+mod points;
+#[cfg(test)]
+mod tests;
+
+pub use algebraic::{hyper, kasa};
+pub use geometric::{CircleFit, Stop, refine};
+pub use moments::Moments;
+pub use plane::Plane;
+pub use points::{BLOCK, Merge, Points, Sampled, Xy};
+
+use core::fmt;
+
+/// A circle in the plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Circle {
+    /// Centre, m (or whatever unit the points have).
+    pub centre: [f64; 2],
+    /// Radius, same unit.
+    pub radius: f64,
+}
+
+/// Why no circle (or plane) can be fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum CircleError {
+    /// Fewer than three points.
+    TooFew {
+        /// Number of points given.
+        points: usize,
+    },
+    /// All points are one point, as far as their digits tell.
+    Coincident,
+    /// The points lie on a line, or their arc is too flat to tell from one.
+    Collinear,
+    /// A coordinate is NaN, infinite, or so large that its fourth power overflows (beyond about 1e75).
+    NonFinite,
+    /// x and y differ in length.
+    Lengths {
+        /// Number of x.
+        x: usize,
+        /// Number of y.
+        y: usize,
+    },
+}
+
+impl fmt::Display for CircleError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TooFew { points } => write!(f, "a circle needs at least 3 points, got {points}"),
+            Self::Coincident => f.write_str("all points coincide"),
+            Self::Collinear => f.write_str("the points lie on a line"),
+            Self::NonFinite => f.write_str("a coordinate is not a finite number of sensible size"),
+            Self::Lengths { x, y } => write!(f, "{x} x coordinates but {y} y coordinates"),
+        }
+    }
+}
+
+impl core::error::Error for CircleError {}
+
+/// Least-squares circle: minimises the sum of squared distances between points and circle.
+///
+/// # Errors
+/// [`CircleError`] for fewer than three points, coincident or collinear points, or a coordinate that is not finite.
+pub fn fit(points: &(impl Points + ?Sized)) -> Result<CircleFit, CircleError> {
+    let moments = Moments::of(points);
+    let start = hyper(&moments)?;
+    refine(points, &moments, start)
+}

@@ -1,0 +1,96 @@
+//! The plane of a circle measured in space.
+use super::CircleError;
+use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+use num_traits::Float;
+
+/// Least-squares (orthogonal) plane through 3-D points, with axes in it for projection.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    /// Mean of the points, m; lies in the plane.
+    pub centroid: [f64; 3],
+    /// Unit normal, in the hemisphere of +z so that counter-clockwise seen from above stays so.
+    pub normal: [f64; 3],
+    /// Unit vectors in the plane: the first is x projected (y, for a plane across x), the second completes
+    /// the right-handed frame with the normal.
+    pub axes: [[f64; 3]; 2],
+    /// Angle between normal and z, rad, 0…π/2.
+    pub tilt_rad: f64,
+    /// Root mean square distance of the points from the plane, m.
+    pub rms: f64,
+    /// Flatness: highest minus lowest point over the plane, m.
+    pub flatness: f64,
+}
+
+impl Plane {
+    /// Fits a plane to points that may be walked twice.
+    ///
+    /// # Errors
+    /// [`CircleError`] for fewer than three points, coincident or collinear points, a coordinate that is not finite.
+    pub fn fit<I>(points: I) -> Result<Self, CircleError>
+    where
+        I: Iterator<Item = [f64; 3]> + Clone,
+    {
+        let count = points.clone().count();
+        if count < 3 {
+            return Err(CircleError::TooFew { points: count });
+        }
+        let n = count as f64;
+        let Some(first) = points.clone().next() else { return Err(CircleError::TooFew { points: 0 }) };
+        let first = Vector3::from(first);
+        let offset = points.clone().map(|p| Vector3::from(p) - first).sum::<Vector3<f64>>() / n;
+        let centroid = first + offset;
+        let mut scatter = Matrix3::zeros();
+        for p in points.clone() {
+            let d = (Vector3::from(p) - first) - offset;
+            scatter += d * d.transpose();
+        }
+        scatter /= n;
+        if !scatter.iter().all(|v| v.is_finite()) {
+            return Err(CircleError::NonFinite);
+        }
+        let spread = Float::sqrt(scatter.trace());
+        let digits = 4.0 * f64::EPSILON * centroid.amax();
+        if spread <= digits.max(f64::MIN_POSITIVE) || !(1.0 / (spread * spread)).is_finite() {
+            return Err(CircleError::Coincident);
+        }
+        let eigen = SymmetricEigen::new(scatter / (spread * spread));
+        let mut order = [0, 1, 2];
+        order.sort_unstable_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+        // Below 1e-7 of the spread the second direction is lost in the rounding of the scatter.
+        if eigen.eigenvalues[order[1]] <= 1e-14 {
+            return Err(CircleError::Collinear);
+        }
+        let mut normal: Vector3<f64> = eigen.eigenvectors.column(order[0]).normalize();
+        if normal.z < 0.0 {
+            normal = -normal;
+        }
+        let reference = if Float::abs(normal.x) < 0.999 { Vector3::x() } else { Vector3::y() };
+        let along = (reference - normal * normal.dot(&reference)).normalize();
+        let across = normal.cross(&along);
+        let (mut lowest, mut highest, mut squares) = (0.0_f64, 0.0_f64, 0.0);
+        for p in points {
+            let height = ((Vector3::from(p) - first) - offset).dot(&normal);
+            (lowest, highest) = (lowest.min(height), highest.max(height));
+            squares += height * height;
+        }
+        Ok(Self {
+            centroid: centroid.into(),
+            normal: normal.into(),
+            axes: [along.into(), across.into()],
+            tilt_rad: Float::atan2(Float::hypot(normal.x, normal.y), normal.z),
+            rms: Float::sqrt(squares / n),
+            flatness: highest - lowest,
+        })
+    }
+
+    /// Coordinates of a point along [`axes`](Self::axes), from the centroid, m.
+    pub fn project(&self, point: [f64; 3]) -> [f64; 2] {
+        let d: [f64; 3] = core::array::from_fn(|i| point[i] - self.centroid[i]);
+        self.axes.map(|axis| axis[0] * d[0] + axis[1] * d[1] + axis[2] * d[2])
+    }
+
+    /// The point in space at coordinates that [`project`](Self::project) gives.
+    pub fn lift(&self, point: [f64; 2]) -> [f64; 3] {
+        core::array::from_fn(|i| self.centroid[i] + point[0] * self.axes[0][i] + point[1] * self.axes[1][i])
+    }
+}
