@@ -1,5 +1,47 @@
 //! Campaigns of circular tests: what was measured, checked at the border, in SI units.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `manifest` | `campaign.toml`, strictly |
+//! | `table` | the numbers of a CSV, fast |
+//! | `samples` | columns → one turn of polar samples |
+//! | `check` | whether numbers can be what the campaign says they are |
+//! | `read`, `write` | whole campaigns; run by run where memory counts |
+//! | `error` | everything a campaign is refused for, with its place |
+mod check;
+mod error;
+mod manifest;
+mod read;
+mod samples;
+mod table;
+#[cfg(test)]
+mod tests;
+mod write;
+
+pub use error::{CampaignError, Place, Problem};
 pub use giotto_shared::Direction;
+pub use manifest::{Entry, Manifest, SHORTEST_ARC_DEG};
+pub use read::{Together, read, read_with_notes};
+pub use samples::{Frame, Loaded, Tilt};
+pub use write::write;
+
+use std::f64::consts::TAU;
+use std::fmt;
+
+/// Something odd but possible, for the person who reads the result.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Note {
+    /// Where.
+    pub at: Place,
+    /// What.
+    pub text: String,
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "note: {}: {}", self.at, self.text)
+    }
+}
 
 /// A set of circular tests of one machine.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,11 +102,30 @@ impl Run {
         f64::from(self.direction.sign())
     }
 
-    /// Duration of the recorded turn (n samples last n spacings), s; `None` without time stamps.
+    /// Duration of one turn, s; `None` without time stamps. Where the angle was inferred the recorded lap is
+    /// the turn (n samples last n spacings), else it follows from the angle that was covered.
     pub fn turn_s(&self) -> Option<f64> {
         let time = self.samples.time_s.as_ref()?;
         let (first, last) = (time.first()?, time.last()?);
         let n = time.len() as f64;
-        (n > 1.0).then(|| (last - first) * n / (n - 1.0))
+        if n < 2.0 {
+            return None;
+        }
+        let span = last - first;
+        if self.samples.angle_inferred {
+            return Some(span * n / (n - 1.0));
+        }
+        let covered = (self.samples.angle_rad.last()? - self.samples.angle_rad.first()?).abs();
+        (covered > 0.0).then(|| span * TAU / covered)
+    }
+}
+
+impl Samples {
+    /// Angle covered, rad, counting one spacing for the last sample; `None` for a whole turn.
+    pub fn arc_rad(&self) -> Option<f64> {
+        let n = self.angle_rad.len() as f64;
+        let span = (self.angle_rad.last()? - self.angle_rad.first()?).abs();
+        let spacing = span / (n - 1.0).max(1.0);
+        (span + spacing < TAU - 2.0 * spacing - 1f64.to_radians()).then_some(span + spacing)
     }
 }

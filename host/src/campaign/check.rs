@@ -1,0 +1,361 @@
+//! Whether the numbers of a run can be what the campaign says they are. What cannot is refused by name;
+//! what is odd but possible becomes a note.
+use super::Note;
+use super::error::{CampaignError, Place, Problem};
+use super::manifest::Entry;
+use super::table::place;
+use giotto_shared::Direction;
+use std::f64::consts::TAU;
+
+/// Largest deviation that still is one, share of the radius.
+const LARGEST_DEVIATION: f64 = 0.1;
+/// A sample that far from both neighbours is no motion of a machine: the larger of 1 mm and 1 % of the radius.
+const SPIKE_M: f64 = 1e-3;
+/// Readings this far out that do not move any more stand at the end of a ballbar's range (±1 mm).
+const INSTRUMENT_LIMIT_M: f64 = 0.99e-3;
+const ROWS_AT_LIMIT: usize = 5;
+/// A turn shorter than this share of the programmed one is not whole: feed overrides end at 125 %.
+const SHORTEST_TURN: f64 = 0.79;
+/// A turn longer than this many programmed ones is a wrong unit: controllers slow down by less.
+const LONGEST_TURN: f64 = 30.0;
+/// Largest hole in a turn, degrees.
+const LARGEST_GAP_DEG: f64 = 36.0;
+/// Noise below which two equal files may be two runs of a simulation without noise, m.
+const SMALLEST_NOISE_M: f64 = 0.15e-6;
+
+/// What the time stamps of a run say.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Clock {
+    /// Duration of the recorded rows plus one spacing, s.
+    pub(super) turn_s: f64,
+    /// Typical spacing, s.
+    pub(super) spacing_s: f64,
+    /// The largest hole: row after it and its length beyond one spacing, s.
+    pub(super) gap: Option<(usize, f64)>,
+}
+
+fn err(entry: &Entry, row: usize, field: usize, problem: Problem) -> CampaignError {
+    CampaignError::new(place(&entry.path, row, field), problem)
+}
+
+/// Time stamps (from 0) must grow; `first_s` is the one subtracted.
+pub(super) fn clock(entry: &Entry, time: &[f64], field: usize, first_s: f64) -> Result<Clock, CampaignError> {
+    if let Some(k) = time.windows(2).position(|w| w[1] < w[0]) {
+        let problem = Problem::TimeBackwards { from_s: time[k] + first_s, to_s: time[k + 1] + first_s };
+        return Err(err(entry, k + 1, field, problem));
+    }
+    let last = time[time.len() - 1];
+    if last <= 0.0 {
+        return Err(err(entry, time.len() - 1, field, Problem::TimeConstant { at_s: first_s }));
+    }
+    // Stamps are rounded to the ticks of the instrument: spacings scatter by up to a tick, a lost sample adds a spacing.
+    let stride = (time.len() - 1).div_ceil(1 << 16);
+    let mut spacings: Vec<f64> = (1..time.len()).step_by(stride).map(|k| time[k] - time[k - 1]).collect();
+    spacings.sort_unstable_by(f64::total_cmp);
+    let at = |share: f64| spacings[((spacings.len() - 1) as f64 * share).round() as usize];
+    let central = &spacings[spacings.len() / 20..spacings.len() - spacings.len() / 20];
+    let spacing_s = central.iter().sum::<f64>() / central.len() as f64;
+    let limit = spacing_s + f64::max(1.05 * (at(0.95) - at(0.05)), 0.5 * spacing_s);
+    let mut gap: Option<(usize, f64)> = None;
+    for k in 1..time.len() {
+        let hole = time[k] - time[k - 1];
+        if hole > limit && gap.is_none_or(|(_, largest)| hole - spacing_s > largest) {
+            gap = Some((k, hole - spacing_s));
+        }
+    }
+    let n = time.len() as f64;
+    let turn_s = if gap.is_some() { last + spacing_s } else { last * n / (n - 1.0) };
+    Ok(Clock { turn_s, spacing_s, gap })
+}
+
+/// Holes in the recording: small ones are noted, large ones refused.
+pub(super) fn gaps(
+    entry: &Entry,
+    clock: &Clock,
+    time: &[f64],
+    field: usize,
+    notes: &mut Vec<Note>,
+) -> Result<(), CampaignError> {
+    let Some((row, gap_s)) = clock.gap else { return Ok(()) };
+    let gap_deg = 360.0 * gap_s / clock.turn_s;
+    if gap_deg > LARGEST_GAP_DEG {
+        return Err(err(entry, row, field, Problem::Gap { gap_s, gap_deg, limit_deg: LARGEST_GAP_DEG }));
+    }
+    let lost = ((clock.turn_s / clock.spacing_s).round() - time.len() as f64).max(1.0);
+    let at = Place::at(&entry.path, row + 2, 1);
+    let text = format!(
+        "about {lost} samples are missing (largest hole {gap_deg:.2}°); angles follow the time stamps"
+    );
+    notes.push(Note { at, text });
+    Ok(())
+}
+
+/// Deviations must be those of a circle of the programmed radius.
+pub(super) fn deviation(
+    entry: &Entry,
+    deviation: &[f64],
+    field: usize,
+    column: &str,
+) -> Result<(), CampaignError> {
+    let radius = entry.radius_m;
+    let limit = LARGEST_DEVIATION * radius;
+    let refuse = |row: usize, hint: String, expected: String| {
+        let value = if column == "radius_mm" {
+            format!("{:.6} mm", (deviation[row] + radius) * 1e3)
+        } else {
+            format!("{:.1} µm", deviation[row] * 1e6)
+        };
+        let (column, radius_mm) = (column.to_owned(), tidy(radius * 1e3));
+        Err(err(entry, row, field, Problem::Implausible { column, value, radius_mm, hint, expected }))
+    };
+    if let Some(row) = deviation.iter().position(|v| v.abs() > limit) {
+        let mean = deviation.iter().sum::<f64>() / deviation.len() as f64;
+        let hint = if column == "radius_mm" {
+            unit_hint((mean + radius) / radius)
+        } else if (mean / radius - 1.0).abs() < 0.1 {
+            "these look like radii, not deviations".to_owned()
+        } else if deviation.iter().filter(|v| v.abs() > limit).count() * 2 < deviation.len() {
+            "an outlier".to_owned()
+        } else {
+            "the unit may be wrong".to_owned()
+        };
+        return refuse(row, hint, format!("within ±{} mm", tidy(limit * 1e3)));
+    }
+    let spike = SPIKE_M.max(0.01 * radius);
+    let lone = |w: &[f64]| (w[1] - w[0]).abs().min((w[1] - w[2]).abs()) > spike;
+    if let Some(k) = deviation.windows(3).position(lone).filter(|_| deviation.len() >= 90) {
+        let expected = format!("within {} mm of its neighbours", tidy(spike * 1e3));
+        return refuse(k + 1, "a single reading far from its neighbours".to_owned(), expected);
+    }
+    let mut run = 1;
+    for k in 1..deviation.len() {
+        run = if deviation[k] == deviation[k - 1] && deviation[k].abs() >= INSTRUMENT_LIMIT_M {
+            run + 1
+        } else {
+            1
+        };
+        let same_everywhere = || deviation.iter().all(|&v| v == deviation[k]);
+        if run >= ROWS_AT_LIMIT && !same_everywhere() && is_extreme(deviation, deviation[k]) {
+            let rows = run + deviation[k + 1..].iter().take_while(|&&v| v == deviation[k]).count();
+            let value_um = tidy(deviation[k] * 1e6);
+            return Err(err(entry, k + 1 - run, field, Problem::OutOfInstrumentRange { value_um, rows }));
+        }
+    }
+    Ok(())
+}
+
+/// Whether no reading lies further out on the same side.
+fn is_extreme(deviation: &[f64], value: f64) -> bool {
+    deviation.iter().all(|&v| v * value.signum() <= value.abs())
+}
+
+/// Rounds away what the conversion of units left behind.
+fn tidy(value: f64) -> f64 {
+    (value * 1e6).round() / 1e6
+}
+
+/// Words for a length that is `relative` times what it should be.
+pub(super) fn unit_hint(relative: f64) -> String {
+    let near = |factor: f64| (relative / factor - 1.0).abs() < 0.1;
+    if near(1e-3) {
+        "1000 times too small, as if in metres".to_owned()
+    } else if near(1e3) {
+        "1000 times too large, as if in micrometres".to_owned()
+    } else if near(1.0 / 25.4) {
+        "25.4 times too small, as if in inches".to_owned()
+    } else if near(2.0) {
+        "twice as large, as if the diameter were meant".to_owned()
+    } else if near(0.5) {
+        "half as large, as if the diameter were programmed".to_owned()
+    } else {
+        format!("{relative:.4} times as large")
+    }
+}
+
+/// Measured against programmed duration of one turn, for files with angles of their own.
+pub(super) fn feed(entry: &Entry, turn_s: f64, notes: &mut Vec<Note>) -> Result<(), CampaignError> {
+    let programmed_s = TAU * entry.radius_m / entry.feed_m_s;
+    let ratio = turn_s / programmed_s;
+    if !(1.0 / LONGEST_TURN..=LONGEST_TURN).contains(&ratio) {
+        let problem = Problem::TooLong { measured_s: turn_s, programmed_s, hint: duration_hint(ratio) };
+        return Err(CampaignError::new(Place::at(&entry.path, 2, 1), problem));
+    }
+    if ratio < 0.97 {
+        notes.push(fast(entry, ratio));
+    }
+    Ok(())
+}
+
+/// As [`feed`] where the whole file stands for one turn; tells how many laps the file may hold instead.
+pub(super) fn duration(
+    entry: &Entry,
+    turn_s: f64,
+    deviation: &[f64],
+    notes: &mut Vec<Note>,
+) -> Result<Option<u32>, CampaignError> {
+    let programmed_s = TAU * entry.radius_m / entry.feed_m_s;
+    let ratio = turn_s / programmed_s;
+    let at = Place::at(&entry.path, deviation.len() + 1, 1);
+    if ratio < 1.0 / LONGEST_TURN || ratio > LONGEST_TURN {
+        let problem = Problem::TooLong { measured_s: turn_s, programmed_s, hint: duration_hint(ratio) };
+        return Err(CampaignError::new(at, problem));
+    }
+    if ratio < SHORTEST_TURN {
+        let problem = Problem::TooShort { measured_s: turn_s, programmed_s, share: ratio };
+        return Err(CampaignError::new(at, problem));
+    }
+    if ratio < 0.97 {
+        notes.push(fast(entry, ratio));
+    }
+    let laps = ratio.round();
+    if laps >= 2.0 && (ratio / laps - 1.0).abs() < 0.03 && repeats(deviation, laps as usize) {
+        return Ok(Some(laps as u32));
+    }
+    Ok(None)
+}
+
+/// The refusal for a file of several laps.
+pub(super) fn several_laps(entry: &Entry, turn_s: f64, rows: usize, laps: u32) -> CampaignError {
+    let programmed_s = TAU * entry.radius_m / entry.feed_m_s;
+    let problem = Problem::SeveralLaps { measured_s: turn_s, programmed_s, laps };
+    CampaignError::new(Place::at(&entry.path, rows / laps as usize + 2, 1), problem)
+}
+
+fn fast(entry: &Entry, ratio: f64) -> Note {
+    let text = format!("the turn took {:.0} % of the programmed time: a feed override?", 100.0 * ratio);
+    Note { at: Place::at(&entry.path, 2, 1), text }
+}
+
+fn duration_hint(ratio: f64) -> String {
+    let near = |factor: f64| (ratio / factor - 1.0).abs() < 0.2;
+    if near(1e3) {
+        "1000 times as long, as if time were in ms, the feed in m/s or the radius in m".to_owned()
+    } else if near(1e-3) {
+        "1000 times shorter, as if the radius were in µm or the feed in µm/s".to_owned()
+    } else if near(60.0) {
+        "60 times as long, as if the feed were in mm/min".to_owned()
+    } else if near(1.0 / 60.0) {
+        "60 times shorter, as if time were in minutes".to_owned()
+    } else {
+        format!("{ratio:.4} times as long")
+    }
+}
+
+/// Whether the deviations show only orders that are multiples of `laps` over the file: the same circle again.
+fn repeats(deviation: &[f64], laps: usize) -> bool {
+    let n = deviation.len();
+    if n.is_multiple_of(laps) && (n / laps..n).all(|k| deviation[k] == deviation[k - n / laps]) {
+        return deviation.iter().any(|v| *v != deviation[0]);
+    }
+    let stride = n.div_ceil(1 << 14);
+    let used: Vec<f64> = deviation.iter().copied().step_by(stride).collect();
+    let m = used.len() as f64;
+    let amplitude = |order: usize| {
+        let (mut c, mut s) = (0.0, 0.0);
+        for (k, v) in used.iter().enumerate() {
+            let (sin, cos) = (TAU * order as f64 * k as f64 / m).sin_cos();
+            c += v * cos;
+            s += v * sin;
+        }
+        2.0 / m * f64::hypot(c, s)
+    };
+    let noise = 6.0 * scatter(&used) * (2.0 / m).sqrt();
+    let all: Vec<(usize, f64)> = (1..=8 * laps).map(|order| (order, amplitude(order))).collect();
+    let strongest = |multiple: bool| {
+        all.iter().filter(|(o, _)| o.is_multiple_of(laps) == multiple).map(|(_, a)| *a).fold(0.0, f64::max)
+    };
+    let (own, other) = (strongest(true), strongest(false));
+    own > noise && (other <= noise || other < 0.02 * own)
+}
+
+/// Standard deviation of the sample noise from second differences, robust.
+pub(super) fn scatter(values: &[f64]) -> f64 {
+    if values.len() < 3 {
+        return 0.0;
+    }
+    let stride = (values.len() - 2).div_ceil(1 << 14);
+    let mut second: Vec<f64> = (1..values.len() - 1)
+        .step_by(stride)
+        .map(|k| (values[k + 1] - 2.0 * values[k] + values[k - 1]).abs())
+        .collect();
+    let middle = second.len() / 2;
+    let (_, median, _) = second.select_nth_unstable_by(middle, f64::total_cmp);
+    // Median of |N(0, σ)| is 0.6745 σ; the second difference of white noise has variance 6σ².
+    *median / (0.674_489_75 * 6f64.sqrt())
+}
+
+/// Identity of a measurement by its noise: two runs of a machine never share it.
+pub(super) fn fingerprint(deviation: &[f64]) -> Option<u64> {
+    if scatter(deviation) < SMALLEST_NOISE_M {
+        return None;
+    }
+    let mix = |h: u64, v: &f64| (h ^ v.to_bits()).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29);
+    Some(deviation.iter().fold(deviation.len() as u64, mix))
+}
+
+/// Unwrapped angles must make one turn (or the declared arc) in the direction of travel.
+pub(super) fn angles(
+    entry: &Entry,
+    angle: &[f64],
+    field: usize,
+    covered: &mut f64,
+    notes: &mut Vec<Note>,
+) -> Result<(), CampaignError> {
+    let n = angle.len();
+    let d = f64::from(entry.direction.sign());
+    let (lowest, highest) = angle.iter().fold((f64::MAX, f64::MIN), |(l, h), &a| (l.min(a), h.max(a)));
+    if (highest - lowest).to_degrees() < 0.5 {
+        return Err(err(entry, n - 1, field, Problem::AngleConstant { at_deg: angle[0].to_degrees() }));
+    }
+    let span = angle[n - 1] - angle[0];
+    if span * d < 0.0 {
+        let words = |up: bool| if up { "counter-clockwise (growing)" } else { "clockwise (falling)" };
+        let ccw = entry.direction == Direction::Ccw;
+        let direction = if ccw { "ccw" } else { "cw" };
+        let problem = Problem::DirectionContradicted { found: words(!ccw), expected: words(ccw), direction };
+        return Err(err(entry, n - 1, field, problem));
+    }
+    let one_degree = 1f64.to_radians();
+    if let Some(k) = angle.windows(2).position(|w| d * (w[1] - w[0]) < -one_degree) {
+        let back_deg = (d * (angle[k] - angle[k + 1])).to_degrees();
+        return Err(err(entry, k + 1, field, Problem::AngleBackwards { back_deg }));
+    }
+    let spacing = span.abs() / (n - 1) as f64;
+    *covered = span.abs() + spacing;
+    let tolerance = 2.0 * spacing + 1f64.to_radians();
+    let covered_deg = covered.to_degrees();
+    match entry.arc_rad {
+        Some(declared) if (*covered - declared).abs() > tolerance => {
+            let problem = Problem::ArcContradicted { covered_deg, declared_deg: tidy(declared.to_degrees()) };
+            return Err(err(entry, n - 1, field, problem));
+        }
+        Some(_) => {}
+        None if *covered < TAU - tolerance => {
+            return Err(err(entry, n - 1, field, Problem::Arc { covered_deg }));
+        }
+        None if *covered > TAU + tolerance => {
+            let row = angle.iter().position(|a| (a - angle[0]).abs() >= TAU).unwrap_or(n - 1);
+            return Err(err(entry, row, field, Problem::SeveralTurns { turns: *covered / TAU }));
+        }
+        None => {}
+    }
+    if let Some(k) = angle.windows(2).position(|w| {
+        let hole = (w[1] - w[0]).abs();
+        hole.to_degrees() > LARGEST_GAP_DEG && hole > 3.0 * spacing
+    }) {
+        let gap_deg = (angle[k + 1] - angle[k]).abs().to_degrees();
+        let gap_s = gap_deg.to_radians() * entry.radius_m / entry.feed_m_s;
+        return Err(err(entry, k + 1, field, Problem::Gap { gap_s, gap_deg, limit_deg: LARGEST_GAP_DEG }));
+    }
+    if let Some(start) = entry.start_angle_rad {
+        let off = ((angle[0] - start + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0).to_degrees();
+        if off.abs() > 5.0 + spacing.to_degrees() {
+            let (said, found) = (start.to_degrees(), angle[0].to_degrees());
+            let text = format!(
+                "start_angle_deg = {said:.1}, the first sample lies at {found:.1}°: the file is believed"
+            );
+            notes.push(Note { at: place(&entry.path, 0, field), text });
+        }
+    }
+    Ok(())
+}

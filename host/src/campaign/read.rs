@@ -1,0 +1,112 @@
+//! Reading campaigns: all at once, or run by run for those that do not fit in memory.
+use super::check;
+use super::error::{CampaignError, Place, Problem};
+use super::manifest::Manifest;
+use super::samples::{self, Loaded};
+use super::{Campaign, Note};
+use rayon::prelude::*;
+use std::collections::HashMap;
+use std::f64::consts::TAU;
+use std::path::Path;
+
+/// Reads a campaign: its directory, or its `campaign.toml`.
+///
+/// # Errors
+/// The first problem in file order, with file, line and column.
+pub fn read(path: &Path) -> Result<Campaign, CampaignError> {
+    read_with_notes(path).map(|(campaign, _)| campaign)
+}
+
+/// As [`read`], with what a reader should know of it: keys not used, samples lost, feeds exceeded.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_with_notes(path: &Path) -> Result<(Campaign, Vec<Note>), CampaignError> {
+    let manifest = Manifest::open(path)?;
+    let loaded: Vec<Result<Loaded, CampaignError>> =
+        manifest.runs.par_iter().map(|entry| samples::load(entry, true)).collect();
+    let mut together = Together::new(&manifest);
+    let mut runs = Vec::with_capacity(loaded.len());
+    let mut notes = manifest.notes.clone();
+    for (index, loaded) in loaded.into_iter().enumerate() {
+        let loaded = loaded?;
+        together.add(index, &loaded);
+        notes.extend(loaded.notes);
+        runs.push(loaded.run);
+    }
+    together.check()?;
+    Ok((Campaign { name: manifest.name, machine: manifest.machine, runs }, notes))
+}
+
+impl Manifest {
+    /// Reads and checks run `index` without keeping its time stamps. What only shows across runs is for
+    /// [`Together`] to say.
+    ///
+    /// # Errors
+    /// Whatever keeps the file from being this run.
+    pub fn load(&self, index: usize) -> Result<Loaded, CampaignError> {
+        samples::load(&self.runs[index], false)
+    }
+}
+
+/// Checks across the runs of a campaign, in constant memory a run.
+#[derive(Debug)]
+pub struct Together<'a> {
+    manifest: &'a Manifest,
+    seen: Vec<(usize, Seen)>,
+}
+
+#[derive(Debug)]
+struct Seen {
+    fingerprint: Option<u64>,
+    laps: Option<u32>,
+    rows: usize,
+    /// Measured over programmed duration of the turn.
+    slow: Option<(f64, f64)>,
+}
+
+impl<'a> Together<'a> {
+    /// For the runs of this campaign.
+    pub fn new(manifest: &'a Manifest) -> Self {
+        Self { manifest, seen: Vec::with_capacity(manifest.runs.len()) }
+    }
+
+    /// Takes note of run `index`.
+    pub fn add(&mut self, index: usize, loaded: &Loaded) {
+        let run = &loaded.run;
+        let slow = loaded.turn_s.map(|turn| (turn, turn / (TAU * run.radius_m / run.feed_m_s)));
+        let seen = Seen {
+            fingerprint: loaded.fingerprint,
+            laps: loaded.laps,
+            rows: run.samples.deviation_m.len(),
+            slow,
+        };
+        self.seen.push((index, seen));
+    }
+
+    /// # Errors
+    /// A file measured once and listed as two runs; several laps in one file.
+    pub fn check(mut self) -> Result<(), CampaignError> {
+        self.seen.sort_by_key(|(index, _)| *index);
+        // A controller that slows down does so by degrees; a file of two laps lasts exactly two.
+        let by_degrees = self.seen.iter().any(|(_, s)| {
+            s.slow.is_some_and(|(_, ratio)| ratio > 1.05 && (ratio / ratio.round() - 1.0).abs() > 0.05)
+        });
+        let mut known: HashMap<u64, usize> = HashMap::new();
+        for (index, seen) in &self.seen {
+            let entry = &self.manifest.runs[*index];
+            if let (Some(laps), Some((turn_s, _)), false) = (seen.laps, seen.slow, by_degrees) {
+                return Err(check::several_laps(entry, turn_s, seen.rows, laps));
+            }
+            let Some(print) = seen.fingerprint else { continue };
+            if let Some(first) = known.insert(print, *index) {
+                let other = self.manifest.runs[first].file.clone();
+                return Err(CampaignError::new(
+                    Place::at(&entry.path, 2, 1),
+                    Problem::DuplicateData { other },
+                ));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,366 @@
+//! The numbers of a run's CSV, fast: chunked reads, exact floats, errors by line and column.
+use super::error::{CampaignError, Place, Problem};
+use rayon::prelude::*;
+use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
+use std::path::Path;
+
+/// Bytes parsed by one task, and tasks read ahead at a time: together they bound the memory beside the columns.
+const BLOCK: usize = 1 << 20;
+const BLOCKS: usize = 8;
+
+const EXPECTED_RUN: &str = "a CSV with one run";
+
+/// A column of the contract.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Column {
+    /// `time_s`.
+    Time,
+    /// `angle_deg`.
+    Angle,
+    /// `deviation_um`, `deviation_mm`.
+    Deviation(Unit),
+    /// `radius_mm`.
+    Radius,
+    /// `x_mm`, `y_mm`, `z_mm`.
+    Position(usize),
+}
+
+/// Unit of a length in a header.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Unit {
+    Um,
+    Mm,
+}
+
+impl Column {
+    fn parse(name: &str) -> Option<Self> {
+        Some(match name {
+            "time_s" => Self::Time,
+            "angle_deg" => Self::Angle,
+            "deviation_um" => Self::Deviation(Unit::Um),
+            "deviation_mm" => Self::Deviation(Unit::Mm),
+            "radius_mm" => Self::Radius,
+            "x_mm" => Self::Position(0),
+            "y_mm" => Self::Position(1),
+            "z_mm" => Self::Position(2),
+            _ => return None,
+        })
+    }
+
+    /// The name in a header.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Time => "time_s",
+            Self::Angle => "angle_deg",
+            Self::Deviation(Unit::Um) => "deviation_um",
+            Self::Deviation(Unit::Mm) => "deviation_mm",
+            Self::Radius => "radius_mm",
+            Self::Position(0) => "x_mm",
+            Self::Position(1) => "y_mm",
+            Self::Position(_) => "z_mm",
+        }
+    }
+}
+
+/// Columns of one run as written in its file. Row `k` (from 0) stands in line `k + 2`.
+#[derive(Debug)]
+pub(crate) struct Table {
+    pub(crate) header: Vec<Column>,
+    pub(crate) columns: Vec<Vec<f64>>,
+}
+
+impl Table {
+    /// Reads a file of one of the contract's shapes.
+    pub(crate) fn read(path: &Path) -> Result<Self, CampaignError> {
+        let io = |e: std::io::Error| CampaignError::io(path, "read", EXPECTED_RUN, &e);
+        if path.is_dir() {
+            return Err(CampaignError::new(
+                Place::file(path),
+                Problem::IsDirectory { expected: EXPECTED_RUN },
+            ));
+        }
+        let mut file = std::fs::File::open(path).map_err(io)?;
+        let size = file.metadata().map_err(io)?.len();
+        let mut buffer = Vec::with_capacity(BLOCK.min(usize::try_from(size).unwrap_or(BLOCK)) + 1);
+        file.by_ref().take(BLOCK as u64).read_to_end(&mut buffer).map_err(io)?;
+        if buffer.is_empty() {
+            return Err(CampaignError::new(Place::file(path), Problem::Empty { expected: EXPECTED_RUN }));
+        }
+        let start = if buffer.starts_with(b"\xEF\xBB\xBF") { 3 } else { 0 };
+        let end = buffer[start..].iter().position(|&b| b == b'\n').map_or(buffer.len(), |p| start + p);
+        let header = parse_header(path, &buffer[start..end])?;
+        let mut body = (end + 1).min(buffer.len());
+
+        // Rows are about as long as the first ones: reserve once, so that growing never doubles the memory.
+        let sample = &buffer[body..];
+        let lines = sample.iter().filter(|&&b| b == b'\n').count().max(1) as u64;
+        let rows = size * lines / (sample.len().max(1) as u64) + size / 64 + 16;
+        let rows = usize::try_from(rows.min(size / 2 + 1)).unwrap_or(0);
+        let mut columns: Vec<Vec<f64>> = header.iter().map(|_| Vec::with_capacity(rows)).collect();
+
+        let mut blank_at: Option<u64> = None;
+        let mut consumed = 0u64; // bytes of the file before `buffer`
+        loop {
+            let last = buffer.len() as u64 + consumed >= size && {
+                let before = buffer.len();
+                file.by_ref().take(BLOCK as u64).read_to_end(&mut buffer).map_err(io)?;
+                buffer.len() == before
+            };
+            let whole = if last {
+                buffer.len()
+            } else {
+                buffer.iter().rposition(|&b| b == b'\n').map_or(body, |p| p + 1)
+            };
+            if whole == body && !last && buffer.len() > BLOCKS * BLOCK {
+                return Err(explain(path, &header, consumed + body as u64)); // no line end in sight: not a table
+            }
+            let blocks = split_at_lines(&buffer[body..whole], BLOCK);
+            let width = header.len();
+            let parse = |block: &&[u8]| parse_block(block, width);
+            let parsed: Vec<_> = if blocks.len() > 1 {
+                blocks.par_iter().map(parse).collect()
+            } else {
+                blocks.iter().map(parse).collect()
+            };
+            for (block, result) in blocks.iter().zip(parsed) {
+                let start = consumed + (block.as_ptr() as usize - buffer.as_ptr() as usize) as u64;
+                let parsed = result.map_err(|at| explain(path, &header, start + at as u64))?;
+                if let (Some(at), true) = (blank_at, parsed.rows > 0) {
+                    return Err(explain(path, &header, at));
+                }
+                for (column, part) in columns.iter_mut().zip(&parsed.columns) {
+                    column.extend_from_slice(part);
+                }
+                blank_at = blank_at.or(parsed.blank_at.map(|at| start + at as u64));
+            }
+            if last {
+                break;
+            }
+            consumed += whole as u64;
+            buffer.drain(..whole);
+            body = 0;
+            file.by_ref().take((BLOCK * BLOCKS) as u64).read_to_end(&mut buffer).map_err(io)?;
+        }
+        Ok(Self { header, columns })
+    }
+
+    /// Number of rows.
+    pub(crate) fn rows(&self) -> usize {
+        self.columns.first().map_or(0, Vec::len)
+    }
+
+    /// Index of a column.
+    pub(crate) fn index(&self, wanted: impl Fn(Column) -> bool) -> Option<usize> {
+        self.header.iter().position(|&c| wanted(c))
+    }
+}
+
+/// The place of a field, for checks that know only row and column. Reads the file again (errors are rare).
+pub(crate) fn place(path: &Path, row: usize, field: usize) -> Place {
+    let line_number = row + 2;
+    let column = std::fs::File::open(path)
+        .ok()
+        .and_then(|f| BufReader::new(f).split(b'\n').nth(line_number - 1)?.ok())
+        .map_or(1, |line| {
+            let before = line
+                .split(|&b| b == b',')
+                .take(field)
+                .map(|f| String::from_utf8_lossy(f).chars().count() + 1);
+            1 + before.sum::<usize>()
+        });
+    Place::at(path, line_number, column)
+}
+
+fn parse_header(path: &Path, line: &[u8]) -> Result<Vec<Column>, CampaignError> {
+    let err = |column: usize, problem| Err(CampaignError::new(Place::at(path, 1, column), problem));
+    let Ok(line) = std::str::from_utf8(line) else {
+        let at = std::str::from_utf8(line).map_or_else(|e| e.valid_up_to(), |_| 0);
+        let column = String::from_utf8_lossy(&line[..at]).chars().count() + 1;
+        return err(column, Problem::NotUtf8 { expected: EXPECTED_RUN });
+    };
+    let line = line.trim_end_matches('\r');
+    if line.trim().is_empty() {
+        return err(1, Problem::Header { found: String::new() });
+    }
+    let mut header = Vec::new();
+    let mut column = 1;
+    for name in line.split(',') {
+        match Column::parse(name.trim()) {
+            Some(c) if header.contains(&c) => {
+                return err(column, Problem::DuplicateColumn { name: name.trim().to_owned() });
+            }
+            Some(c) => header.push(c),
+            None if line.contains(';') => return err(line.find(';').unwrap_or(0) + 1, Problem::Semicolons),
+            None if line.split(',').all(|f| f.trim().parse::<f64>().is_ok()) => {
+                return err(1, Problem::NoHeader);
+            }
+            None => return err(column, Problem::Header { found: shorten(line) }),
+        }
+        column += name.chars().count() + 1;
+    }
+    let has = |c: Column| header.contains(&c);
+    let radial = header.iter().filter(|c| matches!(c, Column::Deviation(_) | Column::Radius)).count();
+    let positions = header.iter().filter(|c| matches!(c, Column::Position(_))).count();
+    let polar = radial == 1 && positions == 0 && (has(Column::Time) || has(Column::Angle));
+    let planar = radial == 0 && !has(Column::Angle) && has(Column::Position(0)) && has(Column::Position(1));
+    if !(polar || planar) {
+        return err(1, Problem::Header { found: shorten(line) });
+    }
+    Ok(header)
+}
+
+pub(crate) fn shorten(text: &str) -> String {
+    let text = text.trim();
+    if text.chars().count() <= 60 {
+        text.to_owned()
+    } else {
+        text.chars().take(57).chain("…".chars()).collect()
+    }
+}
+
+/// Cuts at line ends into blocks of at least `size` bytes (the last may be shorter).
+fn split_at_lines(mut bytes: &[u8], size: usize) -> Vec<&[u8]> {
+    let mut blocks = Vec::new();
+    while bytes.len() > size {
+        let cut = bytes[size..].iter().position(|&b| b == b'\n').map_or(bytes.len(), |p| size + p + 1);
+        let (block, rest) = bytes.split_at(cut);
+        blocks.push(block);
+        bytes = rest;
+    }
+    if !bytes.is_empty() {
+        blocks.push(bytes);
+    }
+    blocks
+}
+
+struct Parsed {
+    columns: Vec<Vec<f64>>,
+    rows: usize,
+    blank_at: Option<usize>,
+}
+
+/// Parses whole lines of exactly `width` numbers; the error is the offset of the line that does not fit.
+fn parse_block(bytes: &[u8], width: usize) -> Result<Parsed, usize> {
+    let guess = bytes.len() / (6 * width) + 1;
+    let mut columns: Vec<Vec<f64>> = (0..width).map(|_| Vec::with_capacity(guess)).collect();
+    let (mut at, mut rows, mut blank_at) = (0, 0, None);
+    while at < bytes.len() {
+        let line = at;
+        if matches!(bytes[at], b'\n' | b'\r' | b' ' | b'\t') {
+            let end = bytes[at..].iter().position(|&b| b == b'\n').map_or(bytes.len(), |p| at + p + 1);
+            if bytes[at..end].iter().all(u8::is_ascii_whitespace) {
+                blank_at = blank_at.or(Some(at));
+                at = end;
+                continue;
+            }
+        }
+        if let Some(blank) = blank_at {
+            return Err(blank); // blank lines may end a file, not divide it
+        }
+        for (field, column) in columns.iter_mut().enumerate() {
+            at = skip_blanks(bytes, at);
+            let (value, used) = fast_float2::parse_partial::<f64, _>(&bytes[at..]).map_err(|_| line)?;
+            if used == 0 || !value.is_finite() {
+                return Err(line);
+            }
+            column.push(value);
+            at = skip_blanks(bytes, at + used);
+            match bytes.get(at) {
+                Some(b',') if field + 1 < width => at += 1,
+                Some(b'\n') if field + 1 == width => at += 1,
+                Some(b'\r') if field + 1 == width && bytes.get(at + 1).is_none_or(|&b| b == b'\n') => at += 2,
+                None if field + 1 == width => {}
+                _ => return Err(line),
+            }
+        }
+        rows += 1;
+    }
+    Ok(Parsed { columns, rows, blank_at })
+}
+
+fn skip_blanks(bytes: &[u8], mut at: usize) -> usize {
+    while matches!(bytes.get(at), Some(b' ' | b'\t')) {
+        at += 1;
+    }
+    at
+}
+
+/// Says what is wrong with the line that starts at `offset`.
+fn explain(path: &Path, header: &[Column], offset: u64) -> CampaignError {
+    let found = (|| -> std::io::Result<(usize, Vec<u8>)> {
+        let file = std::fs::File::open(path)?;
+        let mut reader = BufReader::with_capacity(BLOCK, file);
+        let mut lines = 0;
+        let mut left = offset;
+        while left > 0 {
+            let chunk = reader.fill_buf()?;
+            let n = chunk.len().min(usize::try_from(left).unwrap_or(usize::MAX));
+            if n == 0 {
+                break;
+            }
+            lines += chunk[..n].iter().filter(|&&b| b == b'\n').count();
+            reader.consume(n);
+            left -= n as u64;
+        }
+        reader.seek(SeekFrom::Start(offset))?;
+        let mut line = Vec::new();
+        // A binary file may have no line ends at all.
+        reader.take(1 << 16).read_until(b'\n', &mut line)?;
+        Ok((lines + 1, line))
+    })();
+    match found {
+        Ok((number, line)) => {
+            let (column, problem) = explain_line(header, &line);
+            CampaignError::new(Place::at(path, number, column), problem)
+        }
+        Err(e) => CampaignError::io(path, "read", EXPECTED_RUN, &e),
+    }
+}
+
+fn explain_line(header: &[Column], line: &[u8]) -> (usize, Problem) {
+    let line = match std::str::from_utf8(line) {
+        Ok(text) => text.trim_end_matches(['\n', '\r']),
+        Err(e) => {
+            let column = String::from_utf8_lossy(&line[..e.valid_up_to()]).chars().count() + 1;
+            return (column, Problem::NotUtf8 { expected: "numbers" });
+        }
+    };
+    if line.trim().is_empty() {
+        return (1, Problem::EmptyLine);
+    }
+    let fields: Vec<&str> = line.split(',').collect();
+    let (found, expected) = (fields.len(), header.len());
+    let mut column = 1;
+    for (field, text) in fields.iter().enumerate() {
+        let name = header.get(field).map_or("nothing", |c| c.name()).to_owned();
+        let value = text.trim();
+        let here = column + text.chars().take_while(|c| c.is_whitespace()).count();
+        if field >= expected {
+            // `0,00125,-179,7`: every field an integer part or digits of a fraction.
+            let digits =
+                |f: &&str| f.trim().trim_start_matches(['-', '+']).bytes().all(|b| b.is_ascii_digit());
+            let comma = found == 2 * expected && fields.iter().all(digits);
+            let problem = if comma {
+                Problem::DecimalComma {
+                    text: format!("{},{}", fields[0].trim(), fields[1].trim()),
+                    found,
+                    expected,
+                }
+            } else {
+                Problem::Ragged { found, expected }
+            };
+            return (if comma { 1 } else { column }, problem);
+        }
+        match fast_float2::parse::<f64, _>(value) {
+            Ok(v) if v.is_finite() => {}
+            Ok(_) => return (here, Problem::NotFinite { text: value.to_owned(), column: name }),
+            Err(_) if value.is_empty() && found == expected => {
+                return (here, Problem::EmptyField { column: name });
+            }
+            Err(_) if value.contains(';') => return (column, Problem::Semicolons),
+            Err(_) => return (here, Problem::NotANumber { text: shorten(value), column: name }),
+        }
+        column += text.chars().count() + 1;
+    }
+    (column.saturating_sub(1), Problem::Ragged { found, expected })
+}

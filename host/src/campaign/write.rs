@@ -1,0 +1,153 @@
+//! Writing campaigns in the contract's files.
+use super::error::{CampaignError, Place, Problem};
+use super::{Campaign, Direction, Run};
+use std::collections::HashSet;
+use std::fmt::Write as _;
+use std::io::{BufWriter, Write};
+use std::path::{Component, Path};
+use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, value};
+
+/// Writes a campaign into a directory (made if missing): the CSVs first, `campaign.toml` last, so that a
+/// directory with a `campaign.toml` is whole.
+///
+/// Runs with inferred angles become `time_s,deviation_um`; with measured angles `angle_deg,deviation_um`, or
+/// `time_s,x_mm,y_mm` where the time is known as well.
+///
+/// # Errors
+/// A file name that is used twice or leaves the directory, and what the operating system says.
+pub fn write(campaign: &Campaign, dir: &Path) -> Result<(), CampaignError> {
+    let mut names = HashSet::new();
+    for (index, run) in campaign.runs.iter().enumerate() {
+        let plain = |c: Component<'_>| matches!(c, Component::Normal(_) | Component::CurDir);
+        if run.file.is_empty() || !Path::new(&run.file).components().all(plain) {
+            return Err(CampaignError::new(
+                Place::file(dir),
+                Problem::OutsideDirectory { file: run.file.clone() },
+            ));
+        }
+        if !names.insert(run.file.as_str()) {
+            let problem = Problem::DuplicateName { index, file: run.file.clone() };
+            return Err(CampaignError::new(Place::file(dir), problem));
+        }
+    }
+    make_dir(dir)?;
+    for run in &campaign.runs {
+        let path = dir.join(&run.file);
+        if let Some(parent) = path.parent() {
+            make_dir(parent)?;
+        }
+        write_samples(run, &path)?;
+    }
+    let mut document = DocumentMut::new();
+    let mut head = Table::new();
+    head["name"] = value(&campaign.name);
+    head["machine"] = value(&campaign.machine);
+    document["campaign"] = Item::Table(head);
+    let mut list = ArrayOfTables::new();
+    for run in &campaign.runs {
+        list.push(entry(run));
+    }
+    document["run"] = Item::ArrayOfTables(list);
+    replace(&dir.join("campaign.toml"), &document.to_string())
+}
+
+fn make_dir(dir: &Path) -> Result<(), CampaignError> {
+    std::fs::create_dir_all(dir).map_err(|e| CampaignError::io(dir, "made", "a place for a directory", &e))
+}
+
+/// Writes a file whole or not at all.
+pub(crate) fn replace(path: &Path, text: &str) -> Result<(), CampaignError> {
+    let io = |e: std::io::Error| CampaignError::io(path, "written", "a place for a file", &e);
+    let dir = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut file = tempfile::NamedTempFile::new_in(dir).map_err(io)?;
+    file.write_all(text.as_bytes()).map_err(io)?;
+    // A temporary file is private by default; this one is to be shared like any other.
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644)).map_err(io)?;
+    }
+    file.persist(path).map_err(|e| io(e.error))?;
+    Ok(())
+}
+
+/// The `[[run]]` table of a run.
+pub(crate) fn entry(run: &Run) -> Table {
+    let mut table = Table::new();
+    table["file"] = value(&run.file);
+    table["radius_mm"] = value(plain(run.radius_m * 1e3));
+    table["feed_mm_s"] = value(plain(run.feed_m_s * 1e3));
+    table["direction"] = value(match run.direction {
+        Direction::Ccw => "ccw",
+        Direction::Cw => "cw",
+    });
+    table["start_angle_deg"] = value(plain(run.start_angle_rad.to_degrees()));
+    if let Some(started) = run.started_s {
+        table["started_s"] = value(plain(started));
+    }
+    if let Some(temperature) = run.temperature_c {
+        table["temperature_c"] = value(plain(temperature));
+    }
+    if let Some(centre) = run.centre_m {
+        table["centre_mm"] = value(centre.map(|c| plain(c * 1e3)).into_iter().collect::<toml_edit::Array>());
+    }
+    if let Some(arc) = run.samples.arc_rad() {
+        table["arc_deg"] = value((arc.to_degrees() * 1e3).round() / 1e3);
+    }
+    table
+}
+
+/// A decimal of at most nine places: what the conversion of units left behind goes.
+fn plain(v: f64) -> f64 {
+    (v * 1e9).round() / 1e9
+}
+
+pub(crate) fn write_samples(run: &Run, path: &Path) -> Result<(), CampaignError> {
+    let io = |e: std::io::Error| CampaignError::io(path, "written", "a place for a file", &e);
+    let mut out = BufWriter::new(std::fs::File::create(path).map_err(io)?);
+    let samples = &run.samples;
+    let rows = samples.deviation_m.len();
+    let mut line = String::with_capacity(64);
+    let header = match (&samples.time_s, samples.angle_inferred) {
+        (Some(_), true) => "time_s,deviation_um\n",
+        (Some(_), false) => "time_s,x_mm,y_mm\n",
+        (None, _) => "angle_deg,deviation_um\n",
+    };
+    out.write_all(header.as_bytes()).map_err(io)?;
+    for k in 0..rows {
+        line.clear();
+        let (angle, deviation) = (samples.angle_rad[k], samples.deviation_m[k]);
+        match (&samples.time_s, samples.angle_inferred) {
+            (Some(time), true) => {
+                number(&mut line, time[k], 9, b',');
+                number(&mut line, deviation * 1e6, 6, b'\n');
+            }
+            (Some(time), false) => {
+                let (sin, cos) = angle.sin_cos();
+                let radius_mm = (run.radius_m + deviation) * 1e3;
+                number(&mut line, time[k], 9, b',');
+                number(&mut line, radius_mm * cos, 9, b',');
+                number(&mut line, radius_mm * sin, 9, b'\n');
+            }
+            (None, _) => {
+                number(&mut line, angle.to_degrees(), 9, b',');
+                number(&mut line, deviation * 1e6, 6, b'\n');
+            }
+        }
+        out.write_all(line.as_bytes()).map_err(io)?;
+    }
+    out.flush().map_err(io)
+}
+
+/// A decimal without trailing zeros (one is kept), and what follows it.
+fn number(line: &mut String, v: f64, places: usize, end: u8) {
+    let start = line.len();
+    let _ = write!(line, "{v:.places$}"); // writing to a String cannot fail
+    while line.ends_with('0') && !line.ends_with(".0") {
+        line.pop();
+    }
+    if &line[start..] == "-0.0" {
+        line.replace_range(start.., "0.0");
+    }
+    line.push(char::from(end));
+}
