@@ -73,15 +73,27 @@ pub struct SecondOrder {
     pub zeta: f64,
 }
 
-/// Friction seen in position: a pulse after each reversal of the axis that an integrating loop removes.
+/// Friction seen in position: a pulse after each reversal of the axis that an integrating loop removes, and
+/// the teeth of stick–slip while the axis is slow. In a reversal the axis stays behind, so both point
+/// against the new direction of travel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Friction {
-    /// Height of the pulse, m.
+    /// Height of the pulse, m: −sgn(v)·peak·exp(−t/decay), t since the reversal.
     pub peak_m: f64,
     /// Decay of the pulse, s.
     pub decay_s: f64,
-    /// Stick–slip amplitude near reversals at low axis speed, m.
+    /// Height of a stick–slip tooth, m: the axis falls behind by it and catches up at once.
     pub stick_slip_m: f64,
+    /// Travel of the drive from tooth to tooth, m (equal to the height: full standstill between slips).
+    pub stick_travel_m: f64,
+    /// Axis speed at which the teeth have shrunk to 1/e, m/s: height·exp(−(v/speed)²).
+    pub stick_speed_m_s: f64,
+}
+
+impl Default for Friction {
+    fn default() -> Self {
+        Self { peak_m: 0.0, decay_s: 0.02, stick_slip_m: 0.0, stick_travel_m: 1e-3, stick_speed_m_s: 5e-3 }
+    }
 }
 
 /// Periodic position error amplitude·sin(2π·x/pitch + phase).
@@ -95,11 +107,116 @@ pub struct Cyclic {
     pub phase_rad: f64,
 }
 
-/// Radial vibration amplitude·sin(2π·frequency·t + phase).
+/// Radial vibration amplitude·sin(2π·frequency·t + phase), t in campaign time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vibration {
     /// Frequency, Hz.
     pub frequency_hz: f64,
     /// Amplitude, m.
     pub amplitude_m: f64,
+    /// Phase at the start of the campaign, rad.
+    pub phase_rad: f64,
+}
+
+/// A machine that cannot be simulated: which number is at fault and what it may be.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{name} = {value} is outside {allowed}")]
+pub struct MachineError {
+    /// Field at fault.
+    pub name: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// What it may be, in words.
+    pub allowed: &'static str,
+}
+
+/// Slowest settling that is simulated, s: with a longer one the run-in outlasts any circular test.
+pub const MAX_TIME_CONSTANT_S: f64 = 5.0;
+
+impl Machine {
+    /// Checks every number against what the simulation can do.
+    ///
+    /// # Errors
+    /// The first field that is not finite or out of its range.
+    pub fn check(&self) -> Result<(), MachineError> {
+        let fail = |name, value, allowed| Err(MachineError { name, value, allowed });
+        let positive = |name, value: f64| match value > 0.0 && value.is_finite() {
+            true => Ok(()),
+            false => fail(name, value, "positive, finite numbers"),
+        };
+        let finite = |name, value: f64| match value.is_finite() {
+            true => Ok(()),
+            false => fail(name, value, "finite numbers"),
+        };
+        let time_constant = |name, value: f64| match value > 0.0 && value <= MAX_TIME_CONSTANT_S {
+            true => Ok(()),
+            false => fail(name, value, "0 to 5 s (zero excluded)"),
+        };
+        if let Some(t) = self.interpolation_s {
+            time_constant("interpolation_s", t)?;
+        }
+        if let Some(a) = self.centripetal_limit_m_s2 {
+            positive("centripetal_limit_m_s2", a)?;
+        }
+        match self.acc_dec {
+            AccDec::None => {}
+            AccDec::Exponential(t) => time_constant("acc_dec.exponential_s", t)?,
+            AccDec::MovingAverage(t) => time_constant("acc_dec.moving_average_s", t)?,
+        }
+        for axis in 0..2 {
+            let servo = self.servo[axis];
+            if !(servo.kv_per_s >= 1.0 / MAX_TIME_CONSTANT_S) {
+                return fail("kv_per_s", servo.kv_per_s, "0.2 /s and more");
+            }
+            finite("feed_forward", servo.feed_forward)?;
+            if let Some(m) = self.mechanics[axis] {
+                positive("omega_n_rad_s", m.omega_n_rad_s)?;
+                positive("zeta", m.zeta)?;
+                time_constant("1/(ζ·ωn)", slowest_s(m))?;
+            }
+            if !(0.0..=MAX_TIME_CONSTANT_S).contains(&self.dead_time_s[axis]) {
+                return fail("dead_time_s", self.dead_time_s[axis], "0 to 5 s");
+            }
+            if let Some(f) = self.friction[axis] {
+                finite("friction.peak_m", f.peak_m)?;
+                positive("friction.decay_s", f.decay_s)?;
+                finite("friction.stick_slip_m", f.stick_slip_m)?;
+                positive("friction.stick_travel_m", f.stick_travel_m)?;
+                positive("friction.stick_speed_m_s", f.stick_speed_m_s)?;
+            }
+            if let Some(c) = self.cyclic[axis] {
+                finite("cyclic.amplitude_m", c.amplitude_m)?;
+                positive("cyclic.pitch_m", c.pitch_m)?;
+                finite("cyclic.phase_rad", c.phase_rad)?;
+            }
+            finite("backlash_m", self.backlash_m[axis])?;
+            finite("lateral_play_m", self.lateral_play_m[axis])?;
+            finite("scale", self.scale[axis])?;
+            finite("straightness_per_m", self.straightness_per_m[axis])?;
+        }
+        if let Some(v) = self.vibration {
+            positive("vibration.frequency_hz", v.frequency_hz)?;
+            finite("vibration.amplitude_m", v.amplitude_m)?;
+            finite("vibration.phase_rad", v.phase_rad)?;
+        }
+        finite("squareness_rad", self.squareness_rad)?;
+        finite("thermal_per_s", self.thermal_per_s)?;
+        finite("radius_offset_m", self.radius_offset_m)
+    }
+
+    /// Slowest time constant of an axis, s: what the run-in has to outlast.
+    pub(super) fn settling_s(&self, axis: usize) -> f64 {
+        let mut slowest: f64 = 1.0 / self.servo[axis].kv_per_s;
+        if let AccDec::Exponential(t) = self.acc_dec {
+            slowest = slowest.max(t);
+        }
+        self.mechanics[axis].map_or(slowest, |m| slowest.max(slowest_s(m)))
+    }
+}
+
+/// Time constant of the slower (or the common) pole of a second-order element, s.
+fn slowest_s(m: SecondOrder) -> f64 {
+    let root = (m.zeta * m.zeta - 1.0).max(0.0).sqrt();
+    // ζ − √(ζ²−1) loses its digits for large ζ; its reciprocal ζ + √(ζ²−1) does not.
+    if root > 0.0 { (m.zeta + root) / m.omega_n_rad_s } else { 1.0 / (m.zeta * m.omega_n_rad_s) }
 }

@@ -1,3 +1,26 @@
-//! The time-domain machine: command → interpolator → acc/dec filter → servo → friction → mechanics →
-//! geometry → instrument. It knows laws of motion and no data.
+//! The time-domain machine: command → interpolator → acc/dec filter → servo → mechanics → friction and
+//! backlash → geometry → instrument. It knows laws of motion and no data.
+//!
+//! | call | gives |
+//! |---|---|
+//! | [`circle`] | one lap in the steady state, free of noise |
+//! | [`drive`] | where the tool goes under the set-points of an outside controller |
+//!
+//! Linear elements are stepped exactly (matrix exponential under a command that is cubic within a step), so a
+//! lap needs steps enough for its shape, not for its time constants. Backlash and friction follow the axis
+//! through its turning points. Everything is deterministic; noise comes from the instrument and its seed.
+mod axis;
+mod chain;
+mod circle;
+mod command;
+mod drive;
+mod from_model;
+mod geometry;
 pub mod machine;
+
+pub use circle::{CircleTest, MAX_RATE_HZ, SAMPLES_PER_TURN, Trace, ballbar_samples, circle};
+pub use drive::{Hold, Path, SetPoints, drive};
+pub use machine::{Machine, MachineError};
+
+#[cfg(test)]
+mod closed_forms;
