@@ -1,1 +1,7 @@
 //! Machines and helpers for the cross-crate tests.
+//!
+//! [`machine`] moves in the time domain and shares nothing with the simulation under test; [`effects`]
+//! hides known errors in it, scaled to a wanted misfit; [`files`] writes such campaigns with their truth.
+pub mod effects;
+pub mod files;
+pub mod machine;

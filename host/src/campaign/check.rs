@@ -196,7 +196,7 @@ pub(super) fn duration(
     let programmed_s = TAU * entry.radius_m / entry.feed_m_s;
     let ratio = turn_s / programmed_s;
     let at = Place::at(&entry.path, deviation.len() + 1, 1);
-    if ratio < 1.0 / LONGEST_TURN || ratio > LONGEST_TURN {
+    if !(1.0 / LONGEST_TURN..=LONGEST_TURN).contains(&ratio) {
         let problem = Problem::TooLong { measured_s: turn_s, programmed_s, hint: duration_hint(ratio) };
         return Err(CampaignError::new(at, problem));
     }

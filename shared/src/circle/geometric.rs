@@ -181,12 +181,11 @@ pub fn refine(
             stopped,
         };
     loop {
-        if !here.rss.is_finite() || !(here.radius < LINE * spread) {
-            return Err(if here.radius.is_finite() {
-                CircleError::Collinear
-            } else {
-                CircleError::NonFinite
-            });
+        if !here.rss.is_finite() || !here.radius.is_finite() {
+            return Err(CircleError::NonFinite);
+        }
+        if here.radius >= LINE * spread {
+            return Err(CircleError::Collinear);
         }
         let (step, newton) = here.step(shift);
         let length = Float::sqrt(step[0] * step[0] + step[1] * step[1]);

@@ -1,4 +1,5 @@
 //! Circles against published numbers, exact constructions and each other.
+#![allow(clippy::excessive_precision, reason = "reference numbers are quoted as published")]
 use super::*;
 use core::f64::consts::{PI, TAU};
 use std::vec::Vec;

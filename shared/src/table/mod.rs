@@ -1,4 +1,12 @@
-//! The correction table that the controller keeps.
+//! The correction table that the controller keeps: its types here, its bytes in [`image`], its checks in
+//! [`validate`], the bounds of the image in [`bounds`].
+pub mod bounds;
+pub mod image;
+pub mod validate;
+
+pub use image::{FORMAT_VERSION, Header, MAX_IMAGE_BYTES, SCHEMA_HASH, decode, encode};
+pub use validate::{Field, TableError};
+
 use crate::model::Cumulants;
 use crate::term::Term;
 use serde::{Deserialize, Serialize};

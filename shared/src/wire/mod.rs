@@ -1,1 +1,29 @@
-//! (being built)
+//! What host and controller say to each other.
+//!
+//! ```text
+//! frame = COBS( postcard(message) · CRC-32 little endian ) · 00
+//! ```
+//!
+//! The host sends a [`Request`] and waits for the [`FromController::Reply`] with the same session and
+//! sequence number; if none comes it sends the same request again. The controller remembers the last request it
+//! carried out and answers a repetition from memory, so a lost answer never makes a command happen twice.
+//! Between replies the controller may send [`FromController::SetPoints`] to a subscriber.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`message`] | what is said |
+//! | [`frame`] | how it is put into bytes, and found again among any bytes |
+//! | [`refusal`] | why a controller says no |
+pub mod frame;
+pub mod message;
+pub mod refusal;
+
+pub use frame::{Accumulator, FrameCounts, MAX_FRAME, MAX_PAYLOAD, encode};
+pub use message::{
+    CHUNK, Chunk, CircleRun, Command, Counters, FromController, Identity, MotionState, PROTOCOL_VERSION,
+    Pose, Probation, Reply, Request, SET_POINTS, SetPoint, SetPoints, SlotState, Status, TableInfo,
+};
+pub use refusal::{FlashFault, MotionRefusal, Refusal, RunField};
+
+/// CRC-32 ISO-HDLC, of frames and tables alike (check value cbf43926).
+pub const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);

@@ -1,0 +1,226 @@
+//! The bytes of a table, in a file, on the wire and in flash. All numbers little endian.
+//!
+//! ```text
+//! offset  size  what
+//!      0     4  magic 47 49 4F 54 ("GIOT")          ┐
+//!      4     2  format version, 1                   │ fixed for all versions, so that a newer table
+//!      6     2  flags: bit 0 = signed               │ is told from a broken one
+//!      8     4  length n of the whole image, bytes  │
+//!     12     4  CRC-32 of bytes 0..12 and 16..n     ┘
+//!     16     4  schema hash: CRC-32 of `schema.txt`
+//!     20     b  body, postcard of `Table` (`schema.txt` names every field and discriminant)
+//!   20+b    64  Ed25519 signature of bytes 4..8 and 16..20+b, if bit 0 of the flags is set
+//! ```
+//!
+//! The CRC is ISO-HDLC (the one of Ethernet and zip). The order of checks is magic, length, CRC, version,
+//! flags, schema, body, numbers: a flipped bit is called a flipped bit, not a newer version.
+use super::{MAX_TERMS, MAX_ZONES, Table, TableError};
+use crate::wire::CRC;
+
+/// First four bytes of a table.
+pub const MAGIC: [u8; 4] = *b"GIOT";
+/// Format written and the newest read by this build.
+pub const FORMAT_VERSION: u16 = 1;
+/// Flag bit 0: a signature follows the body.
+pub const FLAG_SIGNED: u16 = 1;
+/// Length of the header.
+pub const HEADER_BYTES: usize = 20;
+/// Length of a signature.
+pub const SIGNATURE_BYTES: usize = 64;
+/// Changes when the body's meaning does.
+pub const SCHEMA_HASH: u32 = CRC.checksum(include_bytes!("schema.txt"));
+
+/// Longest body: every string, vector and option full, every term the longest (tag, axis, three numbers).
+const MAX_BODY_BYTES: usize = {
+    let term = 1 + 1 + 3 * 4;
+    let zone = (1 + 24) + 8 + 8 + 1 + 8 + (1 + MAX_TERMS * term);
+    (1 + 32) + (1 + MAX_ZONES * zone) + 8
+};
+/// Longest image.
+pub const MAX_IMAGE_BYTES: usize = HEADER_BYTES + MAX_BODY_BYTES + SIGNATURE_BYTES;
+
+/// The header of an image whose length and CRC hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Header {
+    /// Format version.
+    pub version: u16,
+    /// Flags.
+    pub flags: u16,
+    /// Length of the image in bytes.
+    pub length: usize,
+    /// CRC-32 of the image.
+    pub crc: u32,
+}
+
+fn word<const N: usize>(bytes: &[u8], at: usize) -> Option<[u8; N]> {
+    bytes.get(at..)?.first_chunk().copied()
+}
+
+/// CRC-32 of an image without its own CRC field.
+fn crc_of(image: &[u8]) -> u32 {
+    let mut digest = CRC.digest();
+    digest.update(image.get(..12).unwrap_or(&[]));
+    digest.update(image.get(16..).unwrap_or(&[]));
+    digest.finalize()
+}
+
+impl Header {
+    /// Reads the fixed part and checks that the announced length is possible.
+    ///
+    /// # Errors
+    /// [`TableError::NotATable`], [`TableError::Truncated`], [`TableError::TooLong`].
+    pub fn read(bytes: &[u8]) -> Result<Self, TableError> {
+        let need = HEADER_BYTES as u32;
+        if !bytes.starts_with(&MAGIC) {
+            return Err(TableError::NotATable);
+        }
+        let fields = (word(bytes, 4), word(bytes, 6), word(bytes, 8), word(bytes, 12));
+        let (Some(version), Some(flags), Some(length), Some(crc)) = fields else {
+            return Err(TableError::Truncated { have: bytes.len() as u32, need });
+        };
+        let length = u32::from_le_bytes(length);
+        let max = MAX_IMAGE_BYTES as u32;
+        if length > max {
+            return Err(TableError::TooLong { length, max });
+        }
+        if length < need {
+            return Err(TableError::Truncated { have: length, need });
+        }
+        Ok(Self {
+            version: u16::from_le_bytes(version),
+            flags: u16::from_le_bytes(flags),
+            length: length as usize,
+            crc: u32::from_le_bytes(crc),
+        })
+    }
+
+    /// Reads the header of the image at the start of `bytes` and checks its CRC; what follows the image is
+    /// not looked at.
+    ///
+    /// # Errors
+    /// Those of [`Header::read`], [`TableError::BadCrc`].
+    pub fn check(bytes: &[u8]) -> Result<Self, TableError> {
+        let header = Self::read(bytes)?;
+        let have = bytes.len() as u32;
+        let image =
+            bytes.get(..header.length).ok_or(TableError::Truncated { have, need: header.length as u32 })?;
+        let computed = crc_of(image);
+        if computed != header.crc {
+            return Err(TableError::BadCrc { stored: header.crc, computed });
+        }
+        Ok(header)
+    }
+}
+
+/// Reads and validates the table whose image is all of `bytes`. Whether a signature is *right* is the
+/// business of whoever holds the key ([`signed_parts`]).
+///
+/// # Errors
+/// The first failed check, in the order of the module's text.
+pub fn decode(bytes: &[u8]) -> Result<Table, TableError> {
+    let header = Header::check(bytes)?;
+    if bytes.len() > header.length {
+        return Err(TableError::TooLong { length: bytes.len() as u32, max: header.length as u32 });
+    }
+    match header.version {
+        FORMAT_VERSION => {}
+        0 => return Err(TableError::UnknownVersion { version: 0 }),
+        version => return Err(TableError::NewerVersion { version, supported: FORMAT_VERSION }),
+    }
+    if header.flags & !FLAG_SIGNED != 0 {
+        return Err(TableError::UnknownFlags { flags: header.flags });
+    }
+    let found = word(bytes, 16).map_or(0, u32::from_le_bytes);
+    if found != SCHEMA_HASH {
+        return Err(TableError::SchemaMismatch { found, expected: SCHEMA_HASH });
+    }
+    let trailer = if header.flags & FLAG_SIGNED == 0 { 0 } else { SIGNATURE_BYTES };
+    let body = header
+        .length
+        .checked_sub(trailer)
+        .and_then(|end| bytes.get(HEADER_BYTES..end))
+        .ok_or(TableError::Malformed)?;
+    match postcard::take_from_bytes::<Table>(body) {
+        Ok((table, [])) => table.validate().map(|()| table),
+        _ => Err(TableError::Malformed),
+    }
+}
+
+/// Writes the unsigned image of `table` to the start of `out` and returns its length.
+///
+/// # Errors
+/// Those of [`Table::validate`]; [`TableError::TooLong`] if `out` is shorter than the image.
+pub fn encode(table: &Table, out: &mut [u8]) -> Result<usize, TableError> {
+    table.validate()?;
+    let max = out.len() as u32;
+    let too_long = TableError::TooLong { length: MAX_IMAGE_BYTES as u32, max };
+    let body = out.get_mut(HEADER_BYTES..).ok_or(too_long)?;
+    let body = postcard::to_slice(table, body).map_err(|_| too_long)?.len();
+    let length = HEADER_BYTES + body;
+    let image = out.get_mut(..length).ok_or(too_long)?;
+    write_header(image, 0);
+    Ok(length)
+}
+
+/// Fills the header of an image whose body (and signature) is in place.
+fn write_header(image: &mut [u8], flags: u16) {
+    let length = image.len() as u32;
+    if let Some(header) = image.first_chunk_mut::<HEADER_BYTES>() {
+        header[..4].copy_from_slice(&MAGIC);
+        header[4..6].copy_from_slice(&FORMAT_VERSION.to_le_bytes());
+        header[6..8].copy_from_slice(&flags.to_le_bytes());
+        header[8..12].copy_from_slice(&length.to_le_bytes());
+        header[16..20].copy_from_slice(&SCHEMA_HASH.to_le_bytes());
+    }
+    let crc = crc_of(image);
+    if let Some(field) = image.get_mut(12..16) {
+        field.copy_from_slice(&crc.to_le_bytes());
+    }
+}
+
+/// What an Ed25519 signature covers: version and flags, then schema hash and body; with the signature.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Signed<'a> {
+    /// Bytes 4..8.
+    pub head: &'a [u8],
+    /// Bytes 16 to the end of the body.
+    pub body: &'a [u8],
+    /// The signature.
+    pub signature: &'a [u8; SIGNATURE_BYTES],
+}
+
+/// The parts of a signed image, `None` if it is unsigned or too short.
+pub fn signed_parts(image: &[u8]) -> Option<Signed<'_>> {
+    let header = Header::read(image).ok()?;
+    if header.flags & FLAG_SIGNED == 0 {
+        return None;
+    }
+    let image = image.get(..header.length)?;
+    let (rest, signature) = image.split_last_chunk::<SIGNATURE_BYTES>()?;
+    Some(Signed { head: rest.get(4..8)?, body: rest.get(16..)?, signature })
+}
+
+/// Turns the unsigned image at the start of `out` (`length` bytes) into a signed one: `sign` is given head
+/// and body as in [`Signed`] and returns the signature. The new length is returned.
+///
+/// # Errors
+/// [`TableError::TooLong`] if `out` has no room for the signature; those of [`Header::read`].
+pub fn attach_signature(
+    out: &mut [u8],
+    length: usize,
+    sign: impl FnOnce(&[u8], &[u8]) -> [u8; SIGNATURE_BYTES],
+) -> Result<usize, TableError> {
+    Header::read(out)?;
+    let max = out.len() as u32;
+    let signed = length + SIGNATURE_BYTES;
+    let image = out.get_mut(..signed).ok_or(TableError::TooLong { length: signed as u32, max })?;
+    write_header(image, FLAG_SIGNED);
+    let (rest, signature) = image.split_at_mut(length);
+    *signature.first_chunk_mut().ok_or(TableError::Malformed)? =
+        sign(rest.get(4..8).unwrap_or(&[]), rest.get(16..).unwrap_or(&[]));
+    write_header(image, FLAG_SIGNED);
+    Ok(signed)
+}
+
+#[cfg(test)]
+mod tests;

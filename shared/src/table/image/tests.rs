@@ -1,0 +1,261 @@
+//! The bytes of a table are a promise: pinned here, and every way to break them tried.
+use super::*;
+use crate::model::Cumulants;
+use crate::table::{Field, Limits, Travel, Zone, bounds, validate::Where};
+use crate::term::Term;
+use crate::{Axis, Direction};
+use proptest::prelude::*;
+use std::vec::Vec;
+
+fn zone() -> Zone {
+    Zone {
+        place_m: None,
+        radius_m: [0.05, 0.3],
+        feed_m_s: [0.02, 0.7],
+        travel: Travel::Both,
+        cumulants: Cumulants { kappa2_s2: 46.58e-6, kappa4_s4: -5.5e-6 },
+        terms: heapless::Vec::new(),
+    }
+}
+
+fn table() -> Table {
+    Table {
+        machine: "irb1600".try_into().unwrap(),
+        zones: heapless::Vec::from_slice(&[zone()]).unwrap(),
+        limits: Limits { offset_m: 1e-3, slew_m_s: 0.05 },
+    }
+}
+
+fn all_terms() -> [Term<f32>; 11] {
+    let (axis, x) = (Axis::Y, Axis::X);
+    [
+        Term::RadiusOffset { offset_m: 1e-5 },
+        Term::ScaleError { relative: 1e-5 },
+        Term::ScaleMismatch { relative: 1e-5 },
+        Term::Squareness { shear_rad: 1e-5 },
+        Term::ServoMismatch { delta_tau_s: 1e-4 },
+        Term::BandwidthMismatch { delta_kappa2_s2: 1e-6 },
+        Term::Backlash { axis, step_m: 1e-5 },
+        Term::LateralPlay { axis: x, shift_m: 1e-5 },
+        Term::ReversalSpike { axis, peak_m: 1e-5, decay_s: 0.02 },
+        Term::Cyclic { axis, amplitude_m: 1e-6, pitch_m: 0.01, phase_rad: 1.0 },
+        Term::Straightness { axis: x, curvature_per_m: 1e-4 },
+    ]
+}
+
+fn bytes(table: &Table) -> Vec<u8> {
+    let mut out = [0; MAX_IMAGE_BYTES];
+    let length = encode(table, &mut out).unwrap();
+    out[..length].to_vec()
+}
+
+/// Gives changed bytes a CRC that holds again.
+fn reseal(image: &mut [u8]) {
+    let crc = crc_of(image);
+    image[12..16].copy_from_slice(&crc.to_le_bytes());
+}
+
+#[test]
+fn golden_bytes() {
+    #[rustfmt::skip]
+    let expected: [u8; 64] = [
+        0x47, 0x49, 0x4f, 0x54,                         // "GIOT"
+        1, 0,                                           // format 1
+        0, 0,                                           // flags
+        64, 0, 0, 0,                                    // length
+        0, 0, 0, 0,                                     // CRC (below)
+        0, 0, 0, 0,                                     // schema (below)
+        7, b'i', b'r', b'b', b'1', b'6', b'0', b'0',    // machine
+        1,                                              // one zone
+        0,                                              // place: anywhere
+        0xcd, 0xcc, 0x4c, 0x3d, 0x9a, 0x99, 0x99, 0x3e, // radius 0.05 to 0.3
+        0x0a, 0xd7, 0xa3, 0x3c, 0x33, 0x33, 0x33, 0x3f, // feed 0.02 to 0.7
+        0,                                              // both directions
+        0xe5, 0x5e, 0x43, 0x38,                         // kappa2 46.58e-6
+        0xa4, 0x8c, 0xb8, 0xb6,                         // kappa4 -5.5e-6
+        0,                                              // no terms
+        0x6f, 0x12, 0x83, 0x3a, 0xcd, 0xcc, 0x4c, 0x3d, // offset 1e-3, slew 0.05
+    ];
+    let image = bytes(&table());
+    assert_eq!(image[..12], expected[..12]);
+    assert_eq!(image[20..], expected[20..]);
+    // An independent CRC-32 (zlib's, of the same bytes), so that neither crate nor layout can drift.
+    assert_eq!(image[12..16], GOLDEN_CRC.to_le_bytes(), "{:08x}", crc_of(&image));
+    assert_eq!(SCHEMA_HASH, GOLDEN_SCHEMA, "{SCHEMA_HASH:08x}");
+}
+
+/// `zlib.crc32` of the golden image without its CRC field.
+const GOLDEN_CRC: u32 = 0xb1b3_970b;
+/// `zlib.crc32` of `schema.txt`.
+const GOLDEN_SCHEMA: u32 = 0xb37a_9ab9;
+
+#[test]
+fn discriminants_are_pinned() {
+    let mut out = [0; 32];
+    for (index, term) in all_terms().into_iter().enumerate() {
+        assert_eq!(usize::from(postcard::to_slice(&term, &mut out).unwrap()[0]), index);
+    }
+    let mut one = |value: &dyn Fn(&mut [u8]) -> u8| value(&mut out);
+    assert_eq!(one(&|b| postcard::to_slice(&Axis::Y, b).unwrap()[0]), 1);
+    assert_eq!(one(&|b| postcard::to_slice(&Travel::Cw, b).unwrap()[0]), 2);
+    assert_eq!(one(&|b| postcard::to_slice(&Direction::Cw, b).unwrap()[0]), 1);
+}
+
+#[test]
+fn largest_table_fits_exactly() {
+    let mut longest = zone();
+    longest.place_m = Some([[-1.0; 3], [1.0; 3]]);
+    longest.terms.resize(MAX_TERMS, all_terms()[9]).unwrap();
+    let mut table = table();
+    table.machine = "12345678901234567890123456789012".try_into().unwrap();
+    table.zones.clear();
+    table.zones.resize(MAX_ZONES, longest).unwrap();
+    let image = bytes(&table);
+    assert_eq!(image.len(), MAX_IMAGE_BYTES - SIGNATURE_BYTES);
+    assert_eq!(decode(&image), Ok(table));
+}
+
+#[test]
+fn every_term_survives_the_trip() {
+    for term in all_terms() {
+        let mut table = table();
+        table.zones[0].terms.push(term).unwrap();
+        assert_eq!(decode(&bytes(&table)), Ok(table));
+    }
+}
+
+#[test]
+fn each_breakage_has_its_own_error() {
+    let good = bytes(&table());
+    let have = good.len() as u32;
+    let broken = |change: &dyn Fn(&mut Vec<u8>)| {
+        let mut image = good.clone();
+        change(&mut image);
+        decode(&image).unwrap_err()
+    };
+    assert_eq!(broken(&|b| b.clear()), TableError::NotATable);
+    assert_eq!(broken(&|b| b[0] = b'g'), TableError::NotATable);
+    assert_eq!(broken(&|b| b.truncate(10)), TableError::Truncated { have: 10, need: 20 });
+    assert_eq!(broken(&|b| b.truncate(40)), TableError::Truncated { have: 40, need: have });
+    assert_eq!(broken(&|b| b.push(0)), TableError::TooLong { length: have + 1, max: have });
+    assert_eq!(
+        broken(&|b| b[9] = 0xff),
+        TableError::TooLong { length: 0xff00 + have, max: MAX_IMAGE_BYTES as u32 }
+    );
+    assert!(matches!(broken(&|b| b[30] ^= 1), TableError::BadCrc { .. }));
+    let newer = |b: &mut Vec<u8>| {
+        b[4] = 9;
+        reseal(b);
+    };
+    assert_eq!(broken(&newer), TableError::NewerVersion { version: 9, supported: 1 });
+    // The same byte changed on the way, not by a newer giotto.
+    assert!(matches!(broken(&|b| b[4] = 9), TableError::BadCrc { .. }));
+    let edit = |at: usize, value: u8| {
+        broken(&move |b: &mut Vec<u8>| {
+            b[at] = value;
+            reseal(b);
+        })
+    };
+    assert_eq!(edit(4, 0), TableError::UnknownVersion { version: 0 });
+    assert_eq!(edit(6, 2), TableError::UnknownFlags { flags: 2 });
+    assert!(matches!(edit(16, !good[16]), TableError::SchemaMismatch { .. }));
+    assert_eq!(edit(20, 200), TableError::Malformed);
+    assert_eq!(edit(28, 0), TableError::Malformed); // bytes left over
+}
+
+#[test]
+fn each_bad_number_is_named() {
+    let wrong = |change: &dyn Fn(&mut Table)| {
+        let mut table = table();
+        change(&mut table);
+        encode(&table, &mut [0; MAX_IMAGE_BYTES]).unwrap_err()
+    };
+    let at = Where(Some(0));
+    let nan = |at, field| TableError::NonFinite { at, field };
+    assert_eq!(wrong(&|t| t.zones.clear()), TableError::NoZones);
+    assert_eq!(wrong(&|t| t.limits.offset_m = f32::NAN), nan(Where::HEAD, Field::LimitOffset));
+    assert_eq!(
+        wrong(&|t| t.limits.offset_m = 0.1),
+        TableError::OutOfBounds {
+            at: Where::HEAD,
+            field: Field::LimitOffset,
+            value: 0.1,
+            lo: 0.0,
+            hi: bounds::OFFSET_MAX_M
+        }
+    );
+    assert_eq!(wrong(&|t| t.limits.slew_m_s = f32::INFINITY), nan(Where::HEAD, Field::LimitSlew));
+    assert_eq!(wrong(&|t| t.zones[0].cumulants.kappa4_s4 = f32::NAN), nan(at, Field::Kappa4));
+    assert_eq!(
+        wrong(&|t| t.zones[0].radius_m = [0.3, 0.05]),
+        TableError::EmptyRange { at, field: Field::Radius, lo: 0.3, hi: 0.05 }
+    );
+    let field_of = |error| match error {
+        TableError::OutOfBounds { at: place, field, .. } if place == at => field,
+        other => panic!("{other}"),
+    };
+    assert_eq!(field_of(wrong(&|t| t.zones[0].radius_m[1] = 1.5)), Field::Radius);
+    assert_eq!(field_of(wrong(&|t| t.zones[0].feed_m_s[0] = 0.0)), Field::Feed);
+    assert_eq!(field_of(wrong(&|t| t.zones[0].cumulants.kappa2_s2 = -0.1)), Field::Kappa2);
+    assert_eq!(field_of(wrong(&|t| t.zones[0].place_m = Some([[-1e6; 3]; 2]))), Field::Place);
+}
+
+/// Every number of every term, made not finite and made huge, is refused.
+#[test]
+fn no_number_of_a_term_goes_unchecked() {
+    for term in all_terms() {
+        let mut body = [0; 32];
+        let length = postcard::to_slice(&term, &mut body).unwrap().len();
+        let numbers = (length - 1) / 4;
+        for number in 0..numbers {
+            for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e6, -1e6] {
+                let mut changed = body;
+                let end = length - 4 * (numbers - 1 - number);
+                changed[end - 4..end].copy_from_slice(&bad.to_le_bytes());
+                let mut table = table();
+                table.zones[0].terms.push(postcard::from_bytes(&changed[..length]).unwrap()).unwrap();
+                let refused = table.validate();
+                assert!(refused.is_err(), "{term:?} number {number} = {bad}");
+            }
+        }
+    }
+}
+
+#[test]
+fn signature_travels_outside_the_body() {
+    let mut out = [0; MAX_IMAGE_BYTES];
+    let plain = encode(&table(), &mut out).unwrap();
+    assert_eq!(signed_parts(&out[..plain]), None);
+    let signed = attach_signature(&mut out, plain, |head, body| {
+        assert_eq!(head, [1, 0, 1, 0]);
+        assert_eq!(body.len(), plain - 16);
+        [7; SIGNATURE_BYTES]
+    });
+    let image = &out[..signed.unwrap()];
+    assert_eq!(decode(image), Ok(table()));
+    assert_eq!(signed_parts(image).unwrap().signature, &[7; SIGNATURE_BYTES]);
+}
+
+proptest! {
+    #[test]
+    fn any_bytes_are_refused_or_valid(mut bytes in proptest::collection::vec(any::<u8>(), 0..400), seal: bool) {
+        if seal && bytes.len() >= HEADER_BYTES {
+            bytes[..4].copy_from_slice(&MAGIC);
+            bytes[4..8].copy_from_slice(&[1, 0, 0, 0]);
+            let length = bytes.len() as u32;
+            bytes[8..12].copy_from_slice(&length.to_le_bytes());
+            bytes[16..20].copy_from_slice(&SCHEMA_HASH.to_le_bytes());
+            reseal(&mut bytes);
+        }
+        if let Ok(table) = decode(&bytes) {
+            prop_assert_eq!(table.validate(), Ok(()));
+        }
+    }
+
+    #[test]
+    fn no_flipped_bit_goes_unseen(at in 0usize..64 * 8) {
+        let mut image = bytes(&table());
+        image[at / 8] ^= 1 << (at % 8);
+        prop_assert!(decode(&image).is_err());
+    }
+}

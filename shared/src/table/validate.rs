@@ -1,0 +1,281 @@
+//! Every way in which a table can be wrong, each its own error. Whatever passes may be handed to the engine.
+use super::bounds;
+use super::{Limits, Table, Zone};
+use crate::term::Term;
+use serde::{Deserialize, Serialize};
+
+/// Which number of a table an error speaks of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[allow(missing_docs, reason = "the name is the field of the table")]
+pub enum Field {
+    LimitOffset,
+    LimitSlew,
+    Place,
+    Radius,
+    Feed,
+    Kappa2,
+    Kappa4,
+    TermOffset,
+    TermRelative,
+    TermShear,
+    TermDeltaTau,
+    TermDeltaKappa2,
+    TermDecay,
+    TermPitch,
+    TermPhase,
+    TermCurvature,
+}
+
+impl Field {
+    /// The field in words, with its unit.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::LimitOffset => "largest offset (m)",
+            Self::LimitSlew => "largest offset rate (m/s)",
+            Self::Place => "place (m)",
+            Self::Radius => "radius (m)",
+            Self::Feed => "feed (m/s)",
+            Self::Kappa2 => "kappa2 (s^2)",
+            Self::Kappa4 => "kappa4 (s^4)",
+            Self::TermOffset => "length of a term (m)",
+            Self::TermRelative => "relative length of a term (m/m)",
+            Self::TermShear => "squareness (rad)",
+            Self::TermDeltaTau => "lag mismatch (s)",
+            Self::TermDeltaKappa2 => "bandwidth mismatch (s^2)",
+            Self::TermDecay => "decay of a reversal pulse (s)",
+            Self::TermPitch => "pitch (m)",
+            Self::TermPhase => "phase (rad)",
+            Self::TermCurvature => "guide curvature (1/m)",
+        }
+    }
+}
+
+impl core::fmt::Display for Field {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// Zone an error speaks of, 1-based in words; [`Where::HEAD`] for the table itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Where(pub Option<u8>);
+
+impl Where {
+    /// Not in a zone.
+    pub const HEAD: Self = Self(None);
+}
+
+impl core::fmt::Display for Where {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self.0 {
+            Some(zone) => write!(f, "zone {}", u16::from(zone) + 1),
+            None => f.write_str("limits"),
+        }
+    }
+}
+
+/// Why bytes are not a table that may be used.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
+pub enum TableError {
+    /// The first bytes are not those of a table.
+    #[error("not a giotto table")]
+    NotATable,
+    /// Fewer bytes than the header announces.
+    #[error("table cut short: {have} of {need} bytes")]
+    Truncated {
+        /// Bytes at hand.
+        have: u32,
+        /// Bytes the header needs or announces.
+        need: u32,
+    },
+    /// The header announces more than any table has, or more bytes follow than it announces.
+    #[error("table of {length} bytes, expected at most {max}")]
+    TooLong {
+        /// Announced or present length.
+        length: u32,
+        /// Longest accepted.
+        max: u32,
+    },
+    /// Bytes changed on the way.
+    #[error("table CRC is {stored:08x}, its bytes give {computed:08x}")]
+    BadCrc {
+        /// CRC in the header.
+        stored: u32,
+        /// CRC of the bytes.
+        computed: u32,
+    },
+    /// Written by a newer giotto.
+    #[error("table format {version} is newer than this build's {supported}")]
+    NewerVersion {
+        /// Version in the header.
+        version: u16,
+        /// Newest version this build reads.
+        supported: u16,
+    },
+    /// A version that never existed.
+    #[error("unknown table format {version}")]
+    UnknownVersion {
+        /// Version in the header.
+        version: u16,
+    },
+    /// Same version, other contents: made by a build whose types differ.
+    #[error("table schema {found:08x}, this build has {expected:08x}")]
+    SchemaMismatch {
+        /// Hash in the header.
+        found: u32,
+        /// Hash of this build.
+        expected: u32,
+    },
+    /// A flag bit that this format does not define.
+    #[error("table with unknown flags {flags:04x}")]
+    UnknownFlags {
+        /// The flags of the header.
+        flags: u16,
+    },
+    /// The CRC holds but the body is no table.
+    #[error("table body cannot be read")]
+    Malformed,
+    /// A table without zones corrects nothing.
+    #[error("table without zones")]
+    NoZones,
+    /// NaN or infinity.
+    #[error("{at}: {field} is not a finite number")]
+    NonFinite {
+        /// Which zone.
+        at: Where,
+        /// Which number.
+        field: Field,
+    },
+    /// A number beyond the bounds of the image.
+    #[error("{at}: {field} is {value}, allowed are {lo} to {hi}")]
+    OutOfBounds {
+        /// Which zone.
+        at: Where,
+        /// Which number.
+        field: Field,
+        /// Its value.
+        value: f32,
+        /// Smallest allowed.
+        lo: f32,
+        /// Largest allowed.
+        hi: f32,
+    },
+    /// A range whose lower end is above its upper one.
+    #[error("{at}: {field} range is empty, {lo} to {hi}")]
+    EmptyRange {
+        /// Which zone.
+        at: Where,
+        /// Which range.
+        field: Field,
+        /// Lower end.
+        lo: f32,
+        /// Upper end.
+        hi: f32,
+    },
+    /// The controller demands a signature and the table has none.
+    #[error("table is not signed, and this controller accepts signed tables only")]
+    Unsigned,
+    /// The signature is not that of these bytes by the provisioned key.
+    #[error("table signature does not fit its bytes and the controller's key")]
+    BadSignature,
+}
+
+/// Checks of the numbers in one place of the table.
+struct Check(Where);
+
+impl Check {
+    fn within(&self, field: Field, value: f32, [lo, hi]: [f32; 2]) -> Result<(), TableError> {
+        if !value.is_finite() {
+            return Err(TableError::NonFinite { at: self.0, field });
+        }
+        if value < lo || value > hi {
+            return Err(TableError::OutOfBounds { at: self.0, field, value, lo, hi });
+        }
+        Ok(())
+    }
+
+    fn magnitude(&self, field: Field, value: f32, most: f32) -> Result<(), TableError> {
+        self.within(field, value, [-most, most])
+    }
+
+    fn range(&self, field: Field, [lo, hi]: [f32; 2], bound: [f32; 2]) -> Result<(), TableError> {
+        self.within(field, lo, bound)?;
+        self.within(field, hi, bound)?;
+        if lo > hi {
+            return Err(TableError::EmptyRange { at: self.0, field, lo, hi });
+        }
+        Ok(())
+    }
+
+    fn term(&self, term: &Term<f32>) -> Result<(), TableError> {
+        let length = |value| self.magnitude(Field::TermOffset, value, bounds::OFFSET_MAX_M);
+        match *term {
+            Term::RadiusOffset { offset_m } => length(offset_m),
+            Term::ScaleError { relative } | Term::ScaleMismatch { relative } => {
+                self.magnitude(Field::TermRelative, relative, bounds::RELATIVE_MAX)
+            }
+            Term::Squareness { shear_rad } => {
+                self.magnitude(Field::TermShear, shear_rad, bounds::SHEAR_MAX_RAD)
+            }
+            Term::ServoMismatch { delta_tau_s } => {
+                self.magnitude(Field::TermDeltaTau, delta_tau_s, bounds::DELTA_TAU_MAX_S)
+            }
+            Term::BandwidthMismatch { delta_kappa2_s2 } => {
+                self.magnitude(Field::TermDeltaKappa2, delta_kappa2_s2, bounds::KAPPA2_MAX_S2)
+            }
+            Term::Backlash { step_m, .. } => length(step_m),
+            Term::LateralPlay { shift_m, .. } => length(shift_m),
+            Term::ReversalSpike { peak_m, decay_s, .. } => {
+                length(peak_m)?;
+                self.within(Field::TermDecay, decay_s, bounds::DECAY_S)
+            }
+            Term::Cyclic { amplitude_m, pitch_m, phase_rad, .. } => {
+                length(amplitude_m)?;
+                self.within(Field::TermPitch, pitch_m, bounds::PITCH_M)?;
+                self.magnitude(Field::TermPhase, phase_rad, bounds::PHASE_MAX_RAD)
+            }
+            Term::Straightness { curvature_per_m, .. } => {
+                self.magnitude(Field::TermCurvature, curvature_per_m, bounds::CURVATURE_MAX_PER_M)
+            }
+        }
+    }
+}
+
+impl Limits {
+    /// Checks the bounds of the table against those of the image.
+    pub fn validate(&self) -> Result<(), TableError> {
+        let check = Check(Where::HEAD);
+        check.within(Field::LimitOffset, self.offset_m, [0.0, bounds::OFFSET_MAX_M])?;
+        check.within(Field::LimitSlew, self.slew_m_s, [0.0, bounds::SLEW_MAX_M_S])
+    }
+}
+
+impl Zone {
+    fn validate(&self, index: usize) -> Result<(), TableError> {
+        let check = Check(Where(Some(index as u8)));
+        if let Some([lo, hi]) = self.place_m {
+            for (lo, hi) in lo.into_iter().zip(hi) {
+                check.range(Field::Place, [lo, hi], [-bounds::PLACE_MAX_M, bounds::PLACE_MAX_M])?;
+            }
+        }
+        check.range(Field::Radius, self.radius_m, [bounds::RADIUS_MIN_M, bounds::RADIUS_MAX_M])?;
+        check.range(Field::Feed, self.feed_m_s, [bounds::FEED_MIN_M_S, bounds::FEED_MAX_M_S])?;
+        check.magnitude(Field::Kappa2, self.cumulants.kappa2_s2, bounds::KAPPA2_MAX_S2)?;
+        check.magnitude(Field::Kappa4, self.cumulants.kappa4_s4, bounds::KAPPA4_MAX_S4)?;
+        self.terms.iter().try_for_each(|term| check.term(term))
+    }
+}
+
+impl Table {
+    /// Checks every number against the bounds of the image; the first that fails is named.
+    ///
+    /// # Errors
+    /// [`TableError::NoZones`], [`TableError::NonFinite`], [`TableError::OutOfBounds`], [`TableError::EmptyRange`].
+    pub fn validate(&self) -> Result<(), TableError> {
+        self.limits.validate()?;
+        if self.zones.is_empty() {
+            return Err(TableError::NoZones);
+        }
+        self.zones.iter().enumerate().try_for_each(|(index, zone)| zone.validate(index))
+    }
+}

@@ -1,0 +1,122 @@
+//! Frames: `COBS(payload · CRC-32) · 00`. Bytes may be lost, changed or joined anywhere; whatever arrives,
+//! [`Accumulator`] finds the next whole frame after the next zero.
+use super::CRC;
+use serde::Serialize;
+
+/// Longest payload: the largest message is a batch of set-points.
+pub const MAX_PAYLOAD: usize = 192;
+/// Length of the CRC.
+const CRC_BYTES: usize = 4;
+/// Longest content of a frame before COBS.
+const MAX_CONTENT: usize = MAX_PAYLOAD + CRC_BYTES;
+/// Longest frame with its COBS overhead (one byte in 254, and one) and the closing zero.
+pub const MAX_FRAME: usize = cobs::max_encoding_length(MAX_CONTENT) + 1;
+
+/// A message that does not fit into [`MAX_PAYLOAD`] or the buffer. Messages are bounded by their types, so
+/// this is a defect of the build; the tests encode the largest of each kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("message does not fit into a frame")]
+pub struct TooLong;
+
+/// Writes the frame of `message` to the start of `out` and returns it.
+///
+/// # Errors
+/// [`TooLong`] if the payload exceeds [`MAX_PAYLOAD`] or the frame `out`.
+pub fn encode<'a, M: Serialize>(message: &M, out: &'a mut [u8]) -> Result<&'a mut [u8], TooLong> {
+    let mut content = [0; MAX_CONTENT];
+    let payload = content.get_mut(..MAX_PAYLOAD).ok_or(TooLong)?;
+    let length = postcard::to_slice(message, payload).map_err(|_| TooLong)?.len();
+    let (payload, rest) = content.split_at_mut_checked(length).ok_or(TooLong)?;
+    *rest.first_chunk_mut().ok_or(TooLong)? = CRC.checksum(payload).to_le_bytes();
+    let content = content.get(..length + CRC_BYTES).ok_or(TooLong)?;
+    let mut encoder = cobs::CobsEncoder::new(out);
+    encoder.push(content).map_err(|_| TooLong)?;
+    let end = encoder.finalize();
+    let frame = out.get_mut(..=end).ok_or(TooLong)?;
+    if let Some(last) = frame.last_mut() {
+        *last = 0;
+    }
+    Ok(frame)
+}
+
+/// What was thrown away since the start; wrapping.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FrameCounts {
+    /// Frames whose CRC did not hold.
+    pub crc_errors: u32,
+    /// Frames that were not COBS or too short for a CRC.
+    pub malformed: u32,
+    /// Frames longer than [`MAX_FRAME`].
+    pub overlong: u32,
+}
+
+/// Collects bytes into frames.
+#[derive(Clone, Debug)]
+pub struct Accumulator {
+    bytes: [u8; MAX_FRAME],
+    length: usize,
+    /// Inside a frame that is already too long: nothing is kept before the next zero.
+    discarding: bool,
+    counts: FrameCounts,
+}
+
+impl Default for Accumulator {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Accumulator {
+    /// Nothing collected yet.
+    pub const fn new() -> Self {
+        let counts = FrameCounts { crc_errors: 0, malformed: 0, overlong: 0 };
+        Self { bytes: [0; MAX_FRAME], length: 0, discarding: false, counts }
+    }
+
+    /// What was thrown away.
+    pub const fn counts(&self) -> FrameCounts {
+        self.counts
+    }
+
+    /// Takes one byte; returns the payload of a frame if the byte completed a good one. Zeros between
+    /// frames are no error: a sender may open with one to cut off what came before.
+    pub fn push(&mut self, byte: u8) -> Option<&[u8]> {
+        if byte != 0 {
+            match self.bytes.get_mut(self.length) {
+                Some(place) if !self.discarding => {
+                    *place = byte;
+                    self.length += 1;
+                }
+                _ => self.discarding = true,
+            }
+            return None;
+        }
+        let length = core::mem::take(&mut self.length);
+        if core::mem::take(&mut self.discarding) {
+            self.counts.overlong = self.counts.overlong.wrapping_add(1);
+            return None;
+        }
+        if length == 0 {
+            return None;
+        }
+        let Some(end) = self.unframe(length) else {
+            self.counts.malformed = self.counts.malformed.wrapping_add(1);
+            return None;
+        };
+        let (payload, crc) = self.bytes.get(..end)?.split_last_chunk::<CRC_BYTES>()?;
+        if CRC.checksum(payload) != u32::from_le_bytes(*crc) {
+            self.counts.crc_errors = self.counts.crc_errors.wrapping_add(1);
+            return None;
+        }
+        Some(payload)
+    }
+
+    /// Undoes COBS in place; the length of the content, if there is one with room for a CRC.
+    fn unframe(&mut self, length: usize) -> Option<usize> {
+        let end = cobs::decode_in_place(self.bytes.get_mut(..length)?).ok()?;
+        (end >= CRC_BYTES).then_some(end)
+    }
+}
+
+#[cfg(test)]
+mod tests;

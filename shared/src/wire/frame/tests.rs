@@ -1,0 +1,166 @@
+//! Whatever bytes arrive, the next whole frame is found.
+use super::*;
+use crate::Direction;
+use crate::wire::*;
+use proptest::prelude::*;
+use std::vec::Vec;
+
+fn framed<M: Serialize>(message: &M) -> Vec<u8> {
+    encode(message, &mut [0; MAX_FRAME]).unwrap().to_vec()
+}
+
+fn request(seq: u16) -> Request {
+    Request { session: 7, seq, command: Command::Status }
+}
+
+/// Every payload found in `bytes`.
+fn received(accumulator: &mut Accumulator, bytes: &[u8]) -> Vec<Request> {
+    let mut found = Vec::new();
+    for &byte in bytes {
+        if let Some(payload) = accumulator.push(byte) {
+            found.push(postcard::from_bytes(payload).unwrap());
+        }
+    }
+    found
+}
+
+/// The largest message of each kind fits, so `TooLong` cannot occur at run time.
+#[test]
+fn largest_messages_fit() {
+    let data = Chunk::from_slice(&[0xff; CHUNK]).unwrap();
+    let command = Command::WriteChunk { offset: u16::MAX, data: data.clone() };
+    framed(&Request { session: u16::MAX, seq: u16::MAX, command });
+    framed(&Request { session: u16::MAX, seq: u16::MAX, command: Command::Provision { key: [255; 32] } });
+    let reply = |reply| framed(&FromController::Reply { session: u16::MAX, seq: u16::MAX, reply });
+    reply(Reply::Data { offset: u16::MAX, data });
+    let name: heapless::String<16> = "1234567890123456".try_into().unwrap();
+    reply(Reply::Identity(Identity {
+        board: name.clone(),
+        build: name,
+        protocol: u16::MAX,
+        table_format: u16::MAX,
+        schema_hash: u32::MAX,
+        max_image_bytes: u16::MAX,
+        tick_hz: u32::MAX,
+        signed_only: true,
+    }));
+    let most = u32::MAX;
+    let slot = SlotState::Table(TableInfo { length: u16::MAX, crc: most, generation: Some(most) });
+    reply(Reply::Status(Status {
+        motion: MotionState::Fault,
+        bypass: true,
+        active: Some(1),
+        slots: [slot; 2],
+        probation: Probation::FirstRun,
+        tick: most,
+        raw_m: [1.0; 3],
+        corrected_m: [1.0; 3],
+        counters: Counters {
+            tick_overruns: most,
+            offset_clamps: most,
+            slew_clamps: most,
+            dropped_set_points: most,
+            crc_errors: most,
+            malformed_frames: most,
+            overlong_frames: most,
+            repeated_requests: most,
+            lost_bytes: most,
+        },
+    }));
+    let point = SetPoint { raw_m: [1.0; 3], corrected_m: [1.0; 3] };
+    framed(&FromController::SetPoints(SetPoints {
+        index: most,
+        tick: most,
+        every: u16::MAX,
+        last: true,
+        points: heapless::Vec::from_slice(&[point; SET_POINTS]).unwrap(),
+    }));
+}
+
+#[test]
+fn golden_frame() {
+    let run = CircleRun {
+        centre_m: [0.0; 3],
+        radius_m: 0.1,
+        feed_m_s: 0.5,
+        direction: Direction::Cw,
+        laps: 2,
+        start_rad: 0.0,
+    };
+    let frame = framed(&Request { session: 1, seq: 300, command: Command::RunCircle(run) });
+    #[rustfmt::skip]
+    let payload = [
+        1,                                              // session
+        0xac, 0x02,                                     // sequence 300
+        10,                                             // run circle
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,             // centre
+        0xcd, 0xcc, 0xcc, 0x3d, 0, 0, 0, 0x3f,          // radius, feed
+        1, 2,                                           // clockwise, two laps
+        0, 0, 0, 0,                                     // start
+    ];
+    let mut accumulator = Accumulator::new();
+    let found = frame.iter().find_map(|&byte| accumulator.push(byte).map(<[u8]>::to_vec)).unwrap();
+    assert_eq!(found, payload);
+    assert_eq!(CRC.checksum(b"123456789"), 0xcbf4_3926);
+}
+
+#[test]
+fn next_frame_is_found_after_an_overlong_one() {
+    let mut accumulator = Accumulator::new();
+    let mut bytes = std::vec![0x55; 3 * MAX_FRAME];
+    // The tail of an overlong frame looks like a whole one and must not be taken for it.
+    bytes.extend(framed(&request(1)));
+    bytes.extend(framed(&request(2)));
+    assert_eq!(received(&mut accumulator, &bytes), [request(2)]);
+    assert_eq!(accumulator.counts(), FrameCounts { overlong: 1, ..FrameCounts::default() });
+}
+
+#[test]
+fn longest_frame_is_not_overlong() {
+    let mut accumulator = Accumulator::new();
+    let longest: heapless::Vec<u8, 256> = heapless::Vec::from_slice(&[1; MAX_PAYLOAD - 2]).unwrap();
+    let frame = framed(&longest);
+    assert_eq!(frame.len(), MAX_FRAME);
+    assert!(frame.iter().any(|&byte| accumulator.push(byte).is_some()));
+}
+
+#[test]
+fn changed_frames_are_counted_and_dropped() {
+    let mut accumulator = Accumulator::new();
+    let mut bytes = framed(&request(1));
+    bytes[2] ^= 0x10;
+    bytes.extend([1, 0]); // too short for a CRC
+    bytes.extend(framed(&request(2)));
+    assert_eq!(received(&mut accumulator, &bytes), [request(2)]);
+    assert_eq!(accumulator.counts(), FrameCounts { crc_errors: 1, malformed: 1, overlong: 0 });
+}
+
+proptest! {
+    #[test]
+    fn frame_after_any_bytes_is_found(noise in proptest::collection::vec(any::<u8>(), 0..1000), seq: u16) {
+        let mut accumulator = Accumulator::new();
+        for byte in noise {
+            accumulator.push(byte);
+        }
+        accumulator.push(0);
+        prop_assert_eq!(received(&mut accumulator, &framed(&request(seq))), [request(seq)]);
+    }
+
+    #[test]
+    fn any_payload_survives(payload in proptest::collection::vec(any::<u8>(), 0..MAX_PAYLOAD - 2)) {
+        let payload: heapless::Vec<u8, 256> = heapless::Vec::from_slice(&payload).unwrap();
+        let mut accumulator = Accumulator::new();
+        let found = framed(&payload).iter().find_map(|&byte| accumulator.push(byte).map(<[u8]>::to_vec));
+        let back: heapless::Vec<u8, 256> = postcard::from_bytes(&found.unwrap()).unwrap();
+        prop_assert_eq!(back, payload);
+    }
+
+    #[test]
+    fn no_single_bit_flip_passes(at in 0usize..64, bit in 0u8..8) {
+        let mut frame = framed(&request(9));
+        let at = at % frame.len();
+        frame[at] ^= 1 << bit;
+        let mut accumulator = Accumulator::new();
+        prop_assert_eq!(received(&mut accumulator, &frame), []);
+    }
+}

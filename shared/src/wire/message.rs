@@ -1,0 +1,292 @@
+//! The messages. A change here is a change of [`PROTOCOL_VERSION`].
+use super::Refusal;
+use crate::Direction;
+use serde::{Deserialize, Serialize};
+
+/// Version of the messages of this build; both sides must have the same.
+pub const PROTOCOL_VERSION: u16 = 1;
+
+/// Most bytes of a table in one message.
+pub const CHUNK: usize = 128;
+/// Most set-points in one message.
+pub const SET_POINTS: usize = 6;
+
+/// A piece of a table.
+pub type Chunk = heapless::Vec<u8, CHUNK>;
+
+/// From the host.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Request {
+    /// Drawn anew by each client, so that one cannot be answered from what another was told.
+    pub session: u16,
+    /// Grows by one with each new request; the same in a repetition.
+    pub seq: u16,
+    /// What to do.
+    pub command: Command,
+}
+
+/// What a host may ask.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Command {
+    /// Who are you? → [`Reply::Identity`].
+    Hello,
+    /// How are you? → [`Reply::Status`].
+    Status,
+    /// A table image of this length and CRC will follow.
+    WriteBegin {
+        /// Length of the image, bytes.
+        length: u16,
+        /// CRC-32 of all its bytes.
+        crc: u32,
+    },
+    /// The bytes of the image from `offset` on; in order.
+    WriteChunk {
+        /// Where the bytes belong.
+        offset: u16,
+        /// The bytes.
+        data: Chunk,
+    },
+    /// All chunks are sent: check the table, program the inactive slot, compare → [`Reply::Written`].
+    WriteEnd,
+    /// Bytes of a slot → [`Reply::Data`].
+    ReadBack {
+        /// Slot 0 or 1.
+        slot: u8,
+        /// First byte.
+        offset: u16,
+        /// How many, at most [`CHUNK`].
+        length: u8,
+    },
+    /// Use the table written last; until [`Command::Confirm`] it is on probation.
+    Commit,
+    /// Keep the table on probation: it is the one that boots from now on.
+    Confirm,
+    /// Return to the last good table.
+    Rollback,
+    /// Switch the correction off or on.
+    Bypass {
+        /// `true`: off.
+        on: bool,
+    },
+    /// Run circles.
+    RunCircle(CircleRun),
+    /// Stop within limits.
+    Stop,
+    /// Send every so many ticks' set-point while a run is in progress; 0: none.
+    Subscribe {
+        /// Ticks from one set-point to the next.
+        every: u16,
+    },
+    /// Warm reset, when idle.
+    Reset,
+    /// Provision the public key: from now on only tables signed with it are accepted. Once.
+    Provision {
+        /// Ed25519 public key.
+        key: [u8; 32],
+    },
+}
+
+/// Circles to run, about the origin of the controller's plane, starting and ending at `start_rad`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CircleRun {
+    /// Centre in the machine, m: chooses the zone.
+    pub centre_m: [f32; 3],
+    /// Programmed radius, m.
+    pub radius_m: f32,
+    /// Programmed feed, m/s.
+    pub feed_m_s: f32,
+    /// Direction.
+    pub direction: Direction,
+    /// Whole turns at full feed, beside entry and exit.
+    pub laps: u16,
+    /// Polar angle of start and end, rad.
+    pub start_rad: f32,
+}
+
+/// From the controller.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[allow(clippy::large_enum_variant, reason = "no heap to box on")]
+pub enum FromController {
+    /// The answer to the request with these numbers.
+    Reply {
+        /// Session of the request.
+        session: u16,
+        /// Sequence number of the request.
+        seq: u16,
+        /// The answer.
+        reply: Reply,
+    },
+    /// Unasked, to a subscriber.
+    SetPoints(SetPoints),
+}
+
+/// Answers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[allow(clippy::large_enum_variant, reason = "no heap to box on")]
+pub enum Reply {
+    /// Done.
+    Done,
+    /// To [`Command::Hello`].
+    Identity(Identity),
+    /// To [`Command::Status`].
+    Status(Status),
+    /// To [`Command::WriteEnd`].
+    Written {
+        /// The slot that now holds the table, programmed and compared.
+        slot: u8,
+    },
+    /// To [`Command::ReadBack`].
+    Data {
+        /// First byte.
+        offset: u16,
+        /// The bytes.
+        data: Chunk,
+    },
+    /// Not done, and why.
+    Refused(Refusal),
+}
+
+/// Who the controller is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Identity {
+    /// Board: `mps2-an386`, `stm32f405`, `virtual`.
+    pub board: heapless::String<16>,
+    /// Version of the firmware package.
+    pub build: heapless::String<16>,
+    /// [`PROTOCOL_VERSION`] of the image.
+    pub protocol: u16,
+    /// Newest table format it reads.
+    pub table_format: u16,
+    /// Schema hash of its tables.
+    pub schema_hash: u32,
+    /// Longest table image, bytes.
+    pub max_image_bytes: u16,
+    /// Ticks a second.
+    pub tick_hz: u32,
+    /// Whether a key is provisioned: only signed tables are accepted.
+    pub signed_only: bool,
+}
+
+/// A whole table in a slot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TableInfo {
+    /// Length of the image, bytes.
+    pub length: u16,
+    /// CRC-32 in its header.
+    pub crc: u32,
+    /// Generation it was last confirmed as; `None`: never confirmed.
+    pub generation: Option<u32>,
+}
+
+/// What a slot holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum SlotState {
+    /// Erased.
+    Empty,
+    /// Bytes that are not a whole table.
+    Invalid,
+    /// A whole table of a format this build does not read.
+    OtherFormat {
+        /// Its format version.
+        version: u16,
+    },
+    /// A whole table.
+    Table(TableInfo),
+}
+
+/// Where a table committed but not confirmed stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Probation {
+    /// No table is on probation.
+    None,
+    /// It has not run yet.
+    Fresh,
+    /// Its first run has begun; no second one starts before it is confirmed.
+    FirstRun,
+}
+
+/// What the engine is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum MotionState {
+    /// At rest, ready.
+    Idle,
+    /// Executing a program.
+    Running,
+    /// Decelerating after a stop.
+    Stopping,
+    /// In fault: at rest, nothing starts before a reset.
+    Fault,
+}
+
+/// Everything that went wrong and was survived; all count from boot and wrap.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Counters {
+    /// Ticks that were not finished when the next was due.
+    pub tick_overruns: u32,
+    /// Set-points whose offset was clamped.
+    pub offset_clamps: u32,
+    /// Set-points whose offset rate was clamped.
+    pub slew_clamps: u32,
+    /// Set-points that a subscriber did not get because the link was full.
+    pub dropped_set_points: u32,
+    /// Frames with a wrong CRC.
+    pub crc_errors: u32,
+    /// Frames that were not COBS or not a message.
+    pub malformed_frames: u32,
+    /// Frames longer than any message.
+    pub overlong_frames: u32,
+    /// Requests answered from memory.
+    pub repeated_requests: u32,
+    /// Bytes lost before they were read.
+    pub lost_bytes: u32,
+}
+
+/// A position in the plane of the path and along its normal, m.
+pub type Pose = [f32; 3];
+
+/// The controller's state.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Status {
+    /// The engine.
+    pub motion: MotionState,
+    /// Correction off.
+    pub bypass: bool,
+    /// Slot of the table in use, if one is.
+    pub active: Option<u8>,
+    /// Both slots.
+    pub slots: [SlotState; 2],
+    /// Probation of the table in use.
+    pub probation: Probation,
+    /// Ticks since boot, wrapping.
+    pub tick: u32,
+    /// Programmed position, m.
+    pub raw_m: Pose,
+    /// Corrected position, m.
+    pub corrected_m: Pose,
+    /// Counts.
+    pub counters: Counters,
+}
+
+/// A set-point before and after the correction.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SetPoint {
+    /// Programmed position, m.
+    pub raw_m: Pose,
+    /// Corrected position, m.
+    pub corrected_m: Pose,
+}
+
+/// Consecutive set-points.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SetPoints {
+    /// Set-points sent since the run began before these: a gap shows a loss.
+    pub index: u32,
+    /// Tick of the first.
+    pub tick: u32,
+    /// Ticks from one to the next.
+    pub every: u16,
+    /// No more follow in this run.
+    pub last: bool,
+    /// The points.
+    pub points: heapless::Vec<SetPoint, SET_POINTS>,
+}

@@ -1,0 +1,132 @@
+//! Why a controller says no, in a form the host can put into words.
+use crate::table::TableError;
+use serde::{Deserialize, Serialize};
+
+/// Why a command was not carried out.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
+pub enum Refusal {
+    /// The CRC held but this build has no such command.
+    #[error("the controller does not know this command")]
+    NotUnderstood,
+    /// Only possible at rest.
+    #[error("a run is in progress")]
+    Busy,
+    /// The table is wrong.
+    #[error("{0}")]
+    Table(TableError),
+    /// No upload has begun, or it was broken off by a reset.
+    #[error("no table is being written")]
+    NoUpload,
+    /// A chunk that does not continue where the last one ended.
+    #[error("chunk out of order, expected offset {expected}")]
+    OutOfOrder {
+        /// Next offset.
+        expected: u16,
+    },
+    /// More bytes than announced, or than any table has.
+    #[error("table of more than {max} bytes")]
+    UploadTooLong {
+        /// Most bytes possible.
+        max: u16,
+    },
+    /// Not all bytes came, or they are not the ones announced.
+    #[error("the bytes received are not the ones announced")]
+    UploadIncomplete,
+    /// The flash failed; the table in use is untouched.
+    #[error("flash: {0}")]
+    Flash(FlashFault),
+    /// Commit without a written table.
+    #[error("nothing has been written that could be committed")]
+    NothingToCommit,
+    /// Confirm without a table on probation.
+    #[error("no table is on probation")]
+    NothingToConfirm,
+    /// Rollback without an older confirmed table.
+    #[error("no other confirmed table to return to")]
+    NothingToRollBack,
+    /// A second run of a table on probation.
+    #[error("the table on probation has had its first run: confirm it or roll back")]
+    ProbationOver,
+    /// Correction on without a table.
+    #[error("no valid table to correct with")]
+    NoTable,
+    /// Slot, offset or length that do not exist.
+    #[error("no such slot or offset")]
+    NoSuchPlace,
+    /// The engine says no.
+    #[error("{0}")]
+    Motion(MotionRefusal),
+    /// A key is already provisioned, and not this one.
+    #[error("a key is already provisioned")]
+    KeyProvisioned,
+    /// This image has no signatures built in.
+    #[error("this image cannot check signatures")]
+    NoSignatures,
+}
+
+/// How a flash failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+pub enum FlashFault {
+    /// Erasing failed.
+    #[error("erase failed")]
+    Erase,
+    /// Programming failed.
+    #[error("programming failed")]
+    Program,
+    /// Reading failed.
+    #[error("reading failed")]
+    Read,
+    /// What was read back is not what was written.
+    #[error("byte {offset} does not read back as written")]
+    ReadBack {
+        /// First differing byte of the slot.
+        offset: u32,
+    },
+    /// Every place for a confirmation in this slot is used.
+    #[error("no room for another confirmation in this slot; flash the table again")]
+    Full,
+}
+
+/// Which number of a run is out of bounds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+#[allow(missing_docs, reason = "the name is the field of the run")]
+pub enum RunField {
+    #[error("radius (m)")]
+    Radius,
+    #[error("feed (m/s)")]
+    Feed,
+    #[error("laps")]
+    Laps,
+    #[error("centre (m)")]
+    Centre,
+    #[error("start angle (rad)")]
+    Start,
+    #[error("centripetal acceleration (m/s^2)")]
+    Acceleration,
+}
+
+/// Why the engine does not start.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
+pub enum MotionRefusal {
+    /// A number beyond the bounds of the image, or not a number.
+    #[error("{field} is {value}, allowed are {lo} to {hi}")]
+    OutOfBounds {
+        /// Which.
+        field: RunField,
+        /// Its value.
+        value: f32,
+        /// Smallest allowed.
+        lo: f32,
+        /// Largest allowed.
+        hi: f32,
+    },
+    /// The queue of segments is full.
+    #[error("no room in the queue of segments")]
+    QueueFull,
+    /// The engine is in fault.
+    #[error("the controller is in fault; reset it")]
+    Fault,
+    /// Not possible in the present state.
+    #[error("a run is in progress")]
+    Busy,
+}

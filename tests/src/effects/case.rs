@@ -1,0 +1,200 @@
+//! A hidden campaign from a seed: a laboratory, its effects, and the truth about them.
+use super::{Effect, listed, scaled, unlisted};
+use crate::machine::base::{Lab, Variety};
+use crate::machine::{Instrument, Machine, Plan, Spread};
+use giotto::campaign::Campaign;
+
+/// What a campaign hides.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Kind {
+    /// Nothing, in four ways.
+    Null(Null),
+    /// One or several effects by name.
+    Effects(Vec<String>),
+    /// An effect whose residuals have been dealt to other runs: no cause fits them.
+    Permuted(String),
+}
+
+/// Ways of hiding nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Null {
+    /// A perfect machine and a noisy instrument.
+    Noise,
+    /// Noise and spread between runs.
+    Spread,
+    /// Noise, spread and a servo lag that the baseline has to fit.
+    Lag,
+    /// Noise, spread and second-order mechanics that are handed over as `--model`.
+    Model,
+}
+
+/// The truth about one hidden effect.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Truth {
+    /// Name of the effect.
+    pub effect: String,
+    /// Causes that count as right.
+    pub accept: Vec<String>,
+    /// Axis, 0 X, 1 Y.
+    pub axis: Option<usize>,
+    /// True value.
+    pub value: f64,
+    /// Its unit.
+    pub unit: String,
+    /// Misfit it causes alone, m.
+    pub misfit_m: f64,
+}
+
+/// A hidden campaign.
+pub struct Case {
+    /// Name.
+    pub name: String,
+    /// Seed.
+    pub seed: u64,
+    /// Wanted misfit of each effect, in units of the sample noise.
+    pub strength: f64,
+    /// Instrument, with noise and spread.
+    pub instrument: Instrument,
+    /// Machine without the effects.
+    pub base: Machine,
+    /// Machine with them.
+    pub machine: Machine,
+    /// Tests.
+    pub plan: Plan,
+    /// Truth about each effect.
+    pub truth: Vec<Truth>,
+    /// What was measured.
+    pub campaign: Campaign,
+    /// Second-order model (ωn rad/s, ζ) to be given as `--model`.
+    pub model: Option<[f64; 2]>,
+}
+
+impl Case {
+    /// Draws a laboratory under `seed`, hides `kind` in it at `strength` times the sample noise, measures.
+    /// `None` if an effect has no such name.
+    pub fn new(kind: &Kind, strength: f64, seed: u64, variety: Variety) -> Option<Self> {
+        let lab = Lab::drawn(seed, variety);
+        let (mut base, mut instrument) = (lab.machine, lab.instrument);
+        let plan = lab.grid.plan(seed ^ 0x706c_616e);
+        let mut model = None;
+        let (name, effects): (String, Vec<Effect>) = match kind {
+            Kind::Null(null) => {
+                match null {
+                    Null::Noise | Null::Spread => base = Machine::default(),
+                    Null::Lag => {}
+                    Null::Model => {
+                        let omega_zeta = [30.0 + 30.0 * fraction(seed, 1), 0.6 + 0.2 * fraction(seed, 2)];
+                        base = Machine::default();
+                        base.axes.iter_mut().for_each(|a| a.mechanics = Some(omega_zeta));
+                        model = Some(omega_zeta);
+                    }
+                }
+                if *null == Null::Noise {
+                    instrument.spread =
+                        Spread { radius_m: 0.0, oval_m: 0.0, lobes_m: 0.0, ..instrument.spread };
+                    instrument.drift_m = 0.0;
+                }
+                (format!("null_{null:?}").to_lowercase(), Vec::new())
+            }
+            Kind::Effects(names) => {
+                let effects: Option<Vec<_>> = names
+                    .iter()
+                    .zip(1_u64..)
+                    .map(|(n, i)| {
+                        listed(n, seed.wrapping_mul(31) + i)
+                            .or_else(|| unlisted(n, seed.wrapping_mul(31) + i))
+                    })
+                    .collect();
+                (names.join("+"), effects?)
+            }
+            Kind::Permuted(name) => {
+                (format!("permuted_{name}"), vec![listed(name, seed).or_else(|| unlisted(name, seed))?])
+            }
+        };
+        let mut machine = base.clone();
+        let mut truth = Vec::new();
+        for effect in &effects {
+            // Each is sized alone on the bare machine, then put on top of those before it.
+            let wanted_m = strength * instrument.noise_m;
+            let (alone, misfit_m) = scaled(effect, &base, &plan, wanted_m);
+            machine = merged(machine, &base, &alone);
+            truth.push(Truth {
+                effect: effect.name.to_owned(),
+                accept: effect.accept.iter().map(|s| (*s).to_owned()).collect(),
+                axis: effect.axis,
+                value: (effect.value)(&alone, &plan),
+                unit: effect.unit.to_owned(),
+                misfit_m,
+            });
+        }
+        let mut campaign = instrument.measure(&machine, &plan, seed ^ 0x6d65_6173);
+        if matches!(kind, Kind::Permuted(_)) {
+            truth.clear();
+            deal_residuals(&mut campaign, &base, &plan, &instrument, seed);
+        }
+        Some(Self { name, seed, strength, instrument, base, machine, plan, truth, campaign, model })
+    }
+}
+
+/// A share 0…1 that depends on the seed and a number.
+fn fraction(seed: u64, salt: u64) -> f64 {
+    use rand::{RngExt, SeedableRng};
+    rand_chacha::ChaCha8Rng::seed_from_u64(seed.wrapping_add(salt << 32)).random()
+}
+
+/// `machine` with everything by which `alone` differs from `base`.
+fn merged(mut machine: Machine, base: &Machine, alone: &Machine) -> Machine {
+    macro_rules! take {
+        ($($field:ident).+) => { if alone.$($field).+ != base.$($field).+ { machine.$($field).+ = alone.$($field).+.clone(); } };
+        (add $($field:ident).+ [$i:expr]) => { machine.$($field).+[$i] += alone.$($field).+[$i] - base.$($field).+[$i] };
+    }
+    take!(interpolation_s);
+    take!(centripetal_limit_m_s2);
+    take!(vibration);
+    take!(thermal);
+    take!(geometry.squareness_rad);
+    machine.radius_offset_m += alone.radius_offset_m - base.radius_offset_m;
+    for i in 0..2 {
+        take!(add geometry.scale[i]);
+        take!(add geometry.bow_per_m[i]);
+        take!(add lateral_play_m[i]);
+        if alone.geometry.cyclic[i].is_some() {
+            machine.geometry.cyclic[i] = alone.geometry.cyclic[i];
+        }
+        let (to, from, was) = (&mut machine.axes[i], &alone.axes[i], &base.axes[i]);
+        to.dead_time_s += from.dead_time_s - was.dead_time_s;
+        to.average_s += from.average_s - was.average_s;
+        to.exponential_s += from.exponential_s - was.exponential_s;
+        to.lag_s += from.lag_s - was.lag_s;
+        to.backlash_m += from.backlash_m - was.backlash_m;
+        to.mechanics = from.mechanics.or(to.mechanics);
+        to.friction = from.friction.or(to.friction);
+        to.stick_slip = from.stick_slip.or(to.stick_slip);
+    }
+    machine.patterns.extend(alone.patterns.iter().copied());
+    machine
+}
+
+/// Gives the residual of each run (measured minus base machine) to another run with as many samples.
+fn deal_residuals(campaign: &mut Campaign, base: &Machine, plan: &Plan, instrument: &Instrument, seed: u64) {
+    use rand::{SeedableRng, seq::SliceRandom};
+    let bare =
+        Instrument { offset_m: instrument.offset_m, height_m: instrument.height_m, ..Instrument::perfect() }
+            .measure(base, plan, seed);
+    let residuals: Vec<Vec<f64>> = campaign
+        .runs
+        .iter()
+        .zip(&bare.runs)
+        .map(|(a, b)| a.samples.deviation_m.iter().zip(&b.samples.deviation_m).map(|(a, b)| a - b).collect())
+        .collect();
+    let mut order: Vec<usize> = (0..residuals.len()).collect();
+    order.shuffle(&mut rand_chacha::ChaCha8Rng::seed_from_u64(seed ^ 0x6465_616c));
+    for (i, run) in campaign.runs.iter_mut().enumerate() {
+        let n = run.samples.deviation_m.len();
+        // The next in the shuffled order that is as long as this run; itself if none is.
+        let from = order.iter().position(|k| residuals[*k].len() == n).map_or(i, |k| order.remove(k));
+        for (k, x) in run.samples.deviation_m.iter_mut().enumerate() {
+            *x = bare.runs[i].samples.deviation_m[k] + residuals[from].get(k).copied().unwrap_or(0.0);
+        }
+    }
+}

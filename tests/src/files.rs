@@ -1,0 +1,79 @@
+//! Hidden campaigns on disk: `campaign.toml`, a CSV a run, and `truth.json` beside them.
+use crate::effects::Case;
+use giotto::campaign::{Direction, Run};
+use serde_json::json;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Writes `case` into `dir` (made if missing), with the truth and, if it has one, `model.toml`.
+pub fn write(case: &Case, dir: &Path) -> std::io::Result<()> {
+    std::fs::create_dir_all(dir)?;
+    let mut toml = String::from("[campaign]\nname = \"blind\"\nmachine = \"machine under test\"\n");
+    for run in &case.campaign.runs {
+        let direction = if run.direction == Direction::Ccw { "ccw" } else { "cw" };
+        let _ = write!(
+            toml,
+            "\n[[run]]\nfile = \"{}\"\nradius_mm = {:?}\nfeed_mm_s = {:?}\ndirection = \"{direction}\"\nstart_angle_deg = {:?}\n",
+            run.file,
+            rounded(run.radius_m * 1e3),
+            rounded(run.feed_m_s * 1e3),
+            rounded(run.start_angle_rad.to_degrees()),
+        );
+        if let Some(t) = run.started_s {
+            let _ = writeln!(toml, "started_s = {:?}", rounded(t));
+        }
+        std::fs::write(dir.join(&run.file), csv(run))?;
+    }
+    std::fs::write(dir.join("campaign.toml"), toml)?;
+    let truth = json!({
+        "case": case.name, "seed": case.seed, "strength": case.strength,
+        "noise_um": case.instrument.noise_m * 1e6, "spread_um": case.instrument.spread.radius_m * 1e6,
+        "truth": case.truth.iter().map(|t| json!({
+            "effect": t.effect, "accept": t.accept, "value": t.value, "unit": t.unit,
+            "axis": t.axis.map(|a| ["x", "y"][a]), "misfit_um": t.misfit_m * 1e6,
+        })).collect::<Vec<_>>(),
+    });
+    std::fs::write(dir.join("truth.json"), format!("{truth:#}\n"))?;
+    if let Some([omega_n, zeta]) = case.model {
+        let feeds = case.plan.tests.iter().map(|t| t.feed_m_s * 1e3);
+        let radii = case.plan.tests.iter().map(|t| t.radius_m * 1e3);
+        let range =
+            |v: &mut dyn Iterator<Item = f64>| v.fold((f64::MAX, 0.0_f64), |(a, b), x| (a.min(x), b.max(x)));
+        let ((r0, r1), (f0, f1)) = (range(&mut radii.into_iter()), range(&mut feeds.into_iter()));
+        let model = format!(
+            "format = 1\ncampaign = \"blind\"\nmachine = \"machine under test\"\n\n[servo]\nkind = \"second_order\"\n\
+             omega_n_rad_s = {omega_n:?}\nzeta = {zeta:?}\n\n[valid]\nradius_mm = [{r0:?}, {r1:?}]\nfeed_mm_s = [{f0:?}, {f1:?}]\n"
+        );
+        std::fs::write(dir.join("model.toml"), model)?;
+    }
+    Ok(())
+}
+
+/// Removes the dust of unit conversion.
+fn rounded(x: f64) -> f64 {
+    (x * 1e6).round() / 1e6
+}
+
+fn csv(run: &Run) -> String {
+    let s = &run.samples;
+    let mut out = String::new();
+    if let (false, Some(time)) = (s.angle_inferred, &s.time_s) {
+        out.push_str("time_s,x_mm,y_mm\n");
+        for ((angle, deviation), t) in s.angle_rad.iter().zip(&s.deviation_m).zip(time) {
+            let r = (run.radius_m + deviation) * 1e3;
+            let (sin, cos) = angle.sin_cos();
+            let _ = writeln!(out, "{t:.5},{:.5},{:.5}", r * cos, r * sin);
+        }
+    } else if let Some(time) = &s.time_s {
+        out.push_str("time_s,deviation_um\n");
+        for (t, deviation) in time.iter().zip(&s.deviation_m) {
+            let _ = writeln!(out, "{t:.5},{:.1}", deviation * 1e6);
+        }
+    } else {
+        out.push_str("angle_deg,deviation_um\n");
+        for (angle, deviation) in s.angle_rad.iter().zip(&s.deviation_m) {
+            let _ = writeln!(out, "{:.4},{:.1}", angle.to_degrees(), deviation * 1e6);
+        }
+    }
+    out
+}

@@ -1,0 +1,65 @@
+//! Machines, laboratories and instruments to hide effects in, drawn under a seed.
+use super::plan::Grid;
+use super::{AxisChain, Instrument, Machine, Shape, Spread};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// A machine, a grid and an instrument before anything is hidden.
+#[derive(Clone, Debug)]
+pub struct Lab {
+    /// The machine.
+    pub machine: Machine,
+    /// What is run.
+    pub grid: Grid,
+    /// What looks.
+    pub instrument: Instrument,
+}
+
+/// How far a lab may stray from the usual.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Variety {
+    /// The paper's grid, a ballbar, normal spread.
+    Usual,
+    /// Other grids, sample counts, start angles, spread shapes, trackers, missing start times.
+    Broad,
+}
+
+impl Lab {
+    /// Draws a lab: one servo lag the same on both axes, a dead time, a set-up offset, noise and spread.
+    pub fn drawn(seed: u64, variety: Variety) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let broad = variety == Variety::Broad;
+        let lag_s = if broad { rng.random_range(0.003..0.016) } else { rng.random_range(0.005..0.012) };
+        let dead_time_s = if rng.random_bool(0.5) { rng.random_range(0.0..0.004) } else { 0.0 };
+        let axis = AxisChain { lag_s, dead_time_s, ..AxisChain::default() };
+        let machine = Machine { axes: [axis.clone(), axis], ..Machine::default() };
+        let noise_m = if broad { rng.random_range(0.4e-6..2.5e-6) } else { rng.random_range(0.7e-6..1.2e-6) };
+        let radius_m =
+            if broad { rng.random_range(0.1e-6..2.0e-6) } else { rng.random_range(0.4e-6..0.8e-6) };
+        let around: f64 = rng.random_range(-3.2..3.2);
+        let off = rng.random_range(5e-6..60e-6);
+        let shape = if broad {
+            [Shape::Normal, Shape::Heavy, Shape::Flat][rng.random_range(0..3)]
+        } else {
+            Shape::Normal
+        };
+        let instrument = Instrument {
+            noise_m,
+            resolution_m: 0.1e-6,
+            spread: Spread {
+                radius_m,
+                oval_m: radius_m * if broad { rng.random_range(0.0..0.4) } else { 0.2 },
+                lobes_m: if broad { radius_m * rng.random_range(0.0..0.1) } else { 0.0 },
+                shape,
+            },
+            offset_m: [off * around.cos(), off * around.sin()],
+            height_m: if broad { rng.random_range(0.0..0.2e-3) } else { 0.0 },
+            drift_m: if broad && rng.random_bool(0.3) { rng.random_range(0.0..0.3e-6) } else { 0.0 },
+            tick_s: 0.25e-3,
+            sees_angle: broad && rng.random_bool(0.25),
+            knows_start: !(broad && rng.random_bool(0.2)),
+        };
+        let grid = if broad { Grid::drawn(&mut rng) } else { Grid::paper() };
+        Self { machine, grid, instrument }
+    }
+}

@@ -1,0 +1,215 @@
+//! One circular test, step by step.
+use super::command::{Command, Interpolator};
+use super::friction::{FrictionState, StickState};
+use super::hysteresis::{Play, Sense};
+use super::linear::{Average, Lag, SecondOrder, line_loss};
+use super::pattern::Here;
+use super::{AxisChain, Machine, Test};
+use std::f64::consts::PI;
+
+/// Largest step where every element is linear, s.
+const LINEAR_STEP_S: f64 = 2e-3;
+/// Largest step where chords, friction or teeth have to be followed, s.
+const FINE_STEP_S: f64 = 0.5e-3;
+/// Acceleration of the start, m/s².
+const START_M_S2: f64 = 4.0;
+
+/// What the machine did on one lap: samples at even spacing, without instrument.
+#[derive(Clone, Debug)]
+pub struct Lap {
+    /// Deviation from the programmed radius about the true centre, and position, m.
+    pub position_m: Vec<[f64; 2]>,
+    /// Duration of the turn, s.
+    pub turn_s: f64,
+}
+
+/// The linear elements of one axis, at rest.
+struct Chain {
+    average: Option<Average>,
+    exponential: Option<Lag>,
+    lag: Option<Lag>,
+    mechanics: Option<SecondOrder>,
+    friction: Option<FrictionState>,
+    stick: Option<StickState>,
+    play: Option<Play>,
+    over_m: f64,
+    over: Sense,
+    last_m: f64,
+}
+
+impl Chain {
+    fn new(a: &AxisChain, step_s: f64, at: f64) -> Self {
+        Self {
+            average: (a.average_s > 0.0).then(|| Average::new(a.average_s, step_s, at)),
+            exponential: (a.exponential_s > 0.0).then(|| Lag::new(a.exponential_s, 0.0, step_s, at)),
+            lag: (a.lag_s > 0.0).then(|| Lag::new(a.lag_s, a.feed_forward, step_s, at)),
+            mechanics: a.mechanics.map(|[w, z]| SecondOrder::new(w, z, step_s, at)),
+            friction: a.friction.as_ref().map(|f| FrictionState::new(f, step_s)),
+            stick: a.stick_slip.as_ref().map(|s| StickState::new(s, step_s)),
+            play: (a.backlash_m > 0.0).then(|| Play::new(a.backlash_m, at)),
+            over_m: a.backlash_m.min(0.0),
+            over: Sense::new(2.0 * a.backlash_m.abs().max(1e-7)),
+            last_m: at,
+        }
+    }
+
+    /// Number of elements that see their input as straight pieces.
+    fn lines(a: &AxisChain) -> i32 {
+        [a.average_s > 0.0, a.exponential_s > 0.0, a.lag_s > 0.0, a.mechanics.is_some()]
+            .iter()
+            .map(|on| i32::from(*on))
+            .sum()
+    }
+
+    fn step(&mut self, command: f64, step_s: f64) -> f64 {
+        let mut x = command;
+        if let Some(e) = &mut self.average {
+            x = e.step(x);
+        }
+        if let Some(e) = &mut self.exponential {
+            x = e.step(x);
+        }
+        if let Some(e) = &mut self.lag {
+            x = e.step(x);
+        }
+        if let Some(e) = &mut self.mechanics {
+            x = e.step(x);
+        }
+        let travel = x - self.last_m;
+        self.last_m = x;
+        if let Some(f) = &mut self.friction {
+            x += f.step(travel);
+        }
+        if let Some(s) = &mut self.stick {
+            x += s.step(travel, step_s);
+        }
+        if let Some(p) = &mut self.play {
+            x = p.step(x);
+        }
+        if self.over_m < 0.0 {
+            x -= 0.5 * self.over_m * self.over.step(travel);
+        }
+        x
+    }
+}
+
+/// Feed the controller really drives, m/s.
+pub fn real_feed(machine: &Machine, test: &Test) -> f64 {
+    test.feed_m_s.min((machine.centripetal_limit_m_s2 * test.radius_m).sqrt())
+}
+
+/// Drives `machine` through `test`; `campaign_s` is the length of the campaign, `vibration_rad` the phase
+/// of the vibration when the lap begins.
+pub fn simulate(machine: &Machine, test: &Test, campaign_s: f64, vibration_rad: f64) -> Lap {
+    let feed = real_feed(machine, test);
+    let rate = test.sign() * feed / test.radius_m;
+    let turn_s = 2.0 * PI / rate.abs();
+    let n = test.samples;
+    let spacing_s = turn_s / n as f64;
+    let nonlinear = machine.interpolation_s > 0.0
+        || machine.axes.iter().any(|a| a.friction.is_some() || a.stick_slip.is_some());
+    let largest = if nonlinear { FINE_STEP_S } else { LINEAR_STEP_S };
+    let per_sample = (spacing_s / largest).ceil().max(1.0) as usize;
+    let step_s = spacing_s / per_sample as f64;
+
+    let slow = machine.axes.iter().map(slowest_s).fold(0.0, f64::max);
+    let settle_s = (25.0 * slow).max(0.3);
+    let command = Command::new(
+        test.radius_m,
+        rate,
+        test.start_angle_rad,
+        (feed / START_M_S2).max(0.05),
+        // On the grid of steps, so that the lap begins on a step.
+        (settle_s / step_s).ceil() * step_s,
+    );
+    let mut interpolator =
+        (machine.interpolation_s > 0.0).then(|| Interpolator::new(command, machine.interpolation_s));
+    let rest = command.position_m(command.begin_s());
+    let loss = line_loss(rate, step_s);
+    let gain = [0, 1].map(|i| {
+        if machine.interpolation_s > 0.0 { 1.0 } else { loss.powi(-Chain::lines(&machine.axes[i])) }
+    });
+    let mut chains = [0, 1].map(|i| Chain::new(&machine.axes[i], step_s, gain[i] * rest[i]));
+    let mut senses = [Sense::new(machine.lateral_travel_m); 2];
+    let dead = [machine.axes[0].dead_time_s, machine.axes[1].dead_time_s];
+
+    let mut position_m = Vec::with_capacity(n);
+    let mut last = rest;
+    let first = (command.begin_s() / step_s).floor() as i64;
+    let end = ((n - 1) * per_sample) as i64;
+    for k in first..=end {
+        let t = k as f64 * step_s;
+        let wanted = match &mut interpolator {
+            // A shared delay only turns the circle, so chords take the mean of both.
+            Some(i) => i.position_m(t - 0.5 * (dead[0] + dead[1])),
+            None if dead[0] == dead[1] => command.position_m(t - dead[0]),
+            None => [command.position_m(t - dead[0])[0], command.position_m(t - dead[1])[1]],
+        };
+        let mut p = [0, 1].map(|i| chains[i].step(gain[i] * wanted[i], step_s));
+        let sense = [0, 1].map(|i| senses[i].step(p[i] - last[i]));
+        last = p;
+        if k < 0 || k as usize % per_sample != 0 {
+            continue;
+        }
+        p = machine.geometry.place(p);
+        p[1] += 0.5 * machine.lateral_play_m[0] * sense[0];
+        p[0] -= 0.5 * machine.lateral_play_m[1] * sense[1];
+        position_m.push(outside(
+            machine,
+            test,
+            p,
+            t,
+            turn_s,
+            campaign_s,
+            vibration_rad,
+            command.angle_rad(t),
+        ));
+    }
+    Lap { position_m, turn_s }
+}
+
+/// Longest time constant of a chain, s.
+fn slowest_s(a: &AxisChain) -> f64 {
+    let mechanics = a.mechanics.map_or(0.0, |[w, z]| 1.0 / (w * z.min(1.0 / z)));
+    let friction = a.friction.map_or(0.0, |f| f.decay_s);
+    [a.average_s / 10.0, a.exponential_s, a.lag_s, mechanics, friction].into_iter().fold(0.0, f64::max)
+}
+
+/// What acts on the finished motion: vibration, heat, ball size and patterns.
+#[allow(clippy::too_many_arguments, reason = "one sample of everything that is known")]
+fn outside(
+    machine: &Machine,
+    test: &Test,
+    p: [f64; 2],
+    t: f64,
+    turn_s: f64,
+    campaign_s: f64,
+    vibration_rad: f64,
+    angle_rad: f64,
+) -> [f64; 2] {
+    let mut p = p;
+    let share = (test.started_s + t) / campaign_s;
+    let mut radial = machine.radius_offset_m;
+    if let Some(thermal) = &machine.thermal {
+        let grown = 1.0 + thermal.growth(share);
+        p = p.map(|x| x * grown);
+    }
+    if let Some(v) = &machine.vibration {
+        let shake = v.amplitude_m * (2.0 * PI * v.frequency_hz * t + vibration_rad).sin();
+        match v.axis {
+            Some(axis) => p[axis] += shake,
+            None => radial += shake,
+        }
+    }
+    let here = Here {
+        angle_rad,
+        radius_m: test.radius_m,
+        feed_m_s: 2.0 * PI * test.radius_m / turn_s,
+        sign: test.sign(),
+        time_s: t,
+        share,
+    };
+    radial += machine.patterns.iter().map(|q| q.radial_m(&here)).sum::<f64>();
+    let longer = 1.0 + radial / p[0].hypot(p[1]);
+    p.map(|x| x * longer)
+}
