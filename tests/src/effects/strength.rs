@@ -1,6 +1,7 @@
 //! How much an effect shows: its misfit once the baseline has been fitted again.
 use super::Effect;
 use crate::machine::{Machine, Plan, Test, simulate};
+use std::f64::consts::PI;
 
 /// Every which test is looked at when a size is searched for: enough of all radii, feeds and directions.
 const EVERY: usize = 3;
@@ -26,48 +27,56 @@ fn in_order(plan: &Plan) -> Vec<&Test> {
     tests
 }
 
-/// Root mean square over all samples, m, by which `machine` differs from `base` after each run's centre
-/// has been taken off and one servo lag has been fitted again over all runs. The plan's slow and fast,
-/// small and large circles count alike; every third test is looked at unless `whole`.
-pub fn misfit_m(machine: &Machine, base: &Machine, plan: &Plan, whole: bool) -> f64 {
+/// Root mean square over all samples, m, of what is left of `machine`'s noise-free circles once each run's
+/// centre has been taken off and one servo lag has been fitted over all runs. Every third test (by radius,
+/// feed, direction) is looked at unless `whole`.
+pub fn misfit_m(machine: &Machine, plan: &Plan, whole: bool) -> f64 {
     let tests: Vec<&Test> = in_order(plan).into_iter().step_by(if whole { 1 } else { EVERY }).collect();
-    let with = profiles(machine, &tests, plan.length_s);
-    let without = profiles(base, &tests, plan.length_s);
-    let lag_s = base.axes[0].lag_s;
-    let mut centred = Vec::new();
-    let (mut on_lag, mut lag_square) = (0.0, 0.0);
-    for ((a, b), test) in with.iter().zip(&without).zip(&tests) {
-        let n = a.len() as f64;
-        let difference: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
-        let (mut cos, mut sin, mut mean) = (0.0, 0.0, 0.0);
-        for (k, x) in difference.iter().enumerate() {
-            let (s, c) = (2.0 * std::f64::consts::PI * k as f64 / n).sin_cos();
+    let mut runs = Vec::new();
+    let mut within = 0.0;
+    for (test, profile) in tests.iter().zip(profiles(machine, &tests, plan.length_s)) {
+        let n = profile.len() as f64;
+        let mean = profile.iter().sum::<f64>() / n;
+        let wave = |k: usize| (2.0 * PI * k as f64 / n).sin_cos();
+        let (mut cos, mut sin) = (0.0, 0.0);
+        for (k, x) in profile.iter().enumerate() {
+            let (s, c) = wave(k);
             cos += 2.0 * x * c / n;
             sin += 2.0 * x * s / n;
-            mean += x / n;
         }
-        // ∂ΔR/∂(1/kv²) of R·(1/√(1+ω²/kv²) − 1).
-        let w2 = (test.feed_m_s / test.radius_m).powi(2);
-        let slope = -0.5 * test.radius_m * w2 * (1.0 + w2 * lag_s * lag_s).powf(-1.5);
-        on_lag += n * mean * slope;
-        lag_square += n * slope * slope;
-        let square: f64 = difference
+        within += profile
             .iter()
             .enumerate()
             .map(|(k, x)| {
-                let (s, c) = (2.0 * std::f64::consts::PI * k as f64 / n).sin_cos();
-                (x - cos * c - sin * s - mean).powi(2)
+                let (s, c) = wave(k);
+                (x - mean - cos * c - sin * s).powi(2)
             })
-            .sum();
-        centred.push((n, mean, slope, square));
+            .sum::<f64>();
+        runs.push((n, test.radius_m, (test.feed_m_s / test.radius_m).powi(2), mean));
     }
-    let share = on_lag / lag_square;
-    let (mut sum, mut count) = (0.0, 0.0);
-    for (n, mean, slope, square) in centred {
-        sum += square + n * (mean - share * slope).powi(2);
-        count += n;
+    let between = |lag2: f64| -> f64 {
+        runs.iter()
+            .map(|&(n, radius, w2, mean)| n * (mean - radius * ((1.0 + w2 * lag2).powf(-0.5) - 1.0)).powi(2))
+            .sum()
+    };
+    let count: f64 = runs.iter().map(|r| r.0).sum();
+    ((within + least(between)) / count).sqrt()
+}
+
+/// Least value of a function of τ² over 0…(0.2 s)², by golden section in τ.
+fn least(f: impl Fn(f64) -> f64) -> f64 {
+    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+    let (mut a, mut b) = (0.0_f64, 0.2_f64);
+    for _ in 0..60 {
+        let (c, d) = (b - golden * (b - a), a + golden * (b - a));
+        if f(c * c) < f(d * d) {
+            b = d;
+        } else {
+            a = c;
+        }
     }
-    (sum / count).sqrt()
+    let middle = 0.5 * (a + b);
+    f(middle * middle).min(f(0.0))
 }
 
 /// `base` with `effect` in it, sized so that its misfit is `wanted_m`; and the misfit reached, m.
@@ -82,7 +91,7 @@ pub fn scaled(effect: &Effect, base: &Machine, plan: &Plan, wanted_m: f64) -> (M
     let mut before: Option<(f64, f64)> = None;
     for _ in 0..16 {
         let machine = build(size);
-        let reached = misfit_m(&machine, base, plan, false);
+        let reached = misfit_m(&machine, plan, false);
         let off = |m: f64| (m / wanted_m).ln().abs();
         if off(reached) < off(best.1) {
             best = (machine, reached);
