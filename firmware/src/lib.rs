@@ -1,3 +1,14 @@
 //! The controller: one library for every board and for the virtual controller on the host.
+//!
+//! | module | holds | knows nothing of |
+//! |---|---|---|
+//! | [`store`] | two slots of flash, confirmations, power cuts | what a table means |
+//! | [`server`] | the protocol state machine: request in, reply out | registers, serial ports |
 #![no_std]
 #![forbid(unsafe_code)]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod server;
+pub mod store;

@@ -6,7 +6,9 @@
 //!
 //! The host sends a [`Request`] and waits for the [`FromController::Reply`] with the same session and
 //! sequence number; if none comes it sends the same request again. The controller remembers the last request it
-//! carried out and answers a repetition from memory, so a lost answer never makes a command happen twice.
+//! carried out and answers a repetition from memory, so a lost answer never makes a command happen twice; a
+//! request that comes late, after a newer one of the session, is dropped. A session begins with
+//! [`Command::Hello`].
 //! Between replies the controller may send [`FromController::SetPoints`] to a subscriber.
 //!
 //! | module | holds |

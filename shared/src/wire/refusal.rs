@@ -8,6 +8,9 @@ pub enum Refusal {
     /// The CRC held but this build has no such command.
     #[error("the controller does not know this command")]
     NotUnderstood,
+    /// The session was not opened by a hello, or the controller has restarted since.
+    #[error("the controller has restarted; the session is over")]
+    NoSession,
     /// Only possible at rest.
     #[error("a run is in progress")]
     Busy,

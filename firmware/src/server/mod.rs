@@ -1,0 +1,314 @@
+//! The protocol state machine: bytes in, bytes out, over a flash and an engine. No clock, no registers.
+//!
+//! Tables live in three places: the [`Store`] (what boots), the engine (what corrects), and in between the
+//! buffer of an upload. The order of an update is `WriteBegin`, `WriteChunk`…, `WriteEnd` (the table is
+//! checked in memory, only then is the slot not in use programmed and compared), `Commit` (the engine, at
+//! rest, takes it over on probation), `Confirm` (it is what boots from now on).
+mod motion;
+mod session;
+mod tables;
+mod upload;
+
+pub mod link;
+#[cfg(test)]
+mod tests;
+
+pub use motion::{Motion, Snapshot, TimedSetPoint};
+
+use crate::store::{ImageBuffer, Layout, Store};
+use embedded_storage::nor_flash::NorFlash;
+use giotto_shared::table::{FORMAT_VERSION, MAX_IMAGE_BYTES, SCHEMA_HASH, bounds};
+use giotto_shared::wire::{
+    self, Accumulator, CHUNK, Chunk, CircleRun, Command, Counters, FromController, Identity, MAX_FRAME,
+    MotionRefusal, MotionState, PROTOCOL_VERSION, Probation, Refusal, Reply, RunField, SetPoints, Status,
+};
+use session::{Session, Turn};
+use upload::Upload;
+
+/// Most turns of one run.
+pub const MAX_LAPS: u16 = 10_000;
+/// Largest centripetal acceleration of a programmed circle, m/s²: five g, above any robot or machine tool.
+pub const CENTRIPETAL_MAX_M_S2: f32 = 50.0;
+
+/// What an image says of itself.
+#[derive(Clone, Copy, Debug)]
+pub struct Board {
+    /// Name of the board.
+    pub name: &'static str,
+    /// Ticks a second.
+    pub tick_hz: u32,
+}
+
+/// The server of one controller.
+#[derive(Debug)]
+pub struct Server<F, M> {
+    board: Board,
+    store: Store<F>,
+    motion: M,
+    accumulator: Accumulator,
+    session: Session,
+    upload: Upload,
+    buffer: ImageBuffer,
+    /// Slot whose table the engine has.
+    active: Option<u8>,
+    /// Slot programmed since boot and not yet committed.
+    written: Option<u8>,
+    probation: Probation,
+    /// Asked for by the host; without a table the engine is in bypass anyway.
+    bypass: bool,
+    /// Set-points sent in this run.
+    sent: u32,
+    every: u16,
+    lost_bytes: u32,
+    reset: bool,
+    frame: [u8; MAX_FRAME],
+}
+
+impl<F: NorFlash, M: Motion> Server<F, M> {
+    /// Boots: the newest confirmed table that this image reads goes to the engine; if there is none, bypass.
+    pub fn boot(board: Board, flash: F, layout: Layout, motion: M) -> Self {
+        let mut buffer = [0; MAX_IMAGE_BYTES];
+        let store = Store::open(flash, layout, &mut buffer);
+        let mut server = Self {
+            board,
+            store,
+            motion,
+            accumulator: Accumulator::new(),
+            session: Session::new(),
+            upload: Upload::new(),
+            buffer,
+            active: None,
+            written: None,
+            probation: Probation::None,
+            bypass: false,
+            sent: 0,
+            every: 0,
+            lost_bytes: 0,
+            reset: false,
+            frame: [0; MAX_FRAME],
+        };
+        server.install_last_good();
+        server
+    }
+
+    /// The engine.
+    pub const fn motion_mut(&mut self) -> &mut M {
+        &mut self.motion
+    }
+
+    /// The store.
+    pub const fn store_mut(&mut self) -> &mut Store<F> {
+        &mut self.store
+    }
+
+    /// Gives back flash and engine, as a reset does.
+    pub fn into_parts(self) -> (F, M) {
+        (self.store.into_flash(), self.motion)
+    }
+
+    /// Slot whose table the engine corrects with.
+    pub const fn active(&self) -> Option<u8> {
+        self.active
+    }
+
+    /// Whether a reset was asked for; the reply has to leave first.
+    pub const fn reset_requested(&self) -> bool {
+        self.reset
+    }
+
+    /// Counts bytes that the port lost before [`Server::receive`].
+    pub const fn count_lost_bytes(&mut self, count: u32) {
+        self.lost_bytes = self.lost_bytes.wrapping_add(count);
+    }
+
+    /// Takes a byte from the link; returns the frame to send if it completed a request.
+    pub fn receive(&mut self, byte: u8) -> Option<&[u8]> {
+        let payload = self.accumulator.push(byte)?;
+        let (head, command) = match session::read(payload) {
+            Some(request) => request,
+            None => {
+                self.session.count_malformed();
+                return None;
+            }
+        };
+        let opens = matches!(command, Ok(Command::Hello));
+        let reply = match self.session.turn(head, opens) {
+            Turn::Repeated => return self.session.last_reply(),
+            Turn::Late => return None,
+            // Not remembered: a stranger does not disturb whoever has the session.
+            Turn::Unknown => {
+                return session::frame(head, Reply::Refused(Refusal::NoSession), &mut self.frame);
+            }
+            Turn::New => match command {
+                Ok(command) => self.execute(command).unwrap_or_else(Reply::Refused),
+                Err(session::NotUnderstood) => Reply::Refused(Refusal::NotUnderstood),
+            },
+        };
+        self.session.answer(head, reply)
+    }
+
+    /// The next frame of set-points for a subscriber, if one is due.
+    pub fn set_points(&mut self) -> Option<&[u8]> {
+        let first = self.motion.next_set_point()?;
+        let mut batch = SetPoints {
+            index: self.sent,
+            tick: first.tick,
+            every: self.every,
+            last: first.last,
+            points: heapless::Vec::new(),
+        };
+        let _ = batch.points.push(first.point);
+        while !batch.last && !batch.points.is_full() {
+            let Some(next) = self.motion.next_set_point() else { break };
+            batch.last = next.last;
+            let _ = batch.points.push(next.point);
+        }
+        self.sent = self.sent.wrapping_add(batch.points.len() as u32);
+        let message = FromController::SetPoints(batch);
+        wire::encode(&message, &mut self.frame).ok().map(|frame| &*frame)
+    }
+
+    fn execute(&mut self, command: Command) -> Result<Reply, Refusal> {
+        match command {
+            Command::Hello => return Ok(Reply::Identity(self.identity())),
+            Command::Status => return Ok(Reply::Status(self.status())),
+            Command::WriteBegin { length, crc } => self.upload.begin(length, crc)?,
+            Command::WriteChunk { offset, data } => self.upload.chunk(offset, &data, &mut self.buffer)?,
+            Command::WriteEnd => return self.program().map(|slot| Reply::Written { slot }),
+            Command::ReadBack { slot, offset, length } => return self.read_back(slot, offset, length),
+            Command::Commit => self.commit()?,
+            Command::Confirm => self.confirm()?,
+            Command::Rollback => self.roll_back()?,
+            Command::Bypass { on } => {
+                if !on && self.active.is_none() {
+                    return Err(Refusal::NoTable);
+                }
+                self.bypass = on;
+                self.apply_bypass();
+            }
+            Command::RunCircle(run) => self.run_circle(&run)?,
+            Command::Stop => self.motion.stop(),
+            Command::Subscribe { every } => {
+                self.every = every;
+                self.motion.subscribe(every);
+            }
+            Command::Reset => {
+                self.idle()?;
+                self.reset = true;
+            }
+            Command::Provision { .. } => return Err(Refusal::NoSignatures),
+        }
+        Ok(Reply::Done)
+    }
+
+    fn idle(&self) -> Result<(), Refusal> {
+        match self.motion.snapshot().state {
+            MotionState::Idle | MotionState::Fault => Ok(()),
+            MotionState::Running | MotionState::Stopping => Err(Refusal::Busy),
+        }
+    }
+
+    const fn bypassed(&self) -> bool {
+        self.bypass || self.active.is_none()
+    }
+
+    fn apply_bypass(&mut self) {
+        self.motion.bypass(self.bypassed());
+    }
+
+    fn read_back(&mut self, slot: u8, offset: u16, length: u8) -> Result<Reply, Refusal> {
+        let length = usize::from(length);
+        if slot > 1 || length > CHUNK {
+            return Err(Refusal::NoSuchPlace);
+        }
+        let mut data = Chunk::new();
+        data.resize(length, 0).map_err(|_| Refusal::NoSuchPlace)?;
+        self.store.read(slot, u32::from(offset), &mut data).map_err(|_| Refusal::NoSuchPlace)?;
+        Ok(Reply::Data { offset, data })
+    }
+
+    fn run_circle(&mut self, run: &CircleRun) -> Result<(), Refusal> {
+        self.idle()?;
+        check_run(run).map_err(Refusal::Motion)?;
+        if self.probation == Probation::FirstRun {
+            return Err(Refusal::ProbationOver);
+        }
+        self.motion.run_circle(run).map_err(Refusal::Motion)?;
+        self.sent = 0;
+        if self.probation == Probation::Fresh {
+            self.probation = Probation::FirstRun;
+        }
+        Ok(())
+    }
+
+    fn identity(&self) -> Identity {
+        Identity {
+            board: cut(self.board.name),
+            build: cut(env!("CARGO_PKG_VERSION")),
+            protocol: PROTOCOL_VERSION,
+            table_format: FORMAT_VERSION,
+            schema_hash: SCHEMA_HASH,
+            max_image_bytes: MAX_IMAGE_BYTES as u16,
+            tick_hz: self.board.tick_hz,
+            signed_only: false,
+        }
+    }
+
+    fn status(&self) -> Status {
+        let now = self.motion.snapshot();
+        let frames = self.accumulator.counts();
+        Status {
+            motion: now.state,
+            bypass: self.bypassed(),
+            active: self.active,
+            slots: [self.store.state(0), self.store.state(1)],
+            probation: self.probation,
+            tick: now.tick,
+            raw_m: now.raw_m,
+            corrected_m: now.corrected_m,
+            counters: Counters {
+                tick_overruns: now.tick_overruns,
+                offset_clamps: now.offset_clamps,
+                slew_clamps: now.slew_clamps,
+                dropped_set_points: now.dropped_set_points,
+                crc_errors: frames.crc_errors,
+                malformed_frames: frames.malformed.wrapping_add(self.session.malformed()),
+                overlong_frames: frames.overlong,
+                repeated_requests: self.session.repeated(),
+                lost_bytes: self.lost_bytes,
+            },
+        }
+    }
+}
+
+/// A name, cut to fit.
+fn cut(name: &str) -> heapless::String<16> {
+    let mut out = heapless::String::new();
+    for character in name.chars() {
+        if out.push(character).is_err() {
+            break;
+        }
+    }
+    out
+}
+
+/// Checks a run against the bounds of the image.
+fn check_run(run: &CircleRun) -> Result<(), MotionRefusal> {
+    let within = |field, value: f32, lo: f32, hi: f32| {
+        // Written so that NaN fails.
+        if value >= lo && value <= hi {
+            Ok(())
+        } else {
+            Err(MotionRefusal::OutOfBounds { field, value, lo, hi })
+        }
+    };
+    within(RunField::Radius, run.radius_m, bounds::RADIUS_MIN_M, bounds::RADIUS_MAX_M)?;
+    within(RunField::Feed, run.feed_m_s, bounds::FEED_MIN_M_S, bounds::FEED_MAX_M_S)?;
+    within(RunField::Laps, f32::from(run.laps), 1.0, f32::from(MAX_LAPS))?;
+    within(RunField::Start, run.start_rad, -bounds::PHASE_MAX_RAD, bounds::PHASE_MAX_RAD)?;
+    for coordinate in run.centre_m {
+        within(RunField::Centre, coordinate, -bounds::PLACE_MAX_M, bounds::PLACE_MAX_M)?;
+    }
+    let centripetal = run.feed_m_s * run.feed_m_s / run.radius_m;
+    within(RunField::Acceleration, centripetal, 0.0, CENTRIPETAL_MAX_M_S2)
+}

@@ -1,0 +1,65 @@
+//! What the server needs of an engine.
+use giotto_shared::table::Table;
+use giotto_shared::wire::{CircleRun, MotionRefusal, MotionState, Pose, SetPoint};
+
+/// The engine as its tick last left it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Snapshot {
+    /// What it is doing.
+    pub state: MotionState,
+    /// Ticks since boot, wrapping.
+    pub tick: u32,
+    /// Programmed position, m.
+    pub raw_m: Pose,
+    /// Corrected position, m.
+    pub corrected_m: Pose,
+    /// Ticks that were not finished when the next was due.
+    pub tick_overruns: u32,
+    /// Set-points whose offset was clamped.
+    pub offset_clamps: u32,
+    /// Set-points whose offset rate was clamped.
+    pub slew_clamps: u32,
+    /// Set-points that found no room on their way out.
+    pub dropped_set_points: u32,
+}
+
+/// A set-point with its time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimedSetPoint {
+    /// Tick at which it held.
+    pub tick: u32,
+    /// The set-point.
+    pub point: SetPoint,
+    /// Last one of its run.
+    pub last: bool,
+}
+
+/// An engine, seen from the link. Every call returns at once; what it asks for takes effect in the tick.
+pub trait Motion {
+    /// State, position and counts.
+    fn snapshot(&self) -> Snapshot;
+
+    /// Corrects with this table from the next program on; `None`: no correction.
+    ///
+    /// # Errors
+    /// [`MotionRefusal::Busy`] while a program runs.
+    fn install(&mut self, table: Option<&Table>) -> Result<(), MotionRefusal>;
+
+    /// Switches the correction off (`true`) or on, smoothly.
+    fn bypass(&mut self, on: bool);
+
+    /// Starts circles.
+    ///
+    /// # Errors
+    /// Any [`MotionRefusal`]; nothing has started then.
+    fn run_circle(&mut self, run: &CircleRun) -> Result<(), MotionRefusal>;
+
+    /// Stops within limits.
+    fn stop(&mut self);
+
+    /// Gives every so many ticks' set-point of a run to [`Motion::next_set_point`]; 0: none.
+    fn subscribe(&mut self, every: u16);
+
+    /// The oldest set-point not yet taken.
+    fn next_set_point(&mut self) -> Option<TimedSetPoint>;
+}

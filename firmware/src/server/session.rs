@@ -1,0 +1,100 @@
+//! Whose turn it is: new requests, repeated ones, and those that come too late.
+use giotto_shared::wire::{self, Command, FromController, MAX_FRAME, Reply};
+
+/// Session and sequence number of a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Head {
+    session: u16,
+    seq: u16,
+}
+
+/// The head can be read, the command not: a newer host.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct NotUnderstood;
+
+/// Reads a request; `None` if not even its head can be read.
+pub(super) fn read(payload: &[u8]) -> Option<(Head, Result<Command, NotUnderstood>)> {
+    let (session, rest) = postcard::take_from_bytes::<u16>(payload).ok()?;
+    let (seq, rest) = postcard::take_from_bytes::<u16>(rest).ok()?;
+    let command = match postcard::take_from_bytes::<Command>(rest) {
+        Ok((command, [])) => Ok(command),
+        _ => Err(NotUnderstood),
+    };
+    Some((Head { session, seq }, command))
+}
+
+/// What to do with a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Turn {
+    /// Carry it out.
+    New,
+    /// It was the last one: send the same reply.
+    Repeated,
+    /// A newer one was carried out already: no reply.
+    Late,
+    /// Not of the session that is open.
+    Unknown,
+}
+
+/// The session that is open and the reply to its last request.
+#[derive(Debug)]
+pub(super) struct Session {
+    last: Option<Head>,
+    reply: [u8; MAX_FRAME],
+    length: usize,
+    repeated: u32,
+    malformed: u32,
+}
+
+impl Session {
+    pub(super) const fn new() -> Self {
+        Self { last: None, reply: [0; MAX_FRAME], length: 0, repeated: 0, malformed: 0 }
+    }
+
+    pub(super) const fn repeated(&self) -> u32 {
+        self.repeated
+    }
+
+    pub(super) const fn malformed(&self) -> u32 {
+        self.malformed
+    }
+
+    pub(super) const fn count_malformed(&mut self) {
+        self.malformed = self.malformed.wrapping_add(1);
+    }
+
+    /// `opens`: the request is a hello, which opens a session.
+    pub(super) fn turn(&mut self, head: Head, opens: bool) -> Turn {
+        let same_session = self.last.filter(|last| last.session == head.session);
+        let Some(last) = same_session else {
+            return if opens { Turn::New } else { Turn::Unknown };
+        };
+        // Sequence numbers wrap; less than half the circle ahead is newer.
+        match head.seq.wrapping_sub(last.seq) {
+            0 => {
+                self.repeated = self.repeated.wrapping_add(1);
+                Turn::Repeated
+            }
+            ahead if ahead < 0x8000 => Turn::New,
+            _ => Turn::Late,
+        }
+    }
+
+    pub(super) fn last_reply(&self) -> Option<&[u8]> {
+        self.reply.get(..self.length)
+    }
+
+    /// Frames and remembers the reply.
+    pub(super) fn answer(&mut self, head: Head, reply: Reply) -> Option<&[u8]> {
+        self.last = Some(head);
+        self.length = frame(head, reply, &mut self.reply).map_or(0, <[u8]>::len);
+        self.reply.get(..self.length)
+    }
+}
+
+/// Frames a reply that is not to be remembered.
+pub(super) fn frame(head: Head, reply: Reply, out: &mut [u8; MAX_FRAME]) -> Option<&[u8]> {
+    let Head { session, seq } = head;
+    let message = FromController::Reply { session, seq, reply };
+    wire::encode(&message, out).ok().map(|frame| &*frame)
+}

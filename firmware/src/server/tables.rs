@@ -1,0 +1,105 @@
+//! Which table corrects: what boots, what is on probation, what comes back.
+use super::{Motion, Server};
+use embedded_storage::nor_flash::NorFlash;
+use giotto_shared::table;
+use giotto_shared::wire::{Probation, Refusal};
+
+impl<F: NorFlash, M: Motion> Server<F, M> {
+    /// Gives the table in `slot` to the engine.
+    fn install(&mut self, slot: u8) -> Result<(), Refusal> {
+        self.upload.abort();
+        let image = self.store.load(slot, &mut self.buffer).map_err(Refusal::Flash)?;
+        let table = table::decode(image).map_err(Refusal::Table)?;
+        self.motion.install(Some(&table)).map_err(Refusal::Motion)?;
+        self.active = Some(slot);
+        self.apply_bypass();
+        Ok(())
+    }
+
+    /// Gives the newest confirmed table that this image reads to the engine, or takes any away.
+    pub(super) fn install_last_good(&mut self) {
+        self.probation = Probation::None;
+        let confirmed = self.store.confirmed();
+        if confirmed.into_iter().flatten().any(|slot| self.install(slot).is_ok()) {
+            return;
+        }
+        self.active = None;
+        // Refused only while a program runs; every caller has made sure that none does.
+        let _ = self.motion.install(None);
+        self.apply_bypass();
+    }
+
+    /// The slot that boots.
+    fn last_good(&self) -> Option<u8> {
+        match self.probation {
+            Probation::None => self.active,
+            Probation::Fresh | Probation::FirstRun => self.store.confirmed().into_iter().flatten().next(),
+        }
+    }
+
+    /// Checks the uploaded table and programs the slot that does not boot.
+    pub(super) fn program(&mut self) -> Result<u8, Refusal> {
+        self.idle()?;
+        let length = self.upload.end(&self.buffer)?;
+        let image = self.buffer.get(..length).ok_or(Refusal::UploadIncomplete)?;
+        table::decode(image).map(drop).map_err(Refusal::Table)?;
+        let slot = match self.last_good() {
+            Some(0) => 1,
+            _ => 0,
+        };
+        self.written = None;
+        let on_probation = self.probation != Probation::None;
+        let written = self.store.write(slot, length, &mut self.buffer);
+        if on_probation {
+            // Its slot is gone; the engine must not keep what can no longer be read back.
+            self.install_last_good();
+        }
+        written.map_err(Refusal::Flash)?;
+        self.written = Some(slot);
+        Ok(slot)
+    }
+
+    /// Hands the written table to the engine, on probation.
+    pub(super) fn commit(&mut self) -> Result<(), Refusal> {
+        self.idle()?;
+        let slot = self.written.ok_or(Refusal::NothingToCommit)?;
+        self.install(slot)?;
+        self.written = None;
+        self.probation = Probation::Fresh;
+        Ok(())
+    }
+
+    /// Makes the table on probation the one that boots.
+    pub(super) fn confirm(&mut self) -> Result<(), Refusal> {
+        let slot = match self.probation {
+            Probation::None => None,
+            Probation::Fresh | Probation::FirstRun => self.active,
+        };
+        let slot = slot.ok_or(Refusal::NothingToConfirm)?;
+        self.upload.abort();
+        self.store.confirm(slot, &mut self.buffer).map_err(Refusal::Flash)?;
+        self.probation = Probation::None;
+        Ok(())
+    }
+
+    /// Ends a probation, or else makes the other confirmed table the one that boots.
+    pub(super) fn roll_back(&mut self) -> Result<(), Refusal> {
+        self.idle()?;
+        if self.probation != Probation::None {
+            self.install_last_good();
+            return Ok(());
+        }
+        let in_use = self.active;
+        let other = self.store.confirmed().into_iter().flatten().find(|slot| Some(*slot) != in_use);
+        let other = other.ok_or(Refusal::NothingToRollBack)?;
+        self.upload.abort();
+        // Read before it is confirmed: a table this image cannot use must not become the one that boots.
+        self.install(other)?;
+        if let Err(fault) = self.store.confirm(other, &mut self.buffer) {
+            self.install_last_good();
+            return Err(Refusal::Flash(fault));
+        }
+        self.written = None;
+        Ok(())
+    }
+}

@@ -1,0 +1,239 @@
+//! Requests in and out of order, uploads good and bad, probation.
+use super::*;
+use giotto_shared::table::TableError;
+use giotto_shared::wire::SlotState;
+use proptest::prelude::*;
+
+fn fresh() -> Desk {
+    boot(Cells::new(), None, Tear::Untouched)
+}
+
+fn refused(reply: Option<Reply>) -> Refusal {
+    match reply {
+        Some(Reply::Refused(refusal)) => refusal,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn boots_in_bypass_without_a_table() {
+    let mut desk = fresh();
+    let status = desk.status();
+    assert!(status.bypass);
+    assert_eq!((status.active, status.slots), (None, [SlotState::Empty; 2]));
+    assert_eq!(refused(desk.ask(Command::Bypass { on: false })), Refusal::NoTable);
+    assert_eq!(refused(desk.ask(Command::Commit)), Refusal::NothingToCommit);
+    assert_eq!(refused(desk.ask(Command::Confirm)), Refusal::NothingToConfirm);
+    assert_eq!(refused(desk.ask(Command::Rollback)), Refusal::NothingToRollBack);
+}
+
+#[test]
+fn flashed_table_survives_a_reset_and_bypass_does_not() {
+    let mut desk = fresh();
+    assert!(desk.flash("a") && desk.done(Command::Bypass { on: true }));
+    assert!(desk.status().bypass);
+    let mut desk = desk.reboot();
+    let status = desk.status();
+    assert_eq!((status.bypass, status.active, status.probation), (false, Some(0), Probation::None));
+    assert_eq!(desk.correcting().as_deref(), Some("a"));
+    let crc = table::Header::read(&image("a")).unwrap().crc;
+    let info = TableInfo { length: image("a").len() as u16, crc, generation: Some(1) };
+    assert_eq!(status.slots, [SlotState::Table(info), SlotState::Empty]);
+}
+
+#[test]
+fn without_confirmation_the_last_good_table_returns() {
+    let mut desk = fresh();
+    assert!(desk.flash("a") && desk.write(&image("b")));
+    assert_eq!(desk.correcting().as_deref(), Some("a"));
+    assert!(desk.done(Command::Commit));
+    assert_eq!(desk.status().probation, Probation::Fresh);
+    assert_eq!(desk.correcting().as_deref(), Some("b"));
+    assert!(desk.done(circle()));
+    assert_eq!(refused(desk.ask(Command::Commit)), Refusal::Busy);
+    assert_eq!(refused(desk.ask(Command::Rollback)), Refusal::Busy);
+    assert!(desk.done(Command::Stop));
+    assert_eq!(refused(desk.ask(circle())), Refusal::ProbationOver);
+    assert_eq!(desk.server.motion_mut().runs, 1);
+    assert_eq!(desk.reboot().correcting().as_deref(), Some("a"));
+}
+
+#[test]
+fn confirmed_during_its_first_run_it_stays() {
+    let mut desk = fresh();
+    assert!(desk.flash("a") && desk.write(&image("b")) && desk.done(Command::Commit));
+    assert!(desk.done(circle()) && desk.done(Command::Confirm) && desk.done(Command::Stop));
+    assert!(desk.done(circle()));
+    assert_eq!(desk.reboot().correcting().as_deref(), Some("b"));
+}
+
+#[test]
+fn rollback_goes_back_and_forth_and_survives_a_reset() {
+    let mut desk = fresh();
+    assert!(desk.flash("a") && desk.flash("b"));
+    for (expected, generation) in [("a", 3), ("b", 4), ("a", 5)] {
+        assert!(desk.done(Command::Rollback));
+        assert_eq!(desk.correcting().as_deref(), Some(expected));
+        desk = desk.reboot();
+        assert_eq!(desk.correcting().as_deref(), Some(expected));
+        let status = desk.status();
+        let slot = status.slots[usize::from(status.active.unwrap())];
+        assert!(matches!(slot, SlotState::Table(info) if info.generation == Some(generation)));
+    }
+}
+
+#[test]
+fn rollback_on_probation_returns_at_once() {
+    let mut desk = fresh();
+    assert!(desk.flash("a") && desk.write(&image("b")) && desk.done(Command::Commit));
+    assert!(desk.done(Command::Rollback));
+    assert_eq!(desk.correcting().as_deref(), Some("a"));
+    assert_eq!(refused(desk.ask(Command::Rollback)), Refusal::NothingToRollBack);
+}
+
+#[test]
+fn a_new_upload_ends_a_probation() {
+    let mut desk = fresh();
+    assert!(desk.flash("a") && desk.write(&image("b")) && desk.done(Command::Commit));
+    assert!(desk.write(&image("c")));
+    assert_eq!(desk.correcting().as_deref(), Some("a"));
+    assert!(desk.done(Command::Commit) && desk.done(Command::Confirm));
+    assert_eq!(desk.reboot().correcting().as_deref(), Some("c"));
+}
+
+#[test]
+fn a_bad_table_never_touches_the_flash() {
+    let mut desk = fresh();
+    assert!(desk.flash("a"));
+    let steps = desk.server.store_mut().flash_mut().steps();
+    let mut out_of_bounds = image("b");
+    let end = out_of_bounds.len();
+    out_of_bounds[end - 8..end - 4].copy_from_slice(&1.0_f32.to_le_bytes());
+    assert!(desk.upload(&out_of_bounds));
+    assert!(matches!(refused(desk.ask(Command::WriteEnd)), Refusal::Table(TableError::BadCrc { .. })));
+    let crc = {
+        let mut bytes = out_of_bounds[..12].to_vec();
+        bytes.extend(&out_of_bounds[16..]);
+        wire::CRC.checksum(&bytes)
+    };
+    out_of_bounds[12..16].copy_from_slice(&crc.to_le_bytes());
+    assert!(desk.upload(&out_of_bounds));
+    let refusal = refused(desk.ask(Command::WriteEnd));
+    assert!(matches!(refusal, Refusal::Table(TableError::OutOfBounds { .. })), "{refusal}");
+    assert_eq!(refused(desk.ask(Command::WriteEnd)), Refusal::NoUpload);
+    assert_eq!(refused(desk.ask(Command::Commit)), Refusal::NothingToCommit);
+    assert_eq!(desk.server.store_mut().flash_mut().steps(), steps);
+    assert_eq!(desk.correcting().as_deref(), Some("a"));
+}
+
+#[test]
+fn uploads_are_in_order_and_whole() {
+    let mut desk = fresh();
+    let chunk = |offset, count: usize| Command::WriteChunk {
+        offset,
+        data: Chunk::from_slice(&[0; CHUNK][..count]).unwrap(),
+    };
+    assert_eq!(refused(desk.ask(chunk(0, 1))), Refusal::NoUpload);
+    let too_long = Command::WriteBegin { length: u16::MAX, crc: 0 };
+    assert_eq!(refused(desk.ask(too_long)), Refusal::UploadTooLong { max: MAX_IMAGE_BYTES as u16 });
+    assert!(desk.done(Command::WriteBegin { length: 100, crc: 0 }) && desk.done(chunk(0, 60)));
+    assert_eq!(refused(desk.ask(chunk(50, 10))), Refusal::OutOfOrder { expected: 60 });
+    assert_eq!(refused(desk.ask(chunk(60, 41))), Refusal::UploadTooLong { max: 100 });
+    assert_eq!(refused(desk.ask(Command::WriteEnd)), Refusal::UploadIncomplete);
+}
+
+#[test]
+fn a_repeated_request_happens_once() {
+    let mut desk = fresh();
+    assert!(desk.flash("a") && desk.flash("b"));
+    desk.seq += 1;
+    let rollback = frame(1, desk.seq, Command::Rollback);
+    for _ in 0..3 {
+        assert_eq!(desk.send(&rollback), Some(Reply::Done));
+    }
+    assert_eq!(desk.correcting().as_deref(), Some("a"));
+    assert_eq!(desk.status().counters.repeated_requests, 2);
+    // Late, after a newer one: neither done nor answered.
+    assert_eq!(desk.send(&rollback), None);
+    assert_eq!(desk.correcting().as_deref(), Some("a"));
+}
+
+#[test]
+fn strangers_and_newer_hosts_are_told() {
+    let mut desk = fresh();
+    assert_eq!(refused(desk.send(&frame(2, 1, Command::Rollback))), Refusal::NoSession);
+    assert!(matches!(desk.ask(Command::Status), Some(Reply::Status(_))));
+    assert!(matches!(desk.send(&frame(2, 1, Command::Hello)), Some(Reply::Identity(_))));
+    assert_eq!(refused(desk.ask(Command::Status)), Refusal::NoSession);
+    let unknown = wire::encode(&(2_u16, 2_u16, 99_u8), &mut [0; MAX_FRAME]).unwrap().to_vec();
+    assert_eq!(refused(desk.send(&unknown)), Refusal::NotUnderstood);
+}
+
+#[test]
+fn runs_out_of_bounds_are_refused() {
+    let Command::RunCircle(good) = circle() else { panic!() };
+    let bad = [
+        CircleRun { radius_m: f32::NAN, ..good },
+        CircleRun { radius_m: 2.0, ..good },
+        CircleRun { feed_m_s: 0.0, ..good },
+        CircleRun { laps: 0, ..good },
+        CircleRun { start_rad: 7.0, ..good },
+        CircleRun { centre_m: [0.0, f32::INFINITY, 0.0], ..good },
+        CircleRun { radius_m: 0.01, feed_m_s: 1.0, ..good },
+    ];
+    let mut desk = fresh();
+    for run in bad {
+        let refusal = refused(desk.ask(Command::RunCircle(run)));
+        assert!(matches!(refusal, Refusal::Motion(MotionRefusal::OutOfBounds { .. })), "{refusal}");
+    }
+    assert_eq!(desk.server.motion_mut().runs, 0);
+}
+
+#[test]
+fn read_back_stays_inside_the_slot() {
+    let mut desk = fresh();
+    assert!(desk.flash("a"));
+    let read = |slot, offset, length| Command::ReadBack { slot, offset, length };
+    match desk.ask(read(0, 0, 16)) {
+        Some(Reply::Data { offset: 0, data }) => assert_eq!(data, image("a")[..16]),
+        other => panic!("{other:?}"),
+    }
+    for (slot, offset, length) in [(2, 0, 1), (0, 2040, 16), (0, 0, 200), (1, u16::MAX, 1)] {
+        assert_eq!(refused(desk.ask(read(slot, offset, length))), Refusal::NoSuchPlace);
+    }
+}
+
+proptest! {
+    /// Any bytes, among them whole requests in any order: no panic, and never a correction without a table.
+    #[test]
+    fn any_bytes_leave_a_whole_table(
+        pieces in proptest::collection::vec((0u8..12, any::<u16>(), proptest::collection::vec(any::<u8>(), 0..40)), 0..60)
+    ) {
+        let mut desk = fresh();
+        prop_assert!(desk.flash("a"));
+        for (kind, number, bytes) in pieces {
+            let slot = (number % 3) as u8;
+            let data = Chunk::from_slice(&bytes).unwrap();
+            let command = match kind {
+                0 => Command::WriteBegin { length: number % 100, crc: wire::CRC.checksum(&bytes) },
+                1 => Command::WriteChunk { offset: number % 100, data },
+                2 => Command::WriteEnd,
+                3 => Command::Commit,
+                4 => Command::Confirm,
+                5 => Command::Rollback,
+                6 => Command::Bypass { on: number % 2 == 0 },
+                7 => circle(),
+                8 => Command::Stop,
+                9 => Command::ReadBack { slot, offset: number, length: slot },
+                _ => {
+                    desk.send(&bytes);
+                    desk.send(&[0]);
+                    continue;
+                }
+            };
+            desk.ask(command);
+            prop_assert_eq!(desk.correcting(), Some("a".to_string()));
+        }
+        prop_assert_eq!(desk.reboot().correcting(), Some("a".to_string()));
+    }
+}

@@ -1,0 +1,60 @@
+//! A confirmation: generation and check, eight bytes.
+use giotto_shared::wire::CRC;
+
+/// Length of a confirmation.
+pub(super) const RECORD_BYTES: usize = 8;
+
+/// "The table with this CRC was confirmed as generation n."
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Record {
+    pub(super) generation: u32,
+}
+
+fn check(generation: [u8; 4], table_crc: u32) -> [u8; 4] {
+    let mut digest = CRC.digest();
+    digest.update(&generation);
+    digest.update(&table_crc.to_le_bytes());
+    digest.finalize().to_le_bytes()
+}
+
+impl Record {
+    pub(super) fn is_blank(bytes: [u8; RECORD_BYTES]) -> bool {
+        bytes == [0xff; RECORD_BYTES]
+    }
+
+    /// The generation, if the bytes are a confirmation of the table with this CRC.
+    pub(super) fn read(bytes: [u8; RECORD_BYTES], table_crc: u32) -> Option<u32> {
+        let [a, b, c, d, rest @ ..] = bytes;
+        let generation = [a, b, c, d];
+        (rest == check(generation, table_crc)).then(|| u32::from_le_bytes(generation))
+    }
+
+    pub(super) fn write(self, table_crc: u32) -> [u8; RECORD_BYTES] {
+        let generation = self.generation.to_le_bytes();
+        let [a, b, c, d] = generation;
+        let [e, f, g, h] = check(generation, table_crc);
+        [a, b, c, d, e, f, g, h]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn golden_and_bound_to_its_table() {
+        let bytes = Record { generation: 3 }.write(0x1234_5678);
+        assert_eq!(bytes[..4], [3, 0, 0, 0]);
+        // zlib.crc32(bytes.fromhex("0300000078563412"))
+        assert_eq!(u32::from_le_bytes([bytes[4], bytes[5], bytes[6], bytes[7]]), GOLDEN);
+        assert_eq!(Record::read(bytes, 0x1234_5678), Some(3));
+        assert_eq!(Record::read(bytes, 0x1234_5679), None);
+        for bit in 0..64 {
+            let mut torn = bytes;
+            torn[bit / 8] ^= 1 << (bit % 8);
+            assert_eq!(Record::read(torn, 0x1234_5678), None);
+        }
+    }
+
+    const GOLDEN: u32 = 0x6584_8044;
+}
