@@ -1,7 +1,9 @@
 //! Machines and helpers for the cross-crate tests.
 //!
 //! [`machine`] moves in the time domain and shares nothing with the simulation under test; [`effects`]
-//! hides known errors in it, scaled to a wanted misfit; [`files`] writes such campaigns with their truth.
+//! hides known errors in it, scaled to a wanted misfit; [`files`] writes such campaigns with their truth;
+//! [`study`] judges what `diagnose` makes of them.
 pub mod effects;
 pub mod files;
 pub mod machine;
+pub mod study;

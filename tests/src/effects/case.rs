@@ -63,6 +63,8 @@ pub struct Case {
     pub plan: Plan,
     /// Truth about each effect.
     pub truth: Vec<Truth>,
+    /// Seed of the measurement (phases, spread, noise).
+    pub measured_with: u64,
     /// What was measured.
     pub campaign: Campaign,
     /// Second-order model (ωn rad/s, ζ) to be given as `--model`.
@@ -77,7 +79,7 @@ impl Case {
         let (mut base, mut instrument) = (lab.machine, lab.instrument);
         let plan = lab.grid.plan(seed ^ 0x706c_616e);
         let mut model = None;
-        let (name, effects): (String, Vec<Effect>) = match kind {
+        let effects: Vec<Effect> = match kind {
             Kind::Null(null) => {
                 match null {
                     Null::Noise | Null::Spread => base = Machine::default(),
@@ -94,7 +96,7 @@ impl Case {
                         Spread { radius_m: 0.0, oval_m: 0.0, lobes_m: 0.0, ..instrument.spread };
                     instrument.drift_m = 0.0;
                 }
-                (format!("null_{null:?}").to_lowercase(), Vec::new())
+                Vec::new()
             }
             Kind::Effects(names) => {
                 let effects: Option<Vec<_>> = names
@@ -105,10 +107,10 @@ impl Case {
                             .or_else(|| unlisted(n, seed.wrapping_mul(31) + i))
                     })
                     .collect();
-                (names.join("+"), effects?)
+                effects?
             }
             Kind::Permuted(name) => {
-                (format!("permuted_{name}"), vec![listed(name, seed).or_else(|| unlisted(name, seed))?])
+                vec![listed(name, seed).or_else(|| unlisted(name, seed))?]
             }
         };
         let mut machine = base.clone();
@@ -127,12 +129,25 @@ impl Case {
                 misfit_m,
             });
         }
-        let mut campaign = instrument.measure(&machine, &plan, seed ^ 0x6d65_6173);
+        let measured_with = seed ^ 0x6d65_6173;
+        let mut campaign = instrument.measure(&machine, &plan, measured_with);
         if matches!(kind, Kind::Permuted(_)) {
             truth.clear();
             deal_residuals(&mut campaign, &base, &plan, &instrument, seed);
         }
-        Some(Self { name, seed, strength, instrument, base, machine, plan, truth, campaign, model })
+        Some(Self {
+            name: kind.to_string(),
+            measured_with,
+            seed,
+            strength,
+            instrument,
+            base,
+            machine,
+            plan,
+            truth,
+            campaign,
+            model,
+        })
     }
 }
 
@@ -195,6 +210,21 @@ fn deal_residuals(campaign: &mut Campaign, base: &Machine, plan: &Plan, instrume
         let from = order.iter().position(|k| residuals[*k].len() == n).map_or(i, |k| order.remove(k));
         for (k, x) in run.samples.deviation_m.iter_mut().enumerate() {
             *x = bare.runs[i].samples.deviation_m[k] + residuals[from].get(k).copied().unwrap_or(0.0);
+        }
+    }
+}
+
+impl std::fmt::Display for Kind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Null(null) => f.write_str(match null {
+                Null::Noise => "null_noise",
+                Null::Spread => "null_spread",
+                Null::Lag => "null_lag",
+                Null::Model => "null_model",
+            }),
+            Self::Effects(names) => f.write_str(&names.join("+")),
+            Self::Permuted(name) => write!(f, "permuted_{name}"),
         }
     }
 }

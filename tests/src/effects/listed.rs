@@ -224,7 +224,11 @@ pub fn listed(name: &str, seed: u64) -> Option<Effect> {
                 "um/m",
                 30e-6,
                 Box::new(move |m, size| m.thermal = Some(Thermal { total: sign * size, curvature })),
-                Box::new(|m, _| 1e6 * m.thermal.map_or(0.0, |t| t.total)),
+                // What can be known: the growth between the first run and the last.
+                Box::new(|m, plan| {
+                    let last_s = plan.tests.iter().map(|t| t.started_s).fold(0.0, f64::max);
+                    1e6 * m.thermal.map_or(0.0, |t| t.growth(last_s / plan.length_s))
+                }),
             )
         }
         "stick_slip" => {

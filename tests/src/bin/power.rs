@@ -1,0 +1,112 @@
+//! The power study of `diagnose`: `power --each 40` writes `tests/POWER.md`.
+//!
+//! `--only NAME` keeps the rows whose name contains NAME (or one group: `single`, `pair`, `triple`, `null`,
+//! `unlisted`, `permuted`) and then prints instead of writing.
+use clap::Parser;
+use giotto_tests::effects::Case;
+use giotto_tests::files;
+use giotto_tests::machine::base::Variety;
+use giotto_tests::study::sheet::{Row, page};
+use giotto_tests::study::{Job, Outcome, judge, schedule};
+use rayon::prelude::*;
+use std::path::PathBuf;
+use std::process::{Command, ExitCode};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+/// Hides effects under seeds and asks `diagnose` for them.
+#[derive(Parser)]
+struct Args {
+    /// Seed of the whole study.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Keeps the rows whose name contains this, and prints the page.
+    #[arg(long)]
+    only: Option<String>,
+    /// Keeps the rows of this strength.
+    #[arg(long)]
+    strength: Option<f64>,
+    /// Campaigns a cause and strength.
+    #[arg(long = "per-case", visible_alias = "each", default_value_t = 40)]
+    each: usize,
+    /// Four campaigns a cause and strength.
+    #[arg(long)]
+    quick: bool,
+    /// Other grids, instruments and spreads than the paper's.
+    #[arg(long)]
+    broad: bool,
+    /// The program to ask.
+    #[arg(long, default_value = "target/release/giotto")]
+    giotto: PathBuf,
+    /// Where the page goes.
+    #[arg(short, long, default_value = "tests/POWER.md")]
+    output: PathBuf,
+}
+
+/// Draws the campaign of `job`, has it diagnosed, judges the answer.
+fn ask(job: &Job, args: &Args, variety: Variety) -> Result<Row, String> {
+    let case = Case::new(&job.kind, job.strength, job.seed, variety).ok_or("no such effect")?;
+    let dir = tempfile::tempdir().map_err(|e| e.to_string())?;
+    files::write(&case, dir.path()).map_err(|e| e.to_string())?;
+    let mut command = Command::new(&args.giotto);
+    command.arg("diagnose").arg(dir.path()).arg("--json").args(["--seed", "1"]);
+    if case.model.is_some() {
+        command.arg("--model").arg(dir.path().join("model.toml"));
+    }
+    let start = Instant::now();
+    let answer = command.output().map_err(|e| format!("{}: {e}", args.giotto.display()))?;
+    let seconds = start.elapsed().as_secs_f64();
+    if !answer.status.success() {
+        return Err(String::from_utf8_lossy(&answer.stderr).into_owned());
+    }
+    let json = serde_json::from_slice(&answer.stdout).map_err(|e| e.to_string())?;
+    let outcome = Outcome::from_json(&json).ok_or("the answer is not as the contract has it")?;
+    Ok(Row { job: job.clone(), verdict: judge(&case, &outcome), seconds })
+}
+
+fn main() -> ExitCode {
+    let args = Args::parse();
+    let variety = if args.broad { Variety::Broad } else { Variety::Usual };
+    let each = if args.quick { 4 } else { args.each };
+    let mut jobs = schedule(args.seed, each, args.only.as_deref());
+    jobs.retain(|j| args.strength.is_none_or(|s| s == j.strength));
+    let done = AtomicUsize::new(0);
+    let answers: Vec<Result<Row, String>> = jobs
+        .par_iter()
+        .map(|job| {
+            let row = ask(job, &args, variety)
+                .map_err(|e| format!("{} at {}×, seed {}: {e}", job.kind, job.strength, job.seed));
+            let n = done.fetch_add(1, Ordering::Relaxed) + 1;
+            if n % 50 == 0 {
+                eprintln!("{n} of {}", jobs.len());
+            }
+            row
+        })
+        .collect();
+    let mut rows = Vec::new();
+    let mut broken = 0;
+    for answer in answers {
+        match answer {
+            Ok(row) => rows.push(row),
+            Err(words) => {
+                broken += 1;
+                eprintln!("{words}");
+            }
+        }
+    }
+    let command = format!(
+        "cargo run --release -p giotto-tests --bin power -- --seed {} --per-case {each}{}",
+        args.seed,
+        if args.broad { " --broad" } else { "" }
+    );
+    let page = page(&rows, args.seed, &command);
+    if args.only.is_some() || args.strength.is_some() {
+        println!("{page}");
+    } else if let Err(e) = std::fs::write(&args.output, &page) {
+        eprintln!("{}: {e}", args.output.display());
+        return ExitCode::from(2);
+    } else {
+        println!("{} campaigns, {broken} without an answer: {}", rows.len(), args.output.display());
+    }
+    if broken == 0 { ExitCode::SUCCESS } else { ExitCode::from(5) }
+}

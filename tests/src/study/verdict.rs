@@ -1,0 +1,110 @@
+//! One campaign judged: was the truth found, and nothing else?
+use super::Outcome;
+use crate::effects::{Case, Truth};
+use crate::machine::Instrument;
+
+/// How one answer compares with the truth.
+#[derive(Clone, Debug, Default)]
+pub struct Verdict {
+    /// The first finding is a hidden effect.
+    pub top_right: bool,
+    /// Every hidden effect is among the findings and nothing that is not there.
+    pub exact: bool,
+    /// Findings that are neither hidden nor physically there (`~`).
+    pub false_findings: Vec<String>,
+    /// First finding, or `unexplained`, or `nothing`.
+    pub top: String,
+    /// Everything named, for the list of failures.
+    pub said: String,
+    /// Effects that belong to one axis and were found: on the right one?
+    pub axis: Vec<bool>,
+    /// Effects found: name, and whether the 95 % interval covers the truth.
+    pub covered: Vec<(String, bool)>,
+    /// Stated probability of each finding and whether it is there.
+    pub stated: Vec<(f64, bool)>,
+    /// Gain over the baseline as a share of what the perfect model gains.
+    pub gain_share: Option<f64>,
+}
+
+/// Judges `outcome` against the truth of `case`.
+pub fn judge(case: &Case, outcome: &Outcome) -> Verdict {
+    let must = |cause: &str| case.truth.iter().any(|t| t.accept.iter().any(|a| a == cause));
+    let may =
+        |cause: &str| case.truth.iter().any(|t| t.accept.iter().any(|a| a.strip_prefix('~') == Some(cause)));
+    let causes: Vec<&str> = outcome.findings.iter().map(|f| f.cause.as_str()).collect();
+    let found = |t: &Truth| t.accept.iter().any(|a| causes.contains(&a.as_str()));
+    let unlisted = case.truth.iter().any(|t| t.accept.is_empty());
+    let false_findings: Vec<String> =
+        causes.iter().filter(|c| !must(c) && !may(c)).map(|c| (*c).to_owned()).collect();
+    let listed_found = case.truth.iter().filter(|t| !t.accept.is_empty()).all(found);
+    let mut verdict = Verdict {
+        top_right: causes.first().is_some_and(|c| must(c)),
+        exact: listed_found && false_findings.is_empty() && (!unlisted || outcome.unexplained),
+        top: causes
+            .first()
+            .map_or(if outcome.unexplained { "unexplained" } else { "nothing" }, |c| *c)
+            .to_owned(),
+        stated: outcome.findings.iter().map(|f| (f.probability, must(&f.cause) || may(&f.cause))).collect(),
+        ..Verdict::default()
+    };
+    verdict.said = outcome
+        .findings
+        .iter()
+        .map(|f| {
+            let axis = f.axis.as_deref().map_or(String::new(), |a| format!(" {a}"));
+            format!(
+                "{}{axis} {:.3e} [{:.3e}, {:.3e}] {} p {:.2}",
+                f.cause, f.value, f.ci95[0], f.ci95[1], f.unit, f.probability
+            )
+        })
+        .chain(outcome.unexplained.then(|| "unexplained".to_owned()))
+        .collect::<Vec<_>>()
+        .join("; ");
+    for truth in &case.truth {
+        let name = truth.axis.map(|a| ["x", "y"][a]);
+        let mut same = outcome.findings.iter().filter(|f| truth.accept.contains(&f.cause));
+        let Some(first) = same.clone().next() else { continue };
+        if name.is_some() {
+            verdict.axis.push(same.clone().any(|f| f.axis.as_deref() == name));
+        }
+        let at = same.find(|f| name.is_none() || f.axis.as_deref() == name).unwrap_or(first);
+        let inside = at.ci95[0] <= truth.value && truth.value <= at.ci95[1];
+        verdict.covered.push((truth.effect.clone(), inside));
+    }
+    if !case.truth.is_empty() && !unlisted {
+        let perfect_um = perfect_rms_um(case);
+        let possible = outcome.baseline_um - perfect_um;
+        if possible > 0.0 {
+            verdict.gain_share = Some((outcome.baseline_um - outcome.extended_um) / possible);
+        }
+    }
+    verdict.false_findings = false_findings;
+    verdict
+}
+
+/// What the true machine leaves of the measurement, rms over all samples, each run's centre removed, µm.
+pub fn perfect_rms_um(case: &Case) -> f64 {
+    let perfect = Instrument { noise_m: 0.0, resolution_m: 0.0, drift_m: 0.0, ..case.instrument };
+    let perfect = Instrument {
+        spread: crate::machine::Spread { radius_m: 0.0, oval_m: 0.0, lobes_m: 0.0, ..perfect.spread },
+        ..perfect
+    };
+    // The same streams of random numbers: the vibration has the same phases.
+    let clean = perfect.measure(&case.machine, &case.plan, case.measured_with);
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (run, truth) in case.campaign.runs.iter().zip(&clean.runs) {
+        let left: Vec<f64> =
+            run.samples.deviation_m.iter().zip(&truth.samples.deviation_m).map(|(a, b)| a - b).collect();
+        let n = left.len() as f64;
+        let (mut cos, mut sin) = (0.0, 0.0);
+        for (x, angle) in left.iter().zip(&run.samples.angle_rad) {
+            cos += 2.0 * x * angle.cos() / n;
+            sin += 2.0 * x * angle.sin() / n;
+        }
+        for (x, angle) in left.iter().zip(&run.samples.angle_rad) {
+            sum += (x - cos * angle.cos() - sin * angle.sin()).powi(2);
+        }
+        count += n;
+    }
+    1e6 * (sum / count).sqrt()
+}
