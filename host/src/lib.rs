@@ -4,5 +4,6 @@
 pub mod campaign;
 pub mod causes;
 pub mod cli;
+pub mod fit;
 pub mod model_file;
 pub mod simulation;

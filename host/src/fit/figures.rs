@@ -1,0 +1,182 @@
+//! The paper's Figures 8–11 for any campaign, as SVG.
+use super::radius::{Part, Point};
+use giotto_shared::model::RadiusModel;
+use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::*;
+
+/// One drawing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Figure {
+    /// File name.
+    pub file: &'static str,
+    /// The SVG document.
+    pub svg: String,
+}
+
+/// Why a drawing failed; in memory it does not.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{file} cannot be drawn: {why}")]
+pub struct FigureError {
+    file: &'static str,
+    why: String,
+}
+
+const SIZE: (u32, u32) = (760, 500);
+const FONT: &str = "sans-serif";
+/// Told apart by people who cannot tell red from green, and in print (after Okabe and Ito).
+const COLOURS: [RGBColor; 6] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(60, 60, 60),
+];
+/// Steps of a drawn curve.
+const CURVE_STEPS: usize = 100;
+
+/// Points of one radius: (acceleration, m/s²; value, µm), filled when the run was fitted.
+struct Series {
+    radius_m: f64,
+    points: Vec<(f64, f64, bool)>,
+    curve: Vec<(f64, f64)>,
+}
+
+/// Figures 8 (radius error), 9 (out-of-roundness, where known), 10 (measured and predicted, offsets removed) and 11
+/// (residuals), each against the centripetal acceleration f²/R.
+///
+/// # Errors
+/// [`FigureError`] if the drawing library fails.
+pub fn figures(points: &[Point], model: &RadiusModel<f64>) -> Result<Vec<Figure>, FigureError> {
+    let mut figures = vec![draw(
+        "figure08.svg",
+        "Radius size error",
+        "radius size error, µm",
+        &series(points, None, |p| Some(p.observation.radius_error_m)),
+    )?];
+    if points.iter().any(|p| p.observation.out_of_roundness_m.is_some()) {
+        let roundness = series(points, None, |p| p.observation.out_of_roundness_m);
+        figures.push(draw("figure09.svg", "Out-of-roundness", "out-of-roundness, µm", &roundness)?);
+    }
+    figures.push(draw(
+        "figure10.svg",
+        "Measured (marks) and predicted (lines) radius size error, offsets removed",
+        "radius size error, µm",
+        &series(points, Some(model), |p| Some(p.measured_m())),
+    )?);
+    figures.push(draw(
+        "figure11.svg",
+        "Residuals: measured minus predicted",
+        "residual, µm",
+        &series(points, None, |p| Some(p.residual_m())),
+    )?);
+    Ok(figures)
+}
+
+fn series(
+    points: &[Point],
+    model: Option<&RadiusModel<f64>>,
+    value: impl Fn(&Point) -> Option<f64>,
+) -> Vec<Series> {
+    let mut all: Vec<Series> = Vec::new();
+    for p in points {
+        let radius_m = p.observation.radius_m;
+        let Some(value) = value(p) else { continue };
+        let mark = (p.observation.f2_r(), value * 1e6, p.part == Part::Train);
+        match all.iter_mut().find(|s| (s.radius_m - radius_m).abs() < 1e-9) {
+            Some(s) => s.points.push(mark),
+            None => all.push(Series { radius_m, points: vec![mark], curve: Vec::new() }),
+        }
+    }
+    all.sort_by(|a, b| a.radius_m.total_cmp(&b.radius_m));
+    if let Some(model) = model {
+        for s in &mut all {
+            let top = s.points.iter().map(|p| p.0).fold(0.0, f64::max);
+            let at = |i: usize| {
+                let acceleration = top * i as f64 / CURVE_STEPS as f64;
+                (acceleration, 1e6 * model.radius_error_m(s.radius_m, (acceleration * s.radius_m).sqrt()))
+            };
+            s.curve = (0..=CURVE_STEPS).map(at).collect();
+        }
+    }
+    all
+}
+
+/// A range that holds all values and zero, with room around them.
+fn room(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
+    let (low, high) = values.fold((0.0_f64, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
+    let margin = 0.06 * (high - low).max(1e-3);
+    let pad = |edge: f64, by: f64| if edge == 0.0 && by > 0.0 { edge } else { edge + by };
+    pad(low, -margin)..pad(high, if low < 0.0 { margin.copysign(high.max(1e-9)) } else { margin })
+}
+
+fn draw(file: &'static str, title: &str, value: &str, series: &[Series]) -> Result<Figure, FigureError> {
+    let mut svg = String::new();
+    render(&mut svg, title, value, series).map_err(|why| FigureError { file, why })?;
+    Ok(Figure { file, svg })
+}
+
+type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+
+fn render(svg: &mut String, title: &str, value: &str, series: &[Series]) -> Result<(), String> {
+    let words = |e: &dyn std::fmt::Display| e.to_string();
+    let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
+    root.fill(&WHITE).map_err(|e| words(&e))?;
+    let marks = || series.iter().flat_map(|s| s.points.iter());
+    let lines = || series.iter().flat_map(|s| s.curve.iter());
+    let x = room(marks().map(|p| p.0));
+    let y = room(marks().map(|p| p.1).chain(lines().map(|p| p.1)));
+    let mut chart: Chart<'_, '_> = ChartBuilder::on(&root)
+        .caption(title, (FONT, 17))
+        .margin(14)
+        .x_label_area_size(44)
+        .y_label_area_size(62)
+        .build_cartesian_2d(x, y)
+        .map_err(|e| words(&e))?;
+    chart
+        .configure_mesh()
+        .x_desc("programmed centripetal acceleration f²/R, m/s²")
+        .y_desc(value)
+        .axis_desc_style((FONT, 14))
+        .label_style((FONT, 12))
+        .light_line_style(TRANSPARENT)
+        .bold_line_style(BLACK.mix(0.12))
+        .draw()
+        .map_err(|e| words(&e))?;
+    for (s, colour) in series.iter().zip(COLOURS.iter().cycle()) {
+        let colour = *colour;
+        chart
+            .draw_series(LineSeries::new(s.curve.iter().copied(), colour.stroke_width(1)))
+            .map_err(|e| words(&e))?;
+        let mark = |p: &(f64, f64, bool)| {
+            Circle::new((p.0, p.1), 4, if p.2 { colour.filled() } else { colour.stroke_width(2) })
+        };
+        let fitted = s.points.iter().any(|p| p.2);
+        chart
+            .draw_series(s.points.iter().map(mark))
+            .map_err(|e| words(&e))?
+            .label(format!(
+                "R {} mm{}",
+                trimmed_mm(s.radius_m),
+                if fitted { ", fitted" } else { ", predicted" }
+            ))
+            .legend(move |(x, y)| {
+                Circle::new((x + 8, y), 4, if fitted { colour.filled() } else { colour.stroke_width(2) })
+            });
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::LowerLeft)
+        .margin(12)
+        .label_font((FONT, 13))
+        .background_style(WHITE.mix(0.85))
+        .border_style(BLACK.mix(0.3))
+        .draw()
+        .map_err(|e| words(&e))?;
+    root.present().map_err(|e| words(&e))
+}
+
+/// A radius in mm, without digits that rounding made.
+pub(crate) fn trimmed_mm(radius_m: f64) -> f64 {
+    (radius_m * 1e9).round() / 1e6
+}

@@ -1,0 +1,67 @@
+//! Critical values of the F and t distributions.
+use super::FitError;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
+
+/// F_{α; numerator, denominator}: exceeded by chance with probability `alpha`.
+///
+/// # Errors
+/// [`FitError::Quantile`] for `alpha` outside (0, 1) or no degrees of freedom.
+pub fn critical_f(alpha: f64, numerator: usize, denominator: usize) -> Result<f64, FitError> {
+    let error = FitError::Quantile { alpha, dof: (numerator, denominator) };
+    if !(alpha > 0.0 && alpha < 1.0) || numerator == 0 || denominator == 0 {
+        return Err(error);
+    }
+    if numerator == 1 {
+        // F with one degree of freedom is the square of t, whose quantile is good to more digits.
+        let t = critical_t(alpha, denominator)?;
+        return Ok(t * t);
+    }
+    let f = FisherSnedecor::new(numerator as f64, denominator as f64).map_err(|_| error)?;
+    Ok(f.inverse_cdf(1.0 - alpha))
+}
+
+/// Two-sided t_{α/2; dof}: |t| exceeds it by chance with probability `alpha`.
+///
+/// # Errors
+/// As [`critical_f`].
+pub fn critical_t(alpha: f64, dof: usize) -> Result<f64, FitError> {
+    let error = FitError::Quantile { alpha, dof: (1, dof) };
+    if !(alpha > 0.0 && alpha < 1.0) || dof == 0 {
+        return Err(error);
+    }
+    let t = StudentsT::new(0.0, 1.0, dof as f64).map_err(|_| error)?;
+    Ok(t.inverse_cdf(1.0 - 0.5 * alpha))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn critical_values_are_those_of_the_tables() {
+        // Printed tables of F and t, and the paper's own 4.26.
+        for (alpha, n, d, want) in [
+            (0.05, 1, 24, 4.259677),
+            (0.05, 2, 24, 3.402826),
+            (0.10, 1, 9, 3.360303),
+            (0.05, 1, 9, 5.117355),
+            (0.01, 3, 10, 6.552313),
+        ] {
+            let got = critical_f(alpha, n, d).unwrap();
+            assert!((got / want - 1.0).abs() < 1e-6, "F({alpha}; {n}, {d}) = {got}");
+        }
+        for (alpha, d, want) in
+            [(0.05, 1, 12.7062047362), (0.05, 24, 2.0638985616), (0.05, 9997, 1.960201311)]
+        {
+            let got = critical_t(alpha, d).unwrap();
+            assert!((got / want - 1.0).abs() < 1e-8, "t({alpha}; {d}) = {got}");
+        }
+    }
+
+    #[test]
+    fn nonsense_is_an_error_not_a_panic() {
+        for (alpha, n, d) in [(0.0, 1, 5), (1.0, 1, 5), (f64::NAN, 1, 5), (0.05, 0, 5), (0.05, 1, 0)] {
+            assert!(critical_f(alpha, n, d).is_err());
+        }
+    }
+}
