@@ -77,7 +77,7 @@ fn main() -> ExitCode {
             let row = ask(job, &args, variety)
                 .map_err(|e| format!("{} at {}×, seed {}: {e}", job.kind, job.strength, job.seed));
             let n = done.fetch_add(1, Ordering::Relaxed) + 1;
-            if n % 50 == 0 {
+            if n.is_multiple_of(50) {
                 eprintln!("{n} of {}", jobs.len());
             }
             row

@@ -88,8 +88,10 @@ pub fn scaled(effect: &Effect, base: &Machine, plan: &Plan, wanted_m: f64) -> (M
     };
     let mut size = effect.first;
     let mut best = (build(size), f64::MAX);
-    let mut before: Option<(f64, f64)> = None;
-    for _ in 0..16 {
+    // The misfit grows with the size: keep a bracket, guess by the slope in logarithms.
+    let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+    let mut before: Option<[f64; 2]> = None;
+    for _ in 0..24 {
         let machine = build(size);
         let reached = misfit_m(&machine, plan, false);
         let off = |m: f64| (m / wanted_m).ln().abs();
@@ -99,18 +101,48 @@ pub fn scaled(effect: &Effect, base: &Machine, plan: &Plan, wanted_m: f64) -> (M
         if off(reached) < CLOSE {
             break;
         }
-        if reached < 1e-3 * wanted_m {
-            // Not felt yet (a clamp above every run): grow until it is.
-            size *= 1.5;
-            continue;
+        let at = size.ln();
+        if reached < wanted_m {
+            low = low.max(at);
+        } else {
+            high = high.min(at);
         }
-        let point = (size.ln(), reached.ln());
+        let felt = reached > 1e-3 * wanted_m;
         let slope = before
-            .map(|b: (f64, f64)| (point.1 - b.1) / (point.0 - b.0))
+            .filter(|_| felt)
+            .map(|b| (reached.ln() - b[1]) / (at - b[0]))
             .filter(|s| s.is_finite() && *s > 0.2)
-            .map_or(1.0, |s| s.min(8.0));
-        before = Some(point);
-        size = (point.0 + ((wanted_m.ln() - point.1) / slope).clamp(-2.0, 2.0)).exp();
+            .map_or(1.0, |s| s.min(20.0));
+        // A clamp above every run is not felt at all: a small step then, so as not to jump over the onset.
+        let step = if felt { ((wanted_m.ln() - reached.ln()) / slope).clamp(-2.0, 2.0) } else { 0.2 };
+        before = felt.then_some([at, reached.ln()]);
+        let mut next = at + step;
+        if low.is_finite() && high.is_finite() && (next <= low || next >= high) {
+            next = 0.5 * (low + high);
+        }
+        size = next.exp();
     }
     best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::{LISTED, UNLISTED, listed, unlisted};
+    use crate::machine::base::{Lab, Variety};
+
+    /// The third of the tests that sizes are searched on speaks for all of them.
+    #[test]
+    fn effects_reach_their_misfit_on_the_whole_plan() {
+        for (seed, name) in (1_u64..).zip(LISTED.iter().chain(&UNLISTED)) {
+            let lab = Lab::drawn(seed, Variety::Usual);
+            let plan = lab.grid.plan(seed);
+            let effect = listed(name, seed).or_else(|| unlisted(name, seed)).unwrap();
+            let (machine, reached_m) = scaled(&effect, &lab.machine, &plan, 3e-6);
+            assert!((reached_m / 3e-6 - 1.0).abs() < 0.05, "{name}: {reached_m}");
+            let whole = misfit_m(&machine, &plan, true);
+            assert!((whole / 3e-6 - 1.0).abs() < 0.25, "{name}: {whole} over all tests");
+            assert!(misfit_m(&lab.machine, &plan, true) < 2e-8, "{name}: the bare machine is one lag");
+        }
+    }
 }

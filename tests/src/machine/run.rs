@@ -148,7 +148,7 @@ pub fn simulate(machine: &Machine, test: &Test, campaign_s: f64, vibration_rad: 
         let mut p = [0, 1].map(|i| chains[i].step(gain[i] * wanted[i], step_s));
         let sense = [0, 1].map(|i| senses[i].step(p[i] - last[i]));
         last = p;
-        if k < 0 || k as usize % per_sample != 0 {
+        if k < 0 || !(k as usize).is_multiple_of(per_sample) {
             continue;
         }
         p = machine.geometry.place(p);

@@ -108,3 +108,76 @@ pub fn perfect_rms_um(case: &Case) -> f64 {
     }
     1e6 * (sum / count).sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::Kind;
+    use crate::machine::base::Variety;
+    use crate::study::Finding;
+
+    fn finding(cause: &str, axis: Option<&str>, ci95: [f64; 2]) -> Finding {
+        Finding {
+            cause: cause.into(),
+            axis: axis.map(str::to_owned),
+            probability: 0.9,
+            value: 0.5 * (ci95[0] + ci95[1]),
+            ci95,
+            unit: String::new(),
+            indistinguishable_from: Vec::new(),
+        }
+    }
+
+    fn case(names: &[&str]) -> Case {
+        Case::new(&Kind::Effects(names.iter().map(|s| (*s).to_owned()).collect()), 3.0, 5, Variety::Usual)
+            .unwrap()
+    }
+
+    fn answer(findings: Vec<Finding>, unexplained: bool) -> Outcome {
+        Outcome { findings, unexplained, baseline_um: 3.0, extended_um: 1.5 }
+    }
+
+    #[test]
+    fn right_wrong_and_beside() {
+        let case = case(&["reversal_spike"]);
+        let t = case.truth[0].clone();
+        let axis = t.axis.map(|a| ["x", "y"][a]);
+        let around = [0.9 * t.value, 1.1 * t.value];
+        let v = judge(&case, &answer(vec![finding("reversal_spike", axis, around)], false));
+        assert!(v.top_right && v.exact && v.covered[0].1);
+        let both =
+            vec![finding("reversal_spike", axis, around), finding("higher_order_dynamics", None, [0.0, 1.0])];
+        let v = judge(&case, &answer(both.clone(), false));
+        assert!(v.top_right && v.exact, "what is physically there may be named beside");
+        let turned = both.into_iter().rev().collect();
+        assert!(!judge(&case, &answer(turned, false)).top_right, "but not first");
+        let v = judge(&case, &answer(vec![finding("backlash", Some("x"), [0.0, 1.0])], false));
+        assert!(!v.top_right && !v.exact && v.false_findings == ["backlash"] && v.stated == [(0.9, false)]);
+        let v = judge(&case, &answer(vec![finding("reversal_spike", axis, [0.0, 0.1 * t.value])], false));
+        assert!(v.exact && !v.covered[0].1);
+    }
+
+    #[test]
+    fn sets_nulls_and_the_unlisted() {
+        let pair = case(&["squareness", "thermal_drift"]);
+        let [a, b] = ["squareness", "thermal_drift"].map(|c| finding(c, None, [0.0, 1.0]));
+        assert!(judge(&pair, &answer(vec![a.clone(), b], false)).exact);
+        assert!(!judge(&pair, &answer(vec![a.clone()], false)).exact);
+        let unlisted = case(&["unknown_bump"]);
+        assert!(judge(&unlisted, &answer(Vec::new(), true)).exact);
+        assert!(!judge(&unlisted, &answer(Vec::new(), false)).exact);
+        assert!(!judge(&unlisted, &answer(vec![a], true)).exact);
+    }
+
+    #[test]
+    fn the_perfect_model_leaves_noise_and_spread() {
+        let case = case(&["vibration"]);
+        let expected = (case.instrument.noise_m.powi(2)
+            + case.instrument.spread.radius_m.powi(2)
+            + case.instrument.spread.oval_m.powi(2))
+        .sqrt()
+            * 1e6;
+        let got = perfect_rms_um(&case);
+        assert!((got / expected - 1.0).abs() < 0.1, "{got} {expected}");
+    }
+}
