@@ -10,5 +10,6 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod engine;
 pub mod server;
 pub mod store;

@@ -6,6 +6,7 @@
 //! | [`model`] | the radius model ΔR = β1 f²/R + β2 f⁴/R³ (Eq. 15 of the source paper), cumulants, inverse |
 //! | [`term`] | the profile terms that diagnosis fits, the table carries and the engine evaluates |
 //! | [`path`] | time laws with limited jerk, circles, arcs, lines; derivatives in closed form |
+//! | [`angle`], [`fixed`] | integer phases, sine and cosine, fixed-point products of the tick |
 //! | [`law`] | the compensating operator p − (κ2/2) p″ + (κ2²/8 − κ4/24) p⁗ |
 //! | [`table`] | the correction table: layout, bounds, CRC |
 //! | [`wire`] | messages and frames between host and controller |
@@ -18,8 +19,10 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+pub mod angle;
 pub mod circle;
 pub mod direction;
+pub mod fixed;
 pub mod law;
 pub mod model;
 pub mod path;

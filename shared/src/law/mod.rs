@@ -1,1 +1,8 @@
-//! (being built)
+//! The compensator is one operator: p_cmd = p − (κ2/2) p″ + (κ2²/8 − κ4/24) p⁗.
+//!
+//! It undoes, to fourth order, a linear chain whose impulse response has the cumulants κ2 and κ4. On a circle it is
+//! the radius correction R/(1 + β1 ω² + β2 ω⁴) to that order, on curves the curvature correction, in entry and exit
+//! the ramp.
+mod operator;
+
+pub use operator::{AngularMotion, Gain, Operator};

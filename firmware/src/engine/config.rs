@@ -1,0 +1,89 @@
+//! What the engine is told about the machine, and the bounds that no table can widen.
+use giotto_shared::path::MotionLimits;
+
+/// Slowest and fastest tick the engine is built for, Hz.
+pub const RATE_HZ: [u32; 2] = [250, 20_000];
+/// Shortest feed ramp, ticks: below it the phase of a ramp is no longer exact (see `ramp`).
+pub const MIN_RAMP_TICKS: u32 = 32;
+/// Longest feed ramp or blend, ticks.
+pub const MAX_RAMP_TICKS: u32 = 1 << 24;
+/// Largest circle, m: positions are i32 nanometres, ±2.147 m.
+pub const MAX_RADIUS_M: f64 = 2.0;
+/// Largest coordinate, m.
+pub const MAX_POSITION_M: f64 = 2.1;
+
+/// Limits of the machine and of the correction. SI.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Config {
+    /// Ticks per second.
+    pub rate_hz: u32,
+    /// Feed, acceleration and jerk along the path.
+    pub motion: MotionLimits,
+    /// Feed of positioning moves, m/s.
+    pub positioning_m_s: f64,
+    /// Largest offset of the correction on one axis, whatever the table says, m.
+    pub offset_m: f64,
+    /// Largest rate of change of that offset, whatever the table says, m/s.
+    pub slew_m_s: f64,
+    /// Time over which a correction is engaged or disengaged, s.
+    pub engage_s: f64,
+}
+
+impl Config {
+    /// A robot's worth of limits: 1 m/s, 5 m/s², 100 m/s³; offsets to 20 mm at 0.2 m/s.
+    pub const fn robot(rate_hz: u32) -> Self {
+        Self {
+            rate_hz,
+            motion: MotionLimits { feed_m_s: 1.0, acceleration_m_s2: 5.0, jerk_m_s3: 100.0 },
+            positioning_m_s: 0.5,
+            offset_m: 0.02,
+            slew_m_s: 0.2,
+            engage_s: 0.25,
+        }
+    }
+
+    /// The configuration itself if every number is usable; the name of the first that is not otherwise.
+    pub fn checked(self) -> Result<Self, ConfigError> {
+        if !(RATE_HZ[0]..=RATE_HZ[1]).contains(&self.rate_hz) {
+            return Err(ConfigError("rate_hz"));
+        }
+        let upper_bounds = [
+            (self.motion.feed_m_s, 10.0, "motion.feed_m_s"),
+            (self.motion.acceleration_m_s2, 1e3, "motion.acceleration_m_s2"),
+            (self.motion.jerk_m_s3, 1e6, "motion.jerk_m_s3"),
+            (self.positioning_m_s, self.motion.feed_m_s, "positioning_m_s"),
+            (self.offset_m, 0.05, "offset_m"),
+            (self.slew_m_s, 1.0, "slew_m_s"),
+            (self.engage_s, 10.0, "engage_s"),
+        ];
+        for (value, most, name) in upper_bounds {
+            // NaN fails the comparison too.
+            if !(value > 0.0 && value <= most) {
+                return Err(ConfigError(name));
+            }
+        }
+        Ok(self)
+    }
+
+    /// Seconds per tick.
+    pub fn tick_s(&self) -> f64 {
+        1.0 / f64::from(self.rate_hz)
+    }
+
+    /// Ticks of an engage or disengage blend.
+    pub fn engage_ticks(&self) -> u32 {
+        ticks(self.engage_s * f64::from(self.rate_hz))
+    }
+}
+
+/// A whole number of ticks, at least the shortest ramp.
+pub(crate) fn ticks(exact: f64) -> u32 {
+    (libm::ceil(exact) as u32).clamp(MIN_RAMP_TICKS, MAX_RAMP_TICKS)
+}
+
+/// A value of [`Config`] that is not finite, not positive or beyond what the engine is built for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ConfigError(
+    /// Name of the value.
+    pub &'static str,
+);

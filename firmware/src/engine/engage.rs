@@ -1,0 +1,69 @@
+//! How much of the correction is engaged: all, none, or on the way without a step.
+use super::ramp::{Clock, clock_step, shapes};
+
+/// Share of the correction that goes out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Engage {
+    /// Q31; `i32::MAX` is all of it, exactly.
+    share_q31: i32,
+    /// What was asked for last.
+    wanted: bool,
+    /// Where the blend in hand leads, or where it led.
+    heading: bool,
+    left: u32,
+    ticks: u32,
+    clock: Clock,
+}
+
+impl Engage {
+    /// Settled on or off.
+    pub(crate) fn new(ticks: u32, on: bool) -> Self {
+        let share_q31 = if on { i32::MAX } else { 0 };
+        Self { share_q31, wanted: on, heading: on, left: 0, ticks, clock: Clock::default() }
+    }
+
+    /// Whether it is, or is to be, on.
+    pub(crate) const fn is_on(&self) -> bool {
+        self.wanted
+    }
+
+    /// Asks for on or off. A blend under way is finished first: turning it round would be a step in velocity.
+    pub(crate) fn set(&mut self, on: bool) {
+        self.wanted = on;
+        if self.left == 0 {
+            self.begin();
+        }
+    }
+
+    fn begin(&mut self) {
+        if self.heading != self.wanted {
+            self.heading = self.wanted;
+            let step = clock_step(self.ticks);
+            self.clock = if self.heading { Clock::rising(step) } else { Clock::falling(step) };
+            self.left = self.ticks;
+        }
+    }
+
+    /// The share of the offset that goes out this tick.
+    #[inline(always)]
+    pub(crate) fn apply(&mut self, offset: [i32; 3]) -> [i32; 3] {
+        if self.share_q31 == i32::MAX && self.left == 0 { offset } else { self.blend(offset) }
+    }
+
+    #[inline(never)]
+    fn blend(&mut self, offset: [i32; 3]) -> [i32; 3] {
+        if self.left > 0 {
+            self.left = self.left.wrapping_sub(1);
+            self.share_q31 = match (self.left, self.heading) {
+                (0, true) => i32::MAX,
+                (0, false) => 0,
+                _ => (shapes(self.clock.advance()).s_q32 >> 1) as i32,
+            };
+            if self.left == 0 {
+                self.begin();
+            }
+        }
+        let share = i64::from(self.share_q31);
+        offset.map(|o| (i64::from(o).wrapping_mul(share) >> 31) as i32)
+    }
+}

@@ -1,0 +1,196 @@
+//! The motion engine: programs in, set-points out, one a tick.
+//!
+//! | part | runs | does |
+//! |---|---|---|
+//! | [`Planner`] | background | turns a program and the table into integers, in `f64` |
+//! | [`Executor`] | timer interrupt | one set-point a tick from those integers |
+//! | [`Engine`] | both in one thread | the two with a queue between, for the host and for simple boards |
+//!
+//! Positions are `i32` nanometres in machine coordinates (±2.147 m), so that bypass equals the input bit for bit and
+//! nothing is lost at 1 m. Phases are integers: no drift however long a run.
+mod config;
+mod engage;
+mod executor;
+mod guard;
+mod planned;
+mod planner;
+mod ramp;
+
+pub use config::{Config, ConfigError, MAX_POSITION_M, MAX_RADIUS_M, MIN_RAMP_TICKS, RATE_HZ};
+pub use executor::{Executor, Inbox};
+pub use giotto_shared::path::{CircleRun, MotionLimits, Segment};
+pub use planned::Planned;
+pub use planner::{Planner, Refused};
+
+use giotto_shared::table::Table;
+
+/// Segments that wait in the queue of an [`Engine`], at most.
+pub const QUEUE: usize = 7;
+
+/// Bits of [`Output::flags`].
+pub mod flag {
+    /// The programmed position moves.
+    pub const MOVING: u16 = 1;
+    /// At constant feed.
+    pub const CRUISE: u16 = 2;
+    /// Standing while the offset moves to what the next segment starts with.
+    pub const SETTLING: u16 = 4;
+    /// Offset or its change was cut to its bound in this tick.
+    pub const CUT: u16 = 8;
+}
+
+/// One set-point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct Output {
+    /// As programmed, nm.
+    pub nominal_nm: [i32; 3],
+    /// As commanded to the drives, nm.
+    pub corrected_nm: [i32; 3],
+    /// Bits of [`flag`].
+    pub flags: u16,
+}
+
+/// Why nothing runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// A tick came late or was lost.
+    Overrun,
+    /// A segment did not start where the machine stands.
+    Discontinuity,
+}
+
+/// Counts since start; they wrap.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct Counters {
+    /// Ticks.
+    pub ticks: u32,
+    /// Segments finished.
+    pub segments: u32,
+    /// Segments begun for which no zone of the table holds.
+    pub uncorrected: u32,
+    /// Segments thrown away after a stop or in a fault.
+    pub dropped: u32,
+    /// Stops.
+    pub stops: u32,
+    /// Ticks in which the offset was cut.
+    pub offset_cuts: u32,
+    /// Ticks in which the change of the offset was cut.
+    pub slew_cuts: u32,
+    /// Overruns reported by the board.
+    pub overruns: u32,
+}
+
+/// Planner, queue and executor in one.
+pub struct Engine {
+    planner: Planner,
+    queue: heapless::spsc::Queue<Planned, { QUEUE + 1 }>,
+    executor: Executor,
+}
+
+impl Engine {
+    /// Standing at the machine's origin, without a table, correction engaged.
+    pub fn new(config: Config) -> Result<Self, ConfigError> {
+        let config = config.checked()?;
+        Ok(Self {
+            planner: Planner::new(&config, [0; 3]),
+            queue: heapless::spsc::Queue::new(),
+            executor: Executor::new([0; 3], config.engage_ticks(), false),
+        })
+    }
+
+    /// The table for segments accepted from now on; `None`: no correction. Acts between segments.
+    pub fn load(&mut self, table: Option<&Table>) {
+        self.planner.set_table(table);
+    }
+
+    /// Engages or disengages the correction, at any time, without a step.
+    pub fn set_bypass(&mut self, bypass: bool) {
+        self.executor.set_bypass(bypass);
+    }
+
+    /// Whether the correction is disengaged or on its way to be.
+    pub fn bypass(&self) -> bool {
+        self.executor.bypass()
+    }
+
+    /// Declares the position while idle.
+    pub fn set_position(&mut self, position_nm: [i32; 3]) -> Result<(), Refused> {
+        if !self.idle() || !self.executor.set_position(position_nm) {
+            return Err(Refused::Busy);
+        }
+        Ok(())
+    }
+
+    /// Moves to where the circle starts, then runs it.
+    pub fn run_circle(&mut self, run: &CircleRun) -> Result<(), Refused> {
+        self.ready(2)?;
+        let before = self.planner.position_nm();
+        let (approach, circle) = self.planner.circle(run).inspect_err(|_| self.planner.rewind(before))?;
+        // Room for both was checked.
+        if let Some(approach) = approach {
+            let _ = self.queue.enqueue(approach);
+        }
+        let _ = self.queue.enqueue(circle);
+        Ok(())
+    }
+
+    /// Appends a segment; it runs with an exact stop at its ends.
+    pub fn push(&mut self, segment: &Segment) -> Result<(), Refused> {
+        self.ready(1)?;
+        let planned = self.planner.segment(segment)?;
+        let _ = self.queue.enqueue(planned);
+        Ok(())
+    }
+
+    fn ready(&mut self, room: usize) -> Result<(), Refused> {
+        if self.executor.fault().is_some() {
+            return Err(Refused::Fault);
+        }
+        if self.executor.stopping() || self.queue.capacity() - self.queue.len() < room {
+            return Err(Refused::Busy);
+        }
+        if self.idle() {
+            self.planner.resync(self.executor.nominal_nm(), self.executor.epoch());
+        }
+        Ok(())
+    }
+
+    /// Stops within the limits from the next tick on; what is queued is thrown away.
+    pub fn stop(&mut self) {
+        self.executor.stop();
+    }
+
+    /// One tick.
+    #[inline]
+    pub fn tick(&mut self) -> Output {
+        self.executor.tick(&mut self.queue)
+    }
+
+    /// Nothing in hand and nothing queued.
+    pub fn idle(&self) -> bool {
+        self.executor.idle() && self.queue.is_empty()
+    }
+
+    /// The board saw that a tick came late or was lost.
+    pub fn overrun(&mut self) {
+        self.executor.overrun();
+    }
+
+    /// Why nothing runs, if so.
+    pub fn fault(&self) -> Option<Fault> {
+        self.executor.fault()
+    }
+
+    /// Accepts segments again after a fault; `false` while still moving.
+    pub fn clear_fault(&mut self) -> bool {
+        self.executor.clear_fault()
+    }
+
+    /// Counts since start.
+    pub fn counters(&self) -> &Counters {
+        self.executor.counters()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,458 @@
+//! From what a program asks for to integers that the tick runs. Runs in the background, in `f64`.
+use super::config::{Config, MAX_POSITION_M, MAX_RADIUS_M, MAX_RAMP_TICKS, ticks};
+use super::planned::{Curve, Kind, Law, Planned, Steady, Timing, base};
+use super::ramp::{FIRST, SECOND, THIRD, clock_step};
+use core::f64::consts::TAU;
+use giotto_shared::angle::phase_from_rad;
+use giotto_shared::fixed::to_fixed;
+use giotto_shared::law::{AngularMotion, Operator};
+use giotto_shared::model::Cumulants;
+use giotto_shared::path::{CircleRun, FeedRamp, Segment};
+use giotto_shared::table::{Table, Travel, Zone};
+
+/// Why a segment was not accepted. Nothing has moved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refused {
+    /// A number is not finite, or not positive where it must be.
+    NotANumber(&'static str),
+    /// Beyond what the configuration or the image allows.
+    OutOfBounds(&'static str),
+    /// The queue is full, or the engine is not at rest where it has to be.
+    Busy,
+    /// A fault has to be cleared first.
+    Fault,
+}
+
+/// Most share of the radius by which the fixed-point law can move a circle.
+const MAX_GAIN: f64 = 0.12;
+
+/// The engine's slow half: plans segments one after the other.
+#[derive(Clone, Debug)]
+pub struct Planner {
+    config: Config,
+    table: Option<Table>,
+    position_nm: [i32; 3],
+    epoch: u8,
+}
+
+/// One circle or arc in its plane, SI.
+struct Round {
+    centre: [f64; 3],
+    u: [f64; 3],
+    v: [f64; 3],
+    radius: f64,
+    rise_per_turn: [f64; 3],
+    feed: f64,
+    /// Sense seen from +Z.
+    ccw: bool,
+}
+
+impl Planner {
+    /// Plans from a position on.
+    pub fn new(config: &Config, position_nm: [i32; 3]) -> Self {
+        Self { config: *config, table: None, position_nm, epoch: 0 }
+    }
+
+    /// The table used for segments planned from now on; `None`: no correction.
+    pub fn set_table(&mut self, table: Option<&Table>) {
+        self.table = table.cloned();
+    }
+
+    /// After a stop or a declared position: plans on from where the executor stands.
+    pub fn resync(&mut self, position_nm: [i32; 3], epoch: u8) {
+        (self.position_nm, self.epoch) = (position_nm, epoch);
+    }
+
+    /// Where the last planned segment ends, nm.
+    pub const fn position_nm(&self) -> [i32; 3] {
+        self.position_nm
+    }
+
+    /// Forgets the last planned segments: plans on from an earlier end.
+    pub(crate) fn rewind(&mut self, position_nm: [i32; 3]) {
+        self.position_nm = position_nm;
+    }
+
+    /// The positioning move to where a circle starts (`None` if already there), and the circle.
+    pub fn circle(&mut self, run: &CircleRun) -> Result<(Option<Planned>, Planned), Refused> {
+        finite(&run.centre_m, "centre")?;
+        positive(run.radius_m, "radius")?;
+        positive(run.feed_m_s, "feed")?;
+        finite(&[run.start_rad], "start angle")?;
+        if run.radius_m > MAX_RADIUS_M {
+            return Err(Refused::OutOfBounds("radius"));
+        }
+        if run.laps == 0 || run.laps > 1_000_000 {
+            return Err(Refused::OutOfBounds("laps"));
+        }
+        let sign = f64::from(run.direction.sign());
+        let round = Round {
+            centre: run.centre_m,
+            u: [1.0, 0.0, 0.0],
+            v: [0.0, sign, 0.0],
+            radius: run.radius_m,
+            rise_per_turn: [0.0; 3],
+            feed: run.feed_m_s,
+            ccw: run.direction == giotto_shared::Direction::Ccw,
+        };
+        self.check_feed(round.feed)?;
+        let here = self.position_nm;
+        // Constant rate over whole turns: the ramps come before and after.
+        let turns = u128::from(run.laps) << 64;
+        let wanted = libm::ceil(f64::from(run.laps) * TAU * round.radius / round.feed / self.config.tick_s());
+        let Some(cruise_ticks) = in_u32(wanted) else { return Err(Refused::OutOfBounds("duration")) };
+        let step = ((turns / u128::from(cruise_ticks)) as u64) & !1;
+        let ramp = self.ramp_ticks(round.feed);
+        let segment = self.round(&round, ramp, |ramp_ticks| {
+            let entry = (step >> 1).wrapping_mul(u64::from(ramp_ticks));
+            let up = u64::from(phase_from_rad(sign * run.start_rad)) << 32;
+            let down = up.wrapping_add(step.wrapping_mul(u64::from(cruise_ticks)));
+            let (start, end) = (up.wrapping_sub(entry), down.wrapping_add(entry));
+            Timing { start, up, end, step, ramp_ticks, cruise_ticks, ..Timing::default() }
+        })?;
+        let start = segment.start_nm;
+        let approach =
+            if start == here { None } else { Some(self.line_to(start, self.config.positioning_m_s)?) };
+        self.position_nm = segment.end_nm;
+        Ok((approach, segment))
+    }
+
+    /// One segment from where the last one ends.
+    pub fn segment(&mut self, segment: &Segment) -> Result<Planned, Refused> {
+        match *segment {
+            Segment::Line { to_m, feed_m_s } => {
+                let to = to_nm(&to_m, "end")?;
+                self.line_to(to, feed_m_s)
+            }
+            Segment::Arc { centre_m, normal, sweep_rad, rise_m, feed_m_s } => {
+                self.arc(centre_m, normal, sweep_rad, rise_m, feed_m_s)
+            }
+            Segment::Dwell { time_s } => self.dwell(time_s),
+        }
+    }
+
+    fn arc(
+        &mut self,
+        centre: [f64; 3],
+        normal: [f64; 3],
+        sweep: f64,
+        rise: f64,
+        feed: f64,
+    ) -> Result<Planned, Refused> {
+        finite(&centre, "centre")?;
+        finite(&normal, "normal")?;
+        finite(&[sweep, rise], "sweep and rise")?;
+        positive(feed, "feed")?;
+        self.check_feed(feed)?;
+        let n = unit(normal).ok_or(Refused::NotANumber("normal"))?;
+        let from = self.position_nm.map(|p| f64::from(p) * 1e-9);
+        let arm = sub(from, centre);
+        // The centre may be given anywhere on the axis: its foot is the centre.
+        let height = dot(arm, n);
+        let centre = [centre[0] + height * n[0], centre[1] + height * n[1], centre[2] + height * n[2]];
+        let arm = sub(from, centre);
+        let radius = libm::sqrt(dot(arm, arm));
+        let u = unit(arm).ok_or(Refused::OutOfBounds("radius"))?;
+        if !(1e-6..=MAX_RADIUS_M).contains(&radius) {
+            return Err(Refused::OutOfBounds("radius"));
+        }
+        let sign = if sweep < 0.0 { -1.0 } else { 1.0 };
+        let sweep = libm::fabs(sweep);
+        if !(1e-9..=1e6 * TAU).contains(&sweep) {
+            return Err(Refused::OutOfBounds("sweep"));
+        }
+        let v = cross(n, u).map(|a| a * sign);
+        let rise_per_turn = n.map(|a| a * rise * TAU / sweep);
+        let round = Round { centre, u, v, radius, rise_per_turn, feed, ccw: n[2] * sign >= 0.0 };
+        let (ramp_ticks, cruise_ticks) = self.profile(sweep * radius, feed)?;
+        let whole = (sweep / TAU * 18_446_744_073_709_551_616.0) as u128;
+        let mut segment =
+            self.round(&round, ramp_ticks, |ramp_ticks| share_out(whole, ramp_ticks, cruise_ticks))?;
+        // Rounding of centre and radius must not show as a gap at the start: move the arc by that nm or two.
+        for (((b, e), s), p) in segment
+            .curve
+            .base
+            .iter_mut()
+            .zip(&mut segment.end_nm)
+            .zip(&mut segment.start_nm)
+            .zip(self.position_nm)
+        {
+            let gap = p - *s;
+            *b += i64::from(gap) << 31;
+            *e += gap;
+            *s = p;
+        }
+        self.position_nm = segment.end_nm;
+        Ok(segment)
+    }
+
+    fn dwell(&mut self, time_s: f64) -> Result<Planned, Refused> {
+        positive(time_s, "time")?;
+        let Some(cruise_ticks) = in_u32(libm::ceil(time_s * f64::from(self.config.rate_hz))) else {
+            return Err(Refused::OutOfBounds("time"));
+        };
+        let timing = Timing { cruise_ticks: cruise_ticks.max(1), ..Timing::default() };
+        let mut segment = self.blank();
+        (segment.timing, segment.corrected) = (timing, true);
+        Ok(segment)
+    }
+
+    fn line_to(&mut self, to: [i32; 3], feed: f64) -> Result<Planned, Refused> {
+        positive(feed, "feed")?;
+        self.check_feed(feed)?;
+        let from = self.position_nm;
+        let metres = |nm: [i32; 3]| nm.map(|p| f64::from(p) * 1e-9);
+        let span = sub(metres(to), metres(from));
+        let length = libm::sqrt(dot(span, span));
+        let Some(direction) = unit(span) else { return self.dwell(self.config.tick_s()) };
+        let mut u_nm = [0; 3];
+        for ((u, t), f) in u_nm.iter_mut().zip(to).zip(from) {
+            *u = t.checked_sub(f).ok_or(Refused::OutOfBounds("length"))?;
+        }
+        let (ramp_ticks, cruise_ticks) = self.profile(length, feed)?;
+        let mut timing = share_out((1u128 << 64) - 1, ramp_ticks, cruise_ticks);
+        self.finish_timing(&mut timing);
+        let v_nm = direction.map(|d| to_fixed(d, 31));
+        let zone = self.zone(None, feed, None);
+        let mut segment = self.blank();
+        segment.curve = Curve { kind: Kind::Line, base: from.map(base), u_nm, v_nm, rise_nm: [0; 3] };
+        segment.timing = timing;
+        if let Some((operator, limits)) = zone {
+            let t = f64::from(ramp_ticks) * self.config.tick_s();
+            let speed = timing.step as f64 / TURN * length / self.config.tick_s();
+            let nm = 1e9;
+            segment.law.k5 = to_fixed(operator.second_s2 * speed * FIRST / t * nm, 3);
+            segment.law.k7 = to_fixed(operator.fourth_s4 * speed * THIRD / (t * t * t) * nm, 4);
+            segment.corrected = true;
+            (segment.offset_nm, segment.slew_nm) = limits;
+        }
+        segment.end_nm = to;
+        self.position_nm = to;
+        Ok(segment)
+    }
+
+    /// Everything that a circle and an arc have in common. Lengthens the ramp until the law fits its number range.
+    fn round(
+        &self,
+        round: &Round,
+        ramp_ticks: u32,
+        timing: impl Fn(u32) -> Timing,
+    ) -> Result<Planned, Refused> {
+        let reach = round.radius + libm::sqrt(dot(round.centre, round.centre));
+        if reach > MAX_POSITION_M {
+            return Err(Refused::OutOfBounds("position"));
+        }
+        let scale = |a: [f64; 3], by: f64| a.map(|x| to_fixed(x * by, 0));
+        let centre_nm = to_nm(&round.centre, "centre")?;
+        let flat = round.rise_per_turn == [0.0; 3];
+        let curve = Curve {
+            kind: if flat { Kind::Arc } else { Kind::Helix },
+            base: centre_nm.map(base),
+            u_nm: scale(round.u, round.radius * 1e9),
+            v_nm: scale(round.v, round.radius * 1e9),
+            rise_nm: scale(round.rise_per_turn, 1e9),
+        };
+        let mut segment = self.blank();
+        segment.curve = curve;
+        let zone = self.zone(Some((round.centre, round.radius)), round.feed, Some(round.ccw));
+        let mut timing_now = timing(ramp_ticks);
+        if let Some((operator, limits)) = zone {
+            let mut ramp = ramp_ticks;
+            for _ in 0..6 {
+                timing_now = timing(ramp);
+                if let Some((law, steady)) = self.law_on_arc(&operator, &timing_now, &curve) {
+                    (segment.law, segment.steady, segment.corrected) = (law, steady, true);
+                    (segment.offset_nm, segment.slew_nm) = limits;
+                    break;
+                }
+                ramp = ramp.saturating_mul(2).min(MAX_RAMP_TICKS);
+            }
+        }
+        self.finish_timing(&mut timing_now);
+        segment.timing = timing_now;
+        let weights = |phase: u64| segment.curve.weights((phase >> 32) as u32);
+        let (c, s) = weights(timing_now.start);
+        segment.start_nm = curve.at(c, s);
+        let (c, s) = weights(timing_now.end);
+        segment.end_nm = curve.at(c, s);
+        if !flat {
+            let rise = round.rise_per_turn.map(|r| r * total_turns(&timing_now));
+            let risen = scale(rise, 1e9);
+            segment.end_nm = [0, 1, 2].map(|i| segment.end_nm[i] + risen[i]);
+        }
+        Ok(segment)
+    }
+
+    /// The operator's fixed-point form on a circle; `None` if a gain is beyond [`MAX_GAIN`].
+    fn law_on_arc(&self, operator: &Operator<f64>, timing: &Timing, curve: &Curve) -> Option<(Law, Steady)> {
+        let rate = timing.step as f64 / TURN * TAU / self.config.tick_s();
+        let t = f64::from(timing.ramp_ticks) * self.config.tick_s();
+        let steady = operator.gain(&AngularMotion { rate, ..Default::default() });
+        let ramp = FeedRamp { from_m_s: 0.0, to_m_s: rate, duration_s: t };
+        let worst = (1..32)
+            .map(|i| ramp.at(t * f64::from(i) / 32.0))
+            .map(|[_, rate, acceleration, jerk, snap]| {
+                let gain = operator.gain(&AngularMotion { rate, acceleration, jerk, snap });
+                libm::fabs(gain.radial).max(libm::fabs(gain.tangential))
+            })
+            .fold(libm::fabs(steady.radial), f64::max);
+        let (a, b) = (operator.second_s2, operator.fourth_s4);
+        let k = [
+            (-a * rate * rate, 34),
+            (b * rate * rate * rate * rate, 35),
+            (4.0 * b * rate * rate / (t * t) * SECOND, 32),
+            (-3.0 * b * (rate * FIRST / t) * (rate * FIRST / t), 32),
+            (a * rate * FIRST / t, 34),
+            (-6.0 * b * rate * rate * rate * FIRST / t, 35),
+            (b * rate * THIRD / (t * t * t), 31),
+        ];
+        let fits = k
+            .iter()
+            .all(|&(k, bits)| libm::fabs(k) < 0.98 * (1u64 << (31 + 32 - bits)) as f64 / (1u64 << 32) as f64);
+        if !(worst <= MAX_GAIN && fits) {
+            return None;
+        }
+        let [k1, k2, k3, k4, k5, k6, k7] = k.map(|(k, bits)| to_fixed(k, bits));
+        let scale = |v: [i32; 3]| v.map(|x| to_fixed(steady.radial * f64::from(x), 1));
+        let steady = Steady { a: scale(curve.u_nm), b: scale(curve.v_nm) };
+        Some((Law { k1, k2, k3, k4, k5, k6, k7 }, steady))
+    }
+
+    /// Ramp and constant-rate ticks for a length at no more than a feed.
+    fn profile(&self, length: f64, feed: f64) -> Result<(u32, u32), Refused> {
+        // Two ramps alone cover feed·(ramp time): a short length takes a lower feed.
+        let mut feed = feed;
+        for _ in 0..60 {
+            let t = f64::from(self.ramp_ticks(feed)) * self.config.tick_s();
+            if feed * t <= length {
+                break;
+            }
+            feed *= (length / (feed * t)).clamp(0.5, 0.98);
+        }
+        let ramp_ticks = self.ramp_ticks(feed);
+        let cruise = libm::ceil(length / feed / self.config.tick_s()) - f64::from(ramp_ticks);
+        let cruise = in_u32(cruise.max(0.0)).ok_or(Refused::OutOfBounds("duration"))?;
+        Ok((ramp_ticks, cruise))
+    }
+
+    fn ramp_ticks(&self, feed: f64) -> u32 {
+        ticks(FeedRamp::within(0.0, feed, &self.config.motion).duration_s * f64::from(self.config.rate_hz))
+    }
+
+    fn finish_timing(&self, timing: &mut Timing) {
+        timing.clock_step = clock_step(timing.ramp_ticks);
+        // ∫ exceeds the sum by T²/12 of the rate's derivative: Δstep/N·S′/12, in units of 2⁻³² turn.
+        let step_q32 = timing.step as f64 / 4_294_967_296.0;
+        timing.end_term_q2 = to_fixed(step_q32 / f64::from(timing.ramp_ticks) * FIRST / 12.0, 2);
+    }
+
+    fn blank(&self) -> Planned {
+        let settle_ticks = self.config.engage_ticks();
+        Planned {
+            settle_ticks,
+            settle_step: clock_step(settle_ticks),
+            offset_nm: to_fixed(self.config.offset_m * 1e9, 0),
+            slew_nm: to_fixed(self.config.slew_m_s * self.config.tick_s() * 1e9, 0),
+            start_nm: self.position_nm,
+            end_nm: self.position_nm,
+            epoch: self.epoch,
+            ..Planned::default()
+        }
+    }
+
+    fn check_feed(&self, feed: f64) -> Result<(), Refused> {
+        if feed > self.config.motion.feed_m_s { Err(Refused::OutOfBounds("feed")) } else { Ok(()) }
+    }
+
+    /// The first zone that fits, its operator and bounds (the tighter of table and image).
+    fn zone(
+        &self,
+        circle: Option<([f64; 3], f64)>,
+        feed: f64,
+        ccw: Option<bool>,
+    ) -> Option<(Operator<f64>, (i32, i32))> {
+        let table = self.table.as_ref()?;
+        let zone = table.zones.iter().find(|zone| fits(zone, circle, feed, ccw))?;
+        let cumulants = Cumulants {
+            kappa2_s2: f64::from(zone.cumulants.kappa2_s2),
+            kappa4_s4: f64::from(zone.cumulants.kappa4_s4),
+        };
+        let offset = f64::from(table.limits.offset_m).min(self.config.offset_m);
+        let slew = f64::from(table.limits.slew_m_s).min(self.config.slew_m_s) * self.config.tick_s();
+        Some((Operator::new(&cumulants), (to_fixed(offset * 1e9, 0), to_fixed(slew * 1e9, 0))))
+    }
+}
+
+const TURN: f64 = 18_446_744_073_709_551_616.0;
+
+fn fits(zone: &Zone, circle: Option<([f64; 3], f64)>, feed: f64, ccw: Option<bool>) -> bool {
+    // Programmed values are decimal, bounds are f32: a bound that was meant to be met is met.
+    let inside = |value: f64, [low, high]: [f32; 2]| {
+        let slack = 1e-6 * libm::fabs(value);
+        value >= f64::from(low) - slack && value <= f64::from(high) + slack
+    };
+    let travel = match (zone.travel, ccw) {
+        (Travel::Both, _) | (_, None) => true,
+        (Travel::Ccw, Some(ccw)) => ccw,
+        (Travel::Cw, Some(ccw)) => !ccw,
+    };
+    let place = match (circle, zone.place_m) {
+        (Some((centre, _)), Some([low, high])) => {
+            centre.iter().zip(low).zip(high).all(|((&c, low), high)| inside(c, [low, high]))
+        }
+        _ => true,
+    };
+    let radius = circle.is_none_or(|(_, radius)| inside(radius, zone.radius_m));
+    travel && place && radius && inside(feed, zone.feed_m_s)
+}
+
+/// Turns from start to end, whole ones included.
+fn total_turns(timing: &Timing) -> f64 {
+    let steps = f64::from(timing.ramp_ticks) + f64::from(timing.cruise_ticks);
+    timing.step as f64 / TURN * steps
+}
+
+/// Shares a whole length out over two ramps and a constant rate.
+fn share_out(whole: u128, ramp_ticks: u32, cruise_ticks: u32) -> Timing {
+    let steps = u128::from(ramp_ticks) + u128::from(cruise_ticks);
+    let step = ((whole / steps.max(1)) as u64) & !1;
+    let up = (step >> 1).wrapping_mul(u64::from(ramp_ticks));
+    Timing { start: 0, up, end: whole as u64, step, ramp_ticks, cruise_ticks, ..Timing::default() }
+}
+
+fn finite(values: &[f64], name: &'static str) -> Result<(), Refused> {
+    if values.iter().all(|v| v.is_finite()) { Ok(()) } else { Err(Refused::NotANumber(name)) }
+}
+
+fn positive(value: f64, name: &'static str) -> Result<(), Refused> {
+    if value.is_finite() && value > 0.0 { Ok(()) } else { Err(Refused::NotANumber(name)) }
+}
+
+fn to_nm(metres: &[f64; 3], name: &'static str) -> Result<[i32; 3], Refused> {
+    finite(metres, name)?;
+    if metres.iter().any(|m| libm::fabs(*m) > MAX_POSITION_M) {
+        return Err(Refused::OutOfBounds("position"));
+    }
+    Ok(metres.map(|m| to_fixed(m * 1e9, 0)))
+}
+
+fn in_u32(value: f64) -> Option<u32> {
+    (0.0..4e9).contains(&value).then_some(value as u32)
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn unit(a: [f64; 3]) -> Option<[f64; 3]> {
+    let length = libm::sqrt(dot(a, a));
+    (length > 1e-12).then(|| a.map(|x| x / length))
+}

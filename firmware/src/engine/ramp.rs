@@ -1,0 +1,139 @@
+//! The degree-9 feed ramp in fixed point, one evaluation a tick.
+//!
+//! With x = 2u − 1 and w = 1 − x² (so q = w/4, r = −x) the smoothstep and its derivatives are
+//! S = ½ + x·P(x²), S′ = (315/128) w⁴, S″ = −(315/8) x w³, S‴ = (945/2) w² (1 − 7w/6).
+//! Falling ramps are rising ones run backwards: S and S″ keep their sign, S′ and S‴ change it.
+use giotto_shared::fixed::{mulh, mulh_sub, to_fixed};
+
+/// S′ = `FIRST`·w⁴.
+pub(crate) const FIRST: f64 = 315.0 / 128.0;
+/// S″ = −`SECOND`·x·w³.
+pub(crate) const SECOND: f64 = 315.0 / 8.0;
+/// S‴ = `THIRD`·w²(1 − 7w/6).
+pub(crate) const THIRD: f64 = 945.0 / 2.0;
+
+/// P(y) = 315/256·(1 − 4y/3 + 6y²/5 − 4y³/7 + y⁴/9), from S′ integrated; each coefficient one bit finer than the
+/// one before it, as Horner's scheme with `mulh` wants it.
+const P: [i32; 5] = [
+    to_fixed(315.0 / 256.0, 28),
+    to_fixed(315.0 / 256.0 * 4.0 / 3.0, 29),
+    to_fixed(315.0 / 256.0 * 6.0 / 5.0, 30),
+    to_fixed(315.0 / 256.0 * 4.0 / 7.0, 31),
+    to_fixed(315.0 / 256.0 / 9.0, 32),
+];
+const SEVEN_SIXTHS_Q31: i32 = to_fixed(7.0 / 12.0, 31);
+
+/// The ramp at one tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub(crate) struct Shapes {
+    /// S, Q32. Error 2e-8.
+    pub(crate) s_q32: u32,
+    /// w⁴, Q30.
+    pub(crate) w4_q30: i32,
+    /// x·w³, Q29.
+    pub(crate) xw3_q29: i32,
+    /// w²(1 − 7w/6), Q29.
+    pub(crate) s3_q29: i32,
+}
+
+impl Shapes {
+    /// This ramp less one that began later: the superposition that a stop in a rising ramp makes.
+    pub(crate) const fn minus(self, later: Self) -> Self {
+        Self {
+            s_q32: self.s_q32.saturating_sub(later.s_q32),
+            w4_q30: self.w4_q30.wrapping_sub(later.w4_q30),
+            xw3_q29: self.xw3_q29.wrapping_sub(later.xw3_q29),
+            s3_q29: self.s3_q29.wrapping_sub(later.s3_q29),
+        }
+    }
+}
+
+/// Evaluates the ramp at x = 2u − 1, Q31.
+#[inline(always)]
+pub(crate) fn shapes(x: i32) -> Shapes {
+    let y_q30 = mulh(x, x);
+    // x = −1 exactly would give y = 1, which Q31 does not hold.
+    let y = y_q30.wrapping_mul(2).wrapping_sub(i32::from(x == i32::MIN));
+    let w = i32::MAX.wrapping_sub(y);
+    let p = mulh_sub(P[0], mulh_sub(P[1], mulh_sub(P[2], mulh_sub(P[3], P[4], y), y), y), y);
+    // ±½ in Q27; at the very end rounding may pass ½, and S must not wrap.
+    let half = mulh(x, p).clamp(-(1 << 26), (1 << 26) - 1);
+    let w2 = mulh(w, w).wrapping_mul(2);
+    let w3_q30 = mulh(w2, w);
+    Shapes {
+        s_q32: (half.wrapping_mul(32) as u32).wrapping_add(1 << 31),
+        w4_q30: mulh(w2, w2),
+        xw3_q29: mulh(x, w3_q30),
+        s3_q29: mulh(w2, (1 << 30) - 1 - mulh(w, SEVEN_SIXTHS_Q31).wrapping_mul(2)),
+    }
+}
+
+/// Where a ramp stands: x as Q63, so that whole ramps of any length end where they should.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub(crate) struct Clock {
+    x: i64,
+    dx: i64,
+}
+
+impl Clock {
+    /// At the start of a rising ramp of so many ticks.
+    pub(crate) const fn rising(step_q63: i64) -> Self {
+        Self { x: i64::MIN, dx: step_q63 }
+    }
+
+    /// At the start of a falling ramp.
+    pub(crate) const fn falling(step_q63: i64) -> Self {
+        Self { x: i64::MAX, dx: step_q63.wrapping_neg() }
+    }
+
+    /// The falling ramp that goes through the same values of 1 − S as this rising one goes on to.
+    pub(crate) const fn mirrored(self) -> Self {
+        Self { x: self.x.wrapping_neg(), dx: self.dx.wrapping_neg() }
+    }
+
+    /// x now, Q31.
+    pub(crate) const fn here(self) -> i32 {
+        (self.x >> 32) as i32
+    }
+
+    /// x after one more tick, Q31.
+    #[inline(always)]
+    pub(crate) fn advance(&mut self) -> i32 {
+        self.x = self.x.wrapping_add(self.dx);
+        (self.x >> 32) as i32
+    }
+}
+
+/// Q63 step of x per tick for a ramp of so many ticks (at least 2).
+pub(crate) const fn clock_step(ticks: u32) -> i64 {
+    let ticks = if ticks < 2 { 2 } else { ticks };
+    (u64::MAX / ticks as u64) as i64
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use giotto_shared::path::smoothstep;
+
+    #[test]
+    fn fixed_point_shapes_are_the_smoothstep() {
+        let mut worst = [0.0f64; 4];
+        for i in 0..1_000_003i64 {
+            let x = ((i * 4295) + i64::from(i32::MIN)).min(i64::from(i32::MAX)) as i32;
+            let f = shapes(x);
+            let s = smoothstep((f64::from(x) / 2f64.powi(31) + 1.0) / 2.0);
+            let got = [
+                f64::from(f.s_q32) / 2f64.powi(32),
+                f64::from(f.w4_q30) / 2f64.powi(30) * FIRST,
+                -f64::from(f.xw3_q29) / 2f64.powi(29) * SECOND,
+                f64::from(f.s3_q29) / 2f64.powi(29) * THIRD,
+            ];
+            for (w, (g, e)) in worst.iter_mut().zip(got.iter().zip([s.value, s.first, s.second, s.third])) {
+                *w = w.max((g - e).abs());
+            }
+        }
+        std::println!("errors of S, S', S'', S''': {worst:?}");
+        assert!(worst[0] < 2e-8 && worst[1] < 3e-8 && worst[2] < 6e-7 && worst[3] < 4e-6, "{worst:?}");
+    }
+}
