@@ -7,3 +7,4 @@ pub mod cli;
 pub mod fit;
 pub mod model_file;
 pub mod simulation;
+pub mod toml_file;

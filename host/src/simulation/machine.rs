@@ -160,8 +160,8 @@ impl Machine {
         }
         match self.acc_dec {
             AccDec::None => {}
-            AccDec::Exponential(t) => time_constant("acc_dec.exponential_s", t)?,
-            AccDec::MovingAverage(t) => time_constant("acc_dec.moving_average_s", t)?,
+            AccDec::Exponential(t) => time_constant("exponential_s", t)?,
+            AccDec::MovingAverage(t) => time_constant("moving_average_s", t)?,
         }
         for axis in 0..2 {
             let servo = self.servo[axis];

@@ -5,6 +5,7 @@
 //! |---|---|
 //! | [`circle`] | one lap in the steady state, free of noise |
 //! | [`drive`] | where the tool goes under the set-points of an outside controller |
+//! | [`campaign`] | a whole plan, read by an instrument with noise |
 //!
 //! Linear elements are stepped exactly (matrix exponential under a command that is cubic within a step), so a
 //! lap needs steps enough for its shape, not for its time constants. Backlash and friction follow the axis
@@ -16,11 +17,20 @@ mod command;
 mod drive;
 mod from_model;
 mod geometry;
+mod instrument;
 pub mod machine;
+mod machine_spec;
+mod plan;
+pub mod plan_file;
 
 pub use circle::{CircleTest, MAX_RATE_HZ, SAMPLES_PER_TURN, Trace, ballbar_samples, circle};
 pub use drive::{Hold, Path, SetPoints, drive};
+pub use instrument::Instrument;
 pub use machine::{Machine, MachineError};
+pub use machine_spec::{AxisSpec, MachineSpec, VibrationSpec};
+pub use plan::{Plan, PlannedTest, campaign};
 
 #[cfg(test)]
 mod closed_forms;
+#[cfg(test)]
+mod plan_tests;
