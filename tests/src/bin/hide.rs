@@ -3,7 +3,7 @@
 //! `hide --effect servo_mismatch --strength 3 --seed 5 -o DIR` (effects joined by `+`, or `null_lag`, …);
 //! `hide --all DIR` writes every effect at 1 and 3 times the noise, nulls, unlisted effects, pairs, triples.
 use clap::Parser;
-use giotto_tests::effects::{Case, Kind, LISTED, Null, UNLISTED};
+use giotto_tests::effects::{Case, Keep, Kind, LISTED, Null, UNLISTED};
 use giotto_tests::files;
 use giotto_tests::machine::base::Variety;
 use rayon::prelude::*;
@@ -24,12 +24,26 @@ struct Args {
     /// Other grids, instruments, spreads than the paper's.
     #[arg(long)]
     broad: bool,
+    /// Leaves out most runs: `one-radius`, `one-feed`, `one-direction`, `one-run`.
+    #[arg(long, value_parser = keep)]
+    keep: Option<Keep>,
     /// Directory to write to.
     #[arg(short, long, default_value = "hidden")]
     output: PathBuf,
     /// Writes one of everything into this directory instead.
     #[arg(long)]
     all: Option<PathBuf>,
+}
+
+/// Which runs stay.
+fn keep(name: &str) -> Result<Keep, String> {
+    match name {
+        "one-radius" => Ok(Keep::OneRadius),
+        "one-feed" => Ok(Keep::OneFeed),
+        "one-direction" => Ok(Keep::OneDirection),
+        "one-run" => Ok(Keep::OneRun),
+        _ => Err("one of one-radius, one-feed, one-direction, one-run".into()),
+    }
 }
 
 /// What a name on the command line asks for.
@@ -84,9 +98,12 @@ fn main() -> std::process::ExitCode {
     let failed: Vec<String> = jobs
         .par_iter()
         .filter_map(|(name, strength, dir)| {
-            let Some(case) = Case::new(&kind(name), *strength, args.seed, variety) else {
+            let Some(mut case) = Case::new(&kind(name), *strength, args.seed, variety) else {
                 return Some(format!("{name}: no such effect"));
             };
+            if let Some(keep) = args.keep {
+                keep.thin(&mut case.campaign);
+            }
             files::write(&case, dir).err().map(|e| format!("{}: {e}", dir.display()))
         })
         .collect();

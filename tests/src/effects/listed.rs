@@ -143,8 +143,9 @@ pub fn listed(name: &str, seed: u64) -> Option<Effect> {
         ),
         "reversal_spike" => {
             let both = rng.random_bool(0.5);
-            let (decay_s, rise_s) = (rng.random_range(0.015..0.1), rng.random_range(0.0005..0.003));
-            let presliding_m = rng.random_range(0.5e-6..15e-6);
+            let decay_s = rng.random_range(0.015..0.1);
+            let rise_s = decay_s * rng.random_range(0.02..0.25);
+            let presliding_m = rng.random_range(0.5e-6..25e-6);
             let mut e = plain(
                 "um",
                 5e-6,

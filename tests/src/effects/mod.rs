@@ -4,7 +4,7 @@ mod listed;
 mod strength;
 mod unlisted;
 
-pub use case::{Case, Kind, Null, Truth};
+pub use case::{Case, Keep, Kind, Null, Truth};
 pub use listed::{LISTED, listed};
 pub use strength::{misfit_m, scaled};
 pub use unlisted::{UNLISTED, unlisted};

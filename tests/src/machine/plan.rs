@@ -70,7 +70,7 @@ impl Grid {
         }
     }
 
-    /// Another laboratory: two to five radii, five to thirteen feeds, fewer samples, another start.
+    /// Another laboratory: two to five radii, seven to thirteen feeds, fewer samples, another start.
     pub fn drawn(rng: &mut ChaCha8Rng) -> Self {
         let radii: &[&[f64]] = &[
             &[0.05, 0.1, 0.2],
@@ -79,7 +79,7 @@ impl Grid {
             &[0.1, 0.3],
             &[0.05, 0.1, 0.15, 0.2, 0.3],
         ];
-        let count = rng.random_range(5..=13);
+        let count = rng.random_range(7..=13);
         let (low, high) = (rng.random_range(0.01..0.05), rng.random_range(0.4..0.8));
         let bend = rng.random_range(0.8..1.8);
         let feeds = (0..count).map(|k| low + (high - low) * (f64::from(k) / f64::from(count - 1)).powf(bend));
