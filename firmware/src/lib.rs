@@ -3,6 +3,7 @@
 //! | module | holds | knows nothing of |
 //! |---|---|---|
 //! | [`store`] | two slots of flash, confirmations, power cuts | what a table means |
+//! | [`engine`] | programs in, one set-point a tick out | flash, serial ports |
 //! | [`server`] | the protocol state machine: request in, reply out | registers, serial ports |
 #![no_std]
 #![forbid(unsafe_code)]

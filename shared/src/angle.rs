@@ -1,5 +1,5 @@
 //! Angles as integers: a turn is 2³² (or 2⁶⁴), so that a phase wraps by itself and never drifts.
-use crate::fixed::{mulh, mulh_add, mulh_sub, to_fixed};
+use crate::fixed::{mulh, mulh_add, to_fixed};
 use core::f64::consts::{FRAC_PI_4, PI};
 
 /// Radians per unit of a 32-bit phase.
@@ -13,29 +13,46 @@ pub const SINCOS_ERROR: f64 = 4.0e-9;
 const SIN: [f64; 4] = economise(series(FRAC_PI_4, 1));
 const COS: [f64; 4] = economise(series(FRAC_PI_4 * FRAC_PI_4 / 2.0, 2));
 
-/// Each step of Horner's scheme with [`mulh`] halves the scale (z is Q31), so each coefficient has one bit more
-/// than the one before it.
-const S: [i32; 4] =
-    [to_fixed(SIN[0], 31), to_fixed(-SIN[1], 32), to_fixed(SIN[2], 33), to_fixed(-SIN[3], 34)];
-const C: [i32; 4] =
-    [to_fixed(COS[0], 32), to_fixed(-COS[1], 33), to_fixed(COS[2], 34), to_fixed(-COS[3], 35)];
+/// Coefficients of [`sincos_with`]. The tick keeps a copy in its own state: one multiple load brings them all,
+/// where immediate operands would cost two instructions each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SinCos {
+    sin: [i32; 4],
+    cos: [i32; 4],
+}
+
+impl SinCos {
+    /// Each step of Horner's scheme with [`mulh_add`] halves the scale (z is Q31), so each coefficient has one bit
+    /// more than the one before it. All are positive because the argument of the scheme is −z.
+    pub const NEW: Self = Self {
+        sin: [to_fixed(SIN[0], 31), to_fixed(-SIN[1], 32), to_fixed(SIN[2], 33), to_fixed(-SIN[3], 34)],
+        cos: [to_fixed(COS[0], 32), to_fixed(-COS[1], 33), to_fixed(COS[2], 34), to_fixed(-COS[3], 35)],
+    };
+}
 
 /// (cos, sin) of a phase (2³² a turn) in Q31; +1 is 2³¹ − 1. Error at most [`SINCOS_ERROR`] (test over all phases).
-#[inline(always)]
+#[inline]
 pub fn sincos(phase: u32) -> (i32, i32) {
-    // Nearest multiple of a quarter turn, and the rest, ±1/8 turn, as Q31.
-    let quarter = phase.wrapping_add(1 << 29) >> 30;
+    sincos_with(&SinCos::NEW, phase)
+}
+
+/// [`sincos`] with the coefficients in memory.
+#[inline(always)]
+pub fn sincos_with(k: &SinCos, phase: u32) -> (i32, i32) {
+    // The rest from the nearest multiple of a quarter turn, ±1/8 turn, as Q31.
     let t = (phase << 2) as i32;
-    // ⌊t²/2³²⌋ is Q30; twice that is Q31 and below 1 because |t| ≤ 1 gives 2³¹ only at t = −1.
-    let z = mulh(t, t).wrapping_mul(2).wrapping_sub((t == i32::MIN) as i32);
-    let sin_over_t = mulh_sub(S[0], mulh_sub(S[1], mulh_sub(S[2], S[3], z), z), z);
-    let sin = mulh_add(0, t, sin_over_t).wrapping_mul(2);
-    let versine = mulh_sub(C[0], mulh_sub(C[1], mulh_sub(C[2], C[3], z), z), z);
-    let cos = mulh_sub(i32::MAX, z, versine);
+    // −t² in Q31: unlike +1, −1 is a number there.
+    let z = mulh(t, t).wrapping_mul(-2);
+    let ([s0, s1, s2, s3], [c0, c1, c2, c3]) = (k.sin, k.cos);
+    let sin_over_t = mulh_add(s0, mulh_add(s1, mulh_add(s2, s3, z), z), z);
+    let sin = mulh(t, sin_over_t).wrapping_mul(2);
+    let versine = mulh_add(c0, mulh_add(c1, mulh_add(c2, c3, z), z), z);
+    let cos = mulh_add(i32::MAX, versine, z);
     // A quarter turn swaps the two and flips a sign.
-    let (c, s) = if quarter & 1 == 0 { (cos, sin) } else { (sin, cos) };
-    let flip_s = -((quarter >> 1 & 1) as i32);
-    let flip_c = -(((quarter.wrapping_add(1)) >> 1 & 1) as i32);
+    let quarters = phase.wrapping_add(1 << 29);
+    let (c, s) = if quarters & (1 << 30) == 0 { (cos, sin) } else { (sin, cos) };
+    let flip_s = (quarters as i32) >> 31;
+    let flip_c = (quarters.wrapping_add(1 << 30) as i32) >> 31;
     ((c ^ flip_c).wrapping_sub(flip_c), (s ^ flip_s).wrapping_sub(flip_s))
 }
 

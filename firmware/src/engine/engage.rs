@@ -1,10 +1,12 @@
 //! How much of the correction is engaged: all, none, or on the way without a step.
-use super::ramp::{Clock, clock_step, shapes};
+use super::ramp::{Clock, POLYNOMIAL, clock_step, shapes};
 
 /// Share of the correction that goes out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Engage {
-    /// Q31; `i32::MAX` is all of it, exactly.
+    /// All of it, and no change under way.
+    full: bool,
+    /// Q31.
     share_q31: i32,
     /// What was asked for last.
     wanted: bool,
@@ -19,7 +21,7 @@ impl Engage {
     /// Settled on or off.
     pub(crate) fn new(ticks: u32, on: bool) -> Self {
         let share_q31 = if on { i32::MAX } else { 0 };
-        Self { share_q31, wanted: on, heading: on, left: 0, ticks, clock: Clock::default() }
+        Self { full: on, share_q31, wanted: on, heading: on, left: 0, ticks, clock: Clock::default() }
     }
 
     /// Whether it is, or is to be, on.
@@ -41,13 +43,14 @@ impl Engage {
             let step = clock_step(self.ticks);
             self.clock = if self.heading { Clock::rising(step) } else { Clock::falling(step) };
             self.left = self.ticks;
+            self.full = false;
         }
     }
 
     /// The share of the offset that goes out this tick.
     #[inline(always)]
     pub(crate) fn apply(&mut self, offset: [i32; 3]) -> [i32; 3] {
-        if self.share_q31 == i32::MAX && self.left == 0 { offset } else { self.blend(offset) }
+        if self.full { offset } else { self.blend(offset) }
     }
 
     #[inline(never)]
@@ -57,10 +60,14 @@ impl Engage {
             self.share_q31 = match (self.left, self.heading) {
                 (0, true) => i32::MAX,
                 (0, false) => 0,
-                _ => (shapes(self.clock.advance()).s_q32 >> 1) as i32,
+                _ => (shapes(&POLYNOMIAL, self.clock.advance()).s_q32 >> 1) as i32,
             };
             if self.left == 0 {
+                self.full = self.heading;
                 self.begin();
+            }
+            if self.full {
+                return offset;
             }
         }
         let share = i64::from(self.share_q31);

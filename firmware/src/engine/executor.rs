@@ -7,9 +7,10 @@
 use super::engage::Engage;
 use super::guard::Guard;
 use super::planned::{Kind, Planned};
-use super::ramp::{Clock, Shapes, shapes};
+use super::ramp::{Clock, POLYNOMIAL, Shapes, shapes};
 use super::{Counters, Fault, Output, flag};
-use giotto_shared::angle::sincos;
+use giotto_shared::angle::{SinCos, sincos_with};
+use giotto_shared::fixed::{mulh, mulh_add};
 
 /// Where the next segment comes from: the receiving end of a lock-free queue.
 pub trait Inbox {
@@ -37,9 +38,14 @@ enum Mode {
     Settle,
     /// Stands still for a time.
     Dwell,
-    Rise,
+    /// Arc at constant rate.
+    ArcCruise,
+    /// Arc in a rising or falling ramp.
+    ArcRamp,
+    /// Line or helix at constant rate.
     Cruise,
-    Fall,
+    /// Line or helix in a ramp.
+    Ramp,
     /// Stopped while rising: the rising ramp runs on, a falling one is laid over it. Each has four continuous
     /// derivatives, so their sum has; it never runs backwards because the second is never ahead of the first.
     Both,
@@ -49,57 +55,63 @@ enum Mode {
 #[derive(Clone, Debug)]
 pub struct Executor {
     mode: Mode,
+    /// The ramp in hand ends in standstill.
+    falling: bool,
     left: u32,
-    /// Phase; in a ramp the running sum of the steps, see [`Self::ramp_phase`].
+    /// Phase; in a ramp the running sum of the steps.
     phase: u64,
-    /// Whole turns, for the rise of a helix.
-    turns: i32,
+    clock: Clock,
+    segment: Planned,
+    sincos: SinCos,
+    ramp: [i32; 5],
+    guard: Guard,
+    engage: Engage,
+    counters: Counters,
     /// Phase where the fall in hand ends.
     end: u64,
-    clock: Clock,
+    /// Whole turns, for the rise of a helix.
+    turns: i32,
     second: Clock,
     /// Ticks that the second ramp runs longer than the first.
     second_left: u32,
-    segment: Planned,
-    guard: Guard,
-    nominal_nm: [i32; 3],
-    /// Offset wanted at rest, before engagement.
+    /// Programmed position where it stands or last stood.
     rest_nm: [i32; 3],
-    engage: Engage,
+    /// Offset wanted there, before engagement.
+    rest_offset_nm: [i32; 3],
     /// Segments planned before the last stop carry an older epoch and are thrown away.
     epoch: u8,
-    stop: bool,
     fault: Option<Fault>,
-    counters: Counters,
 }
 
 impl Executor {
     /// Standing at a position, correction engaged or bypassed from the start.
-    pub fn new(nominal_nm: [i32; 3], engage_ticks: u32, bypass: bool) -> Self {
+    pub fn new(position_nm: [i32; 3], engage_ticks: u32, bypass: bool) -> Self {
         Self {
             mode: Mode::Rest,
+            falling: false,
             left: 0,
             phase: 0,
-            turns: 0,
-            end: 0,
             clock: Clock::default(),
+            segment: Planned::default(),
+            sincos: SinCos::NEW,
+            ramp: POLYNOMIAL,
+            guard: Guard::new(0, 0),
+            engage: Engage::new(engage_ticks, !bypass),
+            counters: Counters::default(),
+            end: 0,
+            turns: 0,
             second: Clock::default(),
             second_left: 0,
-            segment: Planned::default(),
-            guard: Guard::new(0, 0),
-            nominal_nm,
-            rest_nm: [0; 3],
-            engage: Engage::new(engage_ticks, !bypass),
+            rest_nm: position_nm,
+            rest_offset_nm: [0; 3],
             epoch: 0,
-            stop: false,
             fault: None,
-            counters: Counters::default(),
         }
     }
 
-    /// Programmed position of the last tick, nm.
-    pub const fn nominal_nm(&self) -> [i32; 3] {
-        self.nominal_nm
+    /// Programmed position where the machine stands, or last stood, nm.
+    pub const fn rest_nm(&self) -> [i32; 3] {
+        self.rest_nm
     }
 
     /// Nothing in hand.
@@ -123,17 +135,11 @@ impl Executor {
     }
 
     /// Declares the position while standing still. `false` (and no effect) while moving.
-    pub fn set_position(&mut self, nominal_nm: [i32; 3]) -> bool {
-        let idle = self.idle();
-        if idle {
-            self.nominal_nm = nominal_nm;
+    pub fn set_position(&mut self, position_nm: [i32; 3]) -> bool {
+        if self.idle() {
+            self.rest_nm = position_nm;
         }
-        idle
-    }
-
-    /// Stops within the limits, beginning with the next tick; what is queued is thrown away.
-    pub fn stop(&mut self) {
-        self.stop = true;
+        self.idle()
     }
 
     /// Disengages (`true`) or engages (`false`) the correction, without a step.
@@ -141,21 +147,21 @@ impl Executor {
         self.engage.set(!bypass);
     }
 
-    /// The board saw that a tick came late or was lost: stops, and runs nothing more until [`Self::clear_fault`].
-    pub fn overrun(&mut self) {
-        self.counters.overruns = self.counters.overruns.wrapping_add(1);
-        self.fault = Some(Fault::Overrun);
-        self.stop = true;
-    }
-
     /// Whether the correction is disengaged or on its way to be.
     pub const fn bypass(&self) -> bool {
         !self.engage.is_on()
     }
 
+    /// The board saw that a tick came late or was lost: stops, and runs nothing more until [`Self::clear_fault`].
+    pub fn overrun(&mut self) {
+        self.counters.overruns = self.counters.overruns.wrapping_add(1);
+        self.fault = Some(Fault::Overrun);
+        self.stop();
+    }
+
     /// A stop was asked for and the machine still moves.
     pub fn stopping(&self) -> bool {
-        self.stop || (!self.idle() && self.segment.epoch != self.epoch)
+        !self.idle() && self.segment.epoch != self.epoch
     }
 
     /// Accepts segments again after a fault; `false` while still moving.
@@ -166,17 +172,41 @@ impl Executor {
         self.idle()
     }
 
+    /// Stops within the limits, beginning with the next tick; what is queued is thrown away.
+    pub fn stop(&mut self) {
+        if self.stopping() {
+            return;
+        }
+        self.epoch = self.epoch.wrapping_add(1);
+        self.counters.stops = self.counters.stops.wrapping_add(1);
+        let timing = &self.segment.timing;
+        match self.mode {
+            Mode::ArcCruise | Mode::Cruise => {
+                let distance = (timing.step >> 1).wrapping_mul(u64::from(timing.ramp_ticks));
+                self.begin_fall(self.phase.wrapping_add(distance));
+            }
+            Mode::ArcRamp | Mode::Ramp if !self.falling => {
+                // ∫ of the two ramps together: one step for each tick between their starts.
+                let apart = timing.ramp_ticks.wrapping_sub(self.left);
+                self.end = timing.start.wrapping_add(timing.step.wrapping_mul(u64::from(apart)));
+                self.second = Clock::rising(timing.clock_step);
+                self.second_left = apart;
+                self.mode = if apart == 0 { Mode::Rest } else { Mode::Both };
+            }
+            // At the end of a settling or dwelling in hand the segment is seen to be of an old epoch.
+            _ => {}
+        }
+    }
+
     /// One tick. See the module for its contract.
     #[inline]
     pub fn tick(&mut self, inbox: &mut impl Inbox) -> Output {
         self.counters.ticks = self.counters.ticks.wrapping_add(1);
-        if self.stop {
-            self.begin_stop();
-        }
         match self.mode {
+            Mode::ArcCruise => self.arc_cruise(),
+            Mode::ArcRamp => self.arc_ramp(),
             Mode::Cruise => self.cruise(),
-            Mode::Rise => self.rise(),
-            Mode::Fall => self.fall(),
+            Mode::Ramp => self.any_ramp(),
             Mode::Both => self.both(),
             Mode::Settle => self.settle(),
             Mode::Dwell => self.dwell(),
@@ -185,112 +215,155 @@ impl Executor {
     }
 
     #[inline(always)]
-    fn cruise(&mut self) -> Output {
-        self.advance(self.segment.timing.step);
+    fn arc_cruise(&mut self) -> Output {
+        let phase = self.phase.wrapping_add(self.segment.timing.step);
+        self.phase = phase;
         self.left = self.left.wrapping_sub(1);
-        let phase = self.phase;
         if self.left == 0 {
             self.begin_fall(self.segment.timing.end);
         }
-        self.steady_at(phase, flag::MOVING | flag::CRUISE)
+        self.arc_steady(phase, flag::MOVING | flag::CRUISE)
     }
 
     #[inline(always)]
-    fn rise(&mut self) -> Output {
-        self.left = self.left.wrapping_sub(1);
-        let shape = shapes(self.clock.advance());
-        if self.left == 0 {
-            return self.top();
-        }
-        self.ramp_at(shape, 0)
+    fn arc_steady(&mut self, phase: u64, flags: u16) -> Output {
+        let (c, s) = sincos_with(&self.sincos, (phase >> 32) as u32);
+        let [x, y, z] = &self.segment.axes;
+        let nominal = [x.on_arc(c, s), y.on_arc(c, s), z.on_arc(c, s)];
+        let offset = [x.steady(c, s), y.steady(c, s), z.steady(c, s)];
+        self.finish(nominal, offset, flags)
     }
 
     #[inline(always)]
-    fn fall(&mut self) -> Output {
+    fn arc_ramp(&mut self) -> Output {
         self.left = self.left.wrapping_sub(1);
-        let shape = shapes(self.clock.advance());
+        let shape = shapes(&self.ramp, self.clock.advance());
         if self.left == 0 {
-            return self.standstill();
+            return self.end_ramp();
         }
-        self.ramp_at(shape, -1)
+        let step = scaled(self.segment.timing.step, shape.s_q32);
+        self.phase = self.phase.wrapping_add(step);
+        let (c, s) = sincos_with(&self.sincos, self.ramp_phase(step, &shape));
+        let (re, im) = self.segment.law.gain(&shape, c, s);
+        let [x, y, z] = &self.segment.axes;
+        let nominal = [x.on_arc(c, s), y.on_arc(c, s), z.on_arc(c, s)];
+        let offset = [
+            mulh_add(mulh(x.u, re), x.v, im),
+            mulh_add(mulh(y.u, re), y.v, im),
+            mulh_add(mulh(z.u, re), z.v, im),
+        ];
+        self.finish(nominal, offset, flag::MOVING)
+    }
+
+    /// Phase in a ramp. ∫ of the rate is the trapezoidal sum less T²/12 of its derivative (Euler–Maclaurin); the next
+    /// term is below 1e-5 of a step from 32 ticks up.
+    #[inline(always)]
+    fn ramp_phase(&self, step: u64, shape: &Shapes) -> u32 {
+        ((self.phase >> 32) as u32)
+            .wrapping_sub((step >> 33) as u32)
+            .wrapping_sub(self.segment.law.end_term(shape) as u32)
+    }
+
+    #[inline(never)]
+    fn cruise(&mut self) -> Output {
+        self.advance(self.segment.timing.step);
+        let phase = self.phase;
+        let (nominal, offset) = self.steady_at(phase);
+        self.left = self.left.wrapping_sub(1);
+        if self.left == 0 {
+            self.begin_fall(self.segment.timing.end);
+        }
+        self.finish(nominal, offset, flag::MOVING | flag::CRUISE)
+    }
+
+    #[inline(never)]
+    fn any_ramp(&mut self) -> Output {
+        self.left = self.left.wrapping_sub(1);
+        let shape = shapes(&self.ramp, self.clock.advance());
+        if self.left == 0 {
+            return self.end_ramp();
+        }
+        self.ramp_at(shape)
     }
 
     #[inline(never)]
     fn both(&mut self) -> Output {
         self.left = self.left.wrapping_sub(1);
-        let up = shapes(self.clock.advance());
-        let down = shapes(self.second.advance());
+        let up = shapes(&self.ramp, self.clock.advance());
+        let down = shapes(&self.ramp, self.second.advance());
         if self.left == 0 {
             // The rising ramp is over: what remains is the falling one alone.
             self.clock = self.second.mirrored();
             self.left = self.second_left;
-            self.mode = Mode::Fall;
-            return self.ramp_at(shapes(self.clock.here()), -1);
+            self.falling = true;
+            self.mode = if self.segment.kind == Kind::Arc { Mode::ArcRamp } else { Mode::Ramp };
+            self.segment.law.turn_round();
+            let shape = shapes(&self.ramp, self.clock.here());
+            return self.ramp_at(shape);
         }
-        self.ramp_at(up.minus(down), 0)
+        self.ramp_at(up.minus(down))
     }
 
-    /// End of a rising ramp: the phase is set to its exact value.
+    /// One tick of a ramp on any curve.
+    fn ramp_at(&mut self, shape: Shapes) -> Output {
+        let step = scaled(self.segment.timing.step, shape.s_q32);
+        self.advance(step);
+        let phase = self.ramp_phase(step, &shape);
+        let nominal = self.place(phase);
+        let axes = &self.segment.axes;
+        let offset = if self.segment.kind == Kind::Line {
+            let along = self.segment.law.along(&shape);
+            [mulh(axes[0].v, along), mulh(axes[1].v, along), mulh(axes[2].v, along)]
+        } else {
+            let (c, s) = sincos_with(&self.sincos, phase);
+            let (re, im) = self.segment.law.gain(&shape, c, s);
+            axes.map(|a| mulh_add(mulh(a.u, re), a.v, im))
+        };
+        self.finish(nominal, offset, flag::MOVING)
+    }
+
+    /// End of a ramp: the phase is set to its exact value.
     #[inline(never)]
+    fn end_ramp(&mut self) -> Output {
+        if self.falling { self.standstill() } else { self.top() }
+    }
+
     fn top(&mut self) -> Output {
-        let phase = self.segment.timing.up;
-        self.set_phase(phase);
-        self.left = self.segment.timing.cruise_ticks;
-        self.mode = Mode::Cruise;
+        let timing = self.segment.timing;
+        self.set_phase(timing.up);
+        let (nominal, offset) = self.steady_at(timing.up);
+        self.left = timing.cruise_ticks;
+        self.mode = if self.segment.kind == Kind::Arc { Mode::ArcCruise } else { Mode::Cruise };
         if self.left == 0 {
-            self.begin_fall(self.segment.timing.end);
+            self.begin_fall(timing.end);
         }
-        self.steady_at(phase, flag::MOVING)
+        self.finish(nominal, offset, flag::MOVING)
     }
 
-    /// End of a falling ramp: exactly where it was planned to end.
-    #[inline(never)]
     fn standstill(&mut self) -> Output {
         self.set_phase(self.end);
         self.mode = Mode::Rest;
-        let curve = self.segment.curve;
-        let (c, s) = curve.weights(self.phase_q32());
-        self.nominal_nm = self.place(c, s, self.phase_q32());
         if self.end == self.segment.timing.end {
-            self.nominal_nm = self.segment.end_nm;
+            (self.rest_nm, self.rest_offset_nm) = (self.segment.end_nm, self.segment.end_offset_nm);
+        } else {
+            self.rest_nm = self.place((self.phase >> 32) as u32);
+            self.rest_offset_nm = [0; 3];
         }
-        self.rest_nm = self.segment.rest_offset(c, s);
         self.counters.segments = self.counters.segments.wrapping_add(1);
-        self.finish(self.nominal_nm, self.rest_nm, flag::MOVING)
-    }
-
-    fn begin_fall(&mut self, end: u64) {
-        let timing = &self.segment.timing;
-        self.mode = Mode::Fall;
-        self.left = timing.ramp_ticks;
-        self.clock = Clock::falling(timing.clock_step);
-        self.end = end;
-        // So that the sum of steps less half the last one is the phase.
-        self.advance(timing.step >> 1);
+        self.finish(self.rest_nm, self.rest_offset_nm, flag::MOVING)
     }
 
     #[inline(never)]
-    fn begin_stop(&mut self) {
-        self.stop = false;
-        self.epoch = self.epoch.wrapping_add(1);
-        self.counters.stops = self.counters.stops.wrapping_add(1);
-        let timing = &self.segment.timing;
-        match self.mode {
-            Mode::Cruise => {
-                let distance = (timing.step >> 1).wrapping_mul(u64::from(timing.ramp_ticks));
-                self.begin_fall(self.phase.wrapping_add(distance));
-            }
-            Mode::Rise => {
-                // ∫ of the two ramps together: one step for each tick between their starts.
-                let apart = timing.ramp_ticks.wrapping_sub(self.left);
-                self.end = timing.start.wrapping_add(timing.step.wrapping_mul(u64::from(apart)));
-                self.second = Clock::rising(timing.clock_step);
-                self.second_left = apart;
-                self.mode = if apart == 0 { Mode::Rest } else { Mode::Both };
-            }
-            // At the end of the settling or dwelling in hand the segment is seen to be of an old epoch.
-            Mode::Rest | Mode::Settle | Mode::Dwell | Mode::Fall | Mode::Both => {}
-        }
+    fn begin_fall(&mut self, end: u64) {
+        let timing = self.segment.timing;
+        self.mode = if self.segment.kind == Kind::Arc { Mode::ArcRamp } else { Mode::Ramp };
+        self.falling = true;
+        self.left = timing.ramp_ticks;
+        self.clock = Clock::falling(timing.clock_step);
+        self.end = end;
+        self.segment.law.turn_round();
+        // So that the sum of steps less half the last one is the phase.
+        self.advance(timing.step >> 1);
     }
 
     #[inline(never)]
@@ -298,7 +371,7 @@ impl Executor {
         if let Some(next) = inbox.take() {
             if next.epoch != self.epoch || self.fault.is_some() {
                 self.counters.dropped = self.counters.dropped.wrapping_add(1);
-            } else if next.start_nm != self.nominal_nm {
+            } else if next.start_nm != self.rest_nm {
                 self.counters.dropped = self.counters.dropped.wrapping_add(1);
                 self.fault = Some(Fault::Discontinuity);
             } else {
@@ -309,10 +382,10 @@ impl Executor {
                 self.mode = Mode::Settle;
                 self.left = next.settle_ticks;
                 self.clock = Clock::rising(next.settle_step);
-                return self.finish(self.nominal_nm, self.rest_nm, flag::SETTLING);
+                return self.finish(self.rest_nm, self.rest_offset_nm, flag::SETTLING);
             }
         }
-        self.finish(self.nominal_nm, self.rest_nm, 0)
+        self.finish(self.rest_nm, self.rest_offset_nm, 0)
     }
 
     /// Moves the offset from what it is to what the segment starts with, then lets the segment begin.
@@ -320,35 +393,37 @@ impl Executor {
     fn settle(&mut self) -> Output {
         let target = self.segment.start_offset_nm;
         self.left = self.left.wrapping_sub(1);
-        let share = shapes(self.clock.advance()).s_q32;
-        if self.left == 0 || self.rest_nm == target {
-            self.rest_nm = target;
+        let share = shapes(&self.ramp, self.clock.advance()).s_q32;
+        if self.left == 0 || self.rest_offset_nm == target {
+            self.rest_offset_nm = target;
             self.begin_segment();
-            return self.finish(self.nominal_nm, target, flag::SETTLING);
+            return self.finish(self.rest_nm, target, flag::SETTLING);
         }
-        let mut offset = self.rest_nm;
+        let mut offset = self.rest_offset_nm;
         for (o, t) in offset.iter_mut().zip(target) {
-            let way = (i64::from(t) - i64::from(*o)).wrapping_mul(i64::from(share));
+            let way = i64::from(t).wrapping_sub(i64::from(*o)).wrapping_mul(i64::from(share));
             *o = o.wrapping_add((way >> 32) as i32);
         }
-        self.finish(self.nominal_nm, offset, flag::SETTLING)
+        self.finish(self.rest_nm, offset, flag::SETTLING)
     }
 
     fn begin_segment(&mut self) {
-        let timing = &self.segment.timing;
-        if self.segment.epoch != self.epoch {
-            self.mode = Mode::Rest;
-        } else if self.segment.curve.kind == Kind::Dwell {
-            self.mode = Mode::Dwell;
-            self.left = timing.cruise_ticks;
-        } else {
-            self.mode = Mode::Rise;
-            self.left = timing.ramp_ticks;
-            self.clock = Clock::rising(timing.clock_step);
-            self.phase = timing.start;
-            self.turns = 0;
-            self.end = timing.end;
-        }
+        let timing = self.segment.timing;
+        self.left = timing.ramp_ticks;
+        self.mode = match self.segment.kind {
+            _ if self.segment.epoch != self.epoch => Mode::Rest,
+            Kind::Dwell => {
+                self.left = timing.cruise_ticks;
+                Mode::Dwell
+            }
+            Kind::Arc => Mode::ArcRamp,
+            Kind::Line | Kind::Helix => Mode::Ramp,
+        };
+        self.falling = false;
+        self.clock = Clock::rising(timing.clock_step);
+        self.phase = timing.start;
+        self.turns = 0;
+        self.end = timing.end;
     }
 
     #[inline(never)]
@@ -358,10 +433,9 @@ impl Executor {
             self.mode = Mode::Rest;
             self.counters.segments = self.counters.segments.wrapping_add(1);
         }
-        self.finish(self.nominal_nm, self.rest_nm, 0)
+        self.finish(self.rest_nm, self.rest_offset_nm, 0)
     }
 
-    #[inline(always)]
     fn advance(&mut self, by: u64) {
         let (phase, wrapped) = self.phase.overflowing_add(by);
         self.phase = phase;
@@ -370,81 +444,47 @@ impl Executor {
 
     /// Replaces the phase by an exact value close to it, whole turns included.
     fn set_phase(&mut self, exact: u64) {
-        let change = exact.wrapping_sub(self.phase) as i64;
-        let before = self.phase;
+        let ahead = exact.wrapping_sub(self.phase) as i64 > 0;
+        let wrapped = i32::from(ahead && exact < self.phase) - i32::from(!ahead && exact > self.phase);
         self.phase = exact;
-        let wrapped = i32::from(change > 0 && exact < before) - i32::from(change < 0 && exact > before);
         self.turns = self.turns.wrapping_add(wrapped);
     }
 
-    #[inline(always)]
-    fn phase_q32(&self) -> u32 {
-        (self.phase >> 32) as u32
-    }
-
-    /// Position at the weights c, s and the phase (whole turns from `self.turns`).
-    #[inline(always)]
-    fn place(&self, c: i32, s: i32, phase_q32: u32) -> [i32; 3] {
-        let curve = &self.segment.curve;
-        let mut at = curve.at(c, s);
-        if curve.kind == Kind::Helix {
-            let start = (self.segment.timing.start >> 32) as u32;
-            // A ramp's sum of steps runs up to one step ahead of the phase and may have wrapped before it.
-            let ahead = self.phase_q32() < phase_q32 && phase_q32.wrapping_sub(self.phase_q32()) > 1 << 31;
-            let turns = self.turns.wrapping_sub(i32::from(ahead));
-            let risen = curve.risen(turns, phase_q32);
-            let before = curve.risen(0, start);
-            for ((p, r), b) in at.iter_mut().zip(risen).zip(before) {
+    /// Position, nm, at a phase.
+    fn place(&self, phase_q32: u32) -> [i32; 3] {
+        let axes = &self.segment.axes;
+        if self.segment.kind == Kind::Line {
+            return [axes[0].on_line(phase_q32), axes[1].on_line(phase_q32), axes[2].on_line(phase_q32)];
+        }
+        let (c, s) = sincos_with(&self.sincos, phase_q32);
+        let mut at = [axes[0].on_arc(c, s), axes[1].on_arc(c, s), axes[2].on_arc(c, s)];
+        if self.segment.kind == Kind::Helix {
+            // A ramp's sum of steps runs ahead of the phase and may have passed a whole turn before it.
+            let sum_q32 = (self.phase >> 32) as u32;
+            let early = sum_q32 < phase_q32 && phase_q32.wrapping_sub(sum_q32) > 1 << 31;
+            let turns = self.turns.wrapping_sub(i32::from(early));
+            let start = self.segment.risen(0, (self.segment.timing.start >> 32) as u32);
+            for ((p, r), b) in at.iter_mut().zip(self.segment.risen(turns, phase_q32)).zip(start) {
                 *p = p.wrapping_add(r).wrapping_sub(b);
             }
         }
         at
     }
 
-    #[inline(always)]
-    fn steady_at(&mut self, phase: u64, flags: u16) -> Output {
+    /// Position and offset, nm, at constant rate.
+    fn steady_at(&self, phase: u64) -> ([i32; 3], [i32; 3]) {
         let phase_q32 = (phase >> 32) as u32;
-        let (c, s) = if self.segment.curve.kind == Kind::Arc {
-            sincos(phase_q32)
-        } else {
-            self.segment.curve.weights(phase_q32)
-        };
-        let nominal = self.place(c, s, phase_q32);
-        let offset = self.segment.steady.at(c, s);
-        self.finish(nominal, offset, flags)
-    }
-
-    /// One tick of a ramp. `falling` is −1 where the ramp runs backwards in time.
-    #[inline(always)]
-    fn ramp_at(&mut self, shape: Shapes, falling: i32) -> Output {
-        let timing = &self.segment.timing;
-        let step = scaled(timing.step, shape.s_q32);
-        let end_term = timing.end_term(shape.w4_q30);
-        self.advance(step);
-        // ∫ of the rate is the trapezoidal sum less T²/12 of its derivative (Euler–Maclaurin); the next term is
-        // below 1e-8 of a step from 32 ticks up.
-        let phase_q32 = self
-            .phase_q32()
-            .wrapping_sub((step >> 33) as u32)
-            .wrapping_sub((end_term ^ falling).wrapping_sub(falling) as u32);
-        let (c, s) = if self.segment.curve.kind == Kind::Arc {
-            sincos(phase_q32)
-        } else {
-            self.segment.curve.weights(phase_q32)
-        };
-        let nominal = self.place(c, s, phase_q32);
-        let offset = if self.segment.curve.kind == Kind::Line {
-            self.segment.law.on_line(&self.segment.curve.v_nm, shape, falling)
-        } else {
-            self.segment.law.on_arc(&self.segment.curve, shape, falling, c, s)
-        };
-        self.finish(nominal, offset, flag::MOVING)
+        let nominal = self.place(phase_q32);
+        if self.segment.kind == Kind::Line {
+            return (nominal, [0; 3]);
+        }
+        let (c, s) = sincos_with(&self.sincos, phase_q32);
+        (nominal, self.segment.axes.map(|a| a.steady(c, s)))
     }
 
     /// Engagement, bounds, and out.
     #[inline(always)]
     fn finish(&mut self, nominal: [i32; 3], wanted: [i32; 3], flags: u16) -> Output {
-        self.nominal_nm = nominal;
         let wanted = self.engage.apply(wanted);
         let (offset, verdict) = self.guard.pass(wanted);
         let mut flags = flags;
@@ -466,6 +506,6 @@ impl Executor {
 #[inline(always)]
 fn scaled(step: u64, share_q32: u32) -> u64 {
     let share = u64::from(share_q32);
-    let low = (u64::from(step as u32).wrapping_mul(share)) >> 32;
+    let low = u64::from(step as u32).wrapping_mul(share) >> 32;
     (step >> 32).wrapping_mul(share).wrapping_add(low)
 }

@@ -3,9 +3,17 @@
 /// Bounds per axis and the offset that passed last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Guard {
+    last_nm: [i32; 3],
+    /// The largest powers of two not above the bounds: below them one comparison does for all axes.
+    easy_offset_nm: u32,
+    easy_slew_nm: u32,
     offset_nm: i32,
     slew_nm: i32,
-    last_nm: [i32; 3],
+}
+
+/// The largest power of two not above a bound; 0 for 0.
+const fn easy(bound: i32) -> u32 {
+    if bound <= 0 { 0 } else { 1 << (31 - bound.leading_zeros()) }
 }
 
 /// What the gate had to do.
@@ -20,12 +28,13 @@ pub(crate) struct Verdict {
 impl Guard {
     /// Bounds in nm and nm per tick.
     pub(crate) const fn new(offset_nm: i32, slew_nm: i32) -> Self {
-        Self { offset_nm, slew_nm, last_nm: [0; 3] }
+        let (easy_offset_nm, easy_slew_nm) = (easy(offset_nm), easy(slew_nm));
+        Self { last_nm: [0; 3], easy_offset_nm, easy_slew_nm, offset_nm, slew_nm }
     }
 
     /// New bounds; the offset stays where it is.
     pub(crate) fn set(&mut self, offset_nm: i32, slew_nm: i32) {
-        (self.offset_nm, self.slew_nm) = (offset_nm, slew_nm);
+        *self = Self { last_nm: self.last_nm, ..Self::new(offset_nm, slew_nm) };
     }
 
     /// The offset that passed last, nm.
@@ -37,25 +46,19 @@ impl Guard {
     /// The offset that may go out, axis by axis.
     #[inline(always)]
     pub(crate) fn pass(&mut self, wanted: [i32; 3]) -> ([i32; 3], Verdict) {
-        let [x, y, z] = wanted;
-        let [lx, ly, lz] = self.last_nm;
-        // One unsigned comparison an axis: −bound ≤ v ≤ bound.
-        let within = |v: i32, bound: i32| (v.wrapping_add(bound) as u32) <= (bound as u32).wrapping_mul(2);
-        let (o, s) = (self.offset_nm, self.slew_nm);
-        let fine = within(x, o)
-            & within(y, o)
-            & within(z, o)
-            & within(x.wrapping_sub(lx), s)
-            & within(y.wrapping_sub(ly), s)
-            & within(z.wrapping_sub(lz), s);
-        if fine {
-            self.last_nm = wanted;
-            return (wanted, Verdict::default());
+        let ([x, y, z], [lx, ly, lz]) = (wanted, self.last_nm);
+        // v or its ones' complement, whichever is not negative: below 2ⁿ if and only if −2ⁿ ≤ v < 2ⁿ.
+        let size = |v: i32| (v ^ (v >> 31)) as u32;
+        let change = |now: i32, last: i32| size(now.wrapping_sub(last));
+        let offset = size(x) | size(y) | size(z);
+        let slew = change(x, lx) | change(y, ly) | change(z, lz);
+        if offset >= self.easy_offset_nm || slew >= self.easy_slew_nm {
+            return self.cut(wanted);
         }
-        self.cut(wanted)
+        self.last_nm = wanted;
+        (wanted, Verdict::default())
     }
 
-    #[cold]
     #[inline(never)]
     fn cut(&mut self, wanted: [i32; 3]) -> ([i32; 3], Verdict) {
         let mut verdict = Verdict::default();

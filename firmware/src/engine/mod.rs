@@ -150,7 +150,7 @@ impl Engine {
             return Err(Refused::Busy);
         }
         if self.idle() {
-            self.planner.resync(self.executor.nominal_nm(), self.executor.epoch());
+            self.planner.resync(self.executor.rest_nm(), self.executor.epoch());
         }
         Ok(())
     }

@@ -1,6 +1,5 @@
 //! A segment in the form that the tick runs: integers only, everything that could fail already done.
 use super::ramp::Shapes;
-use giotto_shared::angle::sincos;
 use giotto_shared::fixed::{mulh, mulh_add, mulh_sub};
 
 /// Which curve.
@@ -9,7 +8,7 @@ pub(crate) enum Kind {
     /// Stands still for `Timing::cruise_ticks`.
     #[default]
     Dwell,
-    /// p = base + u·s, s the share of the way done.
+    /// p = base + u·share, v its unit direction.
     Line,
     /// p = base + u·cosφ + v·sinφ.
     Arc,
@@ -17,53 +16,44 @@ pub(crate) enum Kind {
     Helix,
 }
 
-/// The curve. `base` is in nm·2³¹ with half a nm added, so that the sum only has to be shifted.
+/// One coordinate of the curve and of its correction at constant rate; the tick loads it as a whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub(crate) struct Curve {
-    pub(crate) kind: Kind,
-    pub(crate) base: [i64; 3],
-    pub(crate) u_nm: [i32; 3],
-    pub(crate) v_nm: [i32; 3],
-    /// nm per turn of φ.
-    pub(crate) rise_nm: [i32; 3],
+pub(crate) struct Axis {
+    /// nm·2³² with half a nm added, so that the upper word of the sum is the position.
+    pub(crate) base: i64,
+    /// nm·2 on arcs, nm on lines.
+    pub(crate) u: i32,
+    /// nm·2 on arcs, unit direction in Q31 on lines.
+    pub(crate) v: i32,
+    /// Correction at constant rate on arcs, nm·2: a·cosφ + b·sinφ.
+    pub(crate) a: i32,
+    pub(crate) b: i32,
 }
 
-/// A base for [`Curve`].
+/// [`Axis::base`] of a position.
 pub(crate) const fn base(nm: i32) -> i64 {
-    ((nm as i64) << 31) + (1 << 30)
+    ((nm as i64) << 32) + (1 << 31)
 }
 
-impl Curve {
-    /// Position, nm, where the vectors have the weights c and s (Q31).
+impl Axis {
+    /// Position on an arc, nm, at cosine and sine in Q31.
     #[inline(always)]
-    pub(crate) fn at(&self, c: i32, s: i32) -> [i32; 3] {
-        let one = |base: i64, u: i32, v: i32| {
-            let sum = base
-                .wrapping_add((i64::from(u)).wrapping_mul(i64::from(c)))
-                .wrapping_add((i64::from(v)).wrapping_mul(i64::from(s)));
-            (sum >> 31) as i32
-        };
-        let ([bx, by, bz], [ux, uy, uz], [vx, vy, vz]) = (self.base, self.u_nm, self.v_nm);
-        [one(bx, ux, vx), one(by, uy, vy), one(bz, uz, vz)]
+    pub(crate) fn on_arc(&self, c: i32, s: i32) -> i32 {
+        let u = i64::from(self.u).wrapping_mul(i64::from(c));
+        let v = i64::from(self.v).wrapping_mul(i64::from(s));
+        (self.base.wrapping_add(u).wrapping_add(v) >> 32) as i32
     }
 
-    /// Weights of the two vectors at a phase.
+    /// Position on a line, nm.
     #[inline(always)]
-    pub(crate) fn weights(&self, phase_q32: u32) -> (i32, i32) {
-        match self.kind {
-            Kind::Arc | Kind::Helix => sincos(phase_q32),
-            Kind::Line => ((phase_q32 >> 1) as i32, 0),
-            Kind::Dwell => (0, 0),
-        }
+    pub(crate) fn on_line(&self, share_q32: u32) -> i32 {
+        (self.base.wrapping_add(i64::from(self.u).wrapping_mul(i64::from(share_q32))) >> 32) as i32
     }
 
-    /// How far the rise has come, nm, after so many turns (whole, and their fraction).
+    /// Correction at constant rate, nm; at most 2 nm below exact (two floors), exactly 0 where there is none.
     #[inline(always)]
-    pub(crate) fn risen(&self, turns: i32, fraction_q32: u32) -> [i32; 3] {
-        self.rise_nm.map(|rise| {
-            let part = (i64::from(rise).wrapping_mul(i64::from(fraction_q32))) >> 32;
-            rise.wrapping_mul(turns).wrapping_add(part as i32)
-        })
+    pub(crate) fn steady(&self, c: i32, s: i32) -> i32 {
+        mulh_add(mulh(self.a, c), self.b, s)
     }
 }
 
@@ -81,108 +71,104 @@ pub(crate) struct Timing {
     pub(crate) cruise_ticks: u32,
     /// Q63 step of the ramp's x per tick.
     pub(crate) clock_step: i64,
-    /// Euler–Maclaurin term of the ramp's phase, units of 2⁻³² turn at w⁴ = 1, Q2.
+}
+
+/// The operator in a ramp, in fixed point. `W` is the share of the constant rate.
+///
+/// On an arc the complex gain δ + ib (Q32):
+/// δ = W²(k1 + k2 W²) + k3 W·xw³ + k4 w⁸, b = w⁴(k5 + k6 W²) + k7 w² + k8 w³.
+/// On a line the offset along it, nm·2: k5 w⁴ + k7 w² + k8 w³.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub(crate) struct Law {
+    /// Q33.
+    pub(crate) k1: i32,
+    /// Q34.
+    pub(crate) k2: i32,
+    /// Q32.
+    pub(crate) k3: i32,
+    /// Q32.
+    pub(crate) k4: i32,
+    /// Q34; on a line nm·2³.
+    pub(crate) k5: i32,
+    /// Q35.
+    pub(crate) k6: i32,
+    /// Q30; on a line nm·2².
+    pub(crate) k7: i32,
+    /// Q31; on a line nm·2³.
+    pub(crate) k8: i32,
+    /// What the sum of rates lacks of the phase (Euler–Maclaurin), units of 2⁻³² turn at w⁴ = 1, Q2.
     pub(crate) end_term_q2: i32,
 }
 
-impl Timing {
-    /// Euler–Maclaurin term at this point of a rising ramp, units of 2⁻³² turn.
-    #[inline(always)]
-    pub(crate) fn end_term(&self, w4_q30: i32) -> i32 {
-        mulh(w4_q30, self.end_term_q2)
-    }
-}
-
-/// The operator in fixed point: on an arc the complex gain δ + ib (Q33), on a line the offset along it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub(crate) struct Law {
-    /// δ: W²(k1 + k2 W²), Q34 and Q35.
-    pub(crate) k1: i32,
-    pub(crate) k2: i32,
-    /// δ: W·xw³ and w⁸, Q32.
-    pub(crate) k3: i32,
-    pub(crate) k4: i32,
-    /// b: w⁴(k5 + k6 W²), Q34 and Q35. On a line k5 is nm·2³.
-    pub(crate) k5: i32,
-    pub(crate) k6: i32,
-    /// b: w²(1 − 7w/6), Q31. On a line nm·2⁴.
-    pub(crate) k7: i32,
-}
-
 impl Law {
-    /// Offset on an arc, nm, with the phase's weights c and s.
+    /// The law of the same ramp run backwards in time: odd derivatives change their sign.
+    pub(crate) fn turn_round(&mut self) {
+        for k in [&mut self.k5, &mut self.k6, &mut self.k7, &mut self.k8, &mut self.end_term_q2] {
+            *k = k.wrapping_neg();
+        }
+    }
+
+    /// Euler–Maclaurin term, units of 2⁻³² turn.
     #[inline(always)]
-    pub(crate) fn on_arc(&self, curve: &Curve, f: Shapes, falling: i32, c: i32, s: i32) -> [i32; 3] {
+    pub(crate) fn end_term(&self, f: &Shapes) -> i32 {
+        mulh(f.w4_q30, self.end_term_q2)
+    }
+
+    /// (δ + ib)(c + is) in Q31.
+    #[inline(always)]
+    pub(crate) fn gain(&self, f: &Shapes, c: i32, s: i32) -> (i32, i32) {
         let rate = (f.s_q32 >> 1) as i32;
         let rate2 = mulh(rate, rate).wrapping_mul(2);
         let main = mulh(mulh_add(self.k1, self.k2, rate2), rate2);
         let jerk = mulh(rate, f.xw3_q29);
         let acceleration2 = mulh(f.w4_q30, f.w4_q30);
         let fine = mulh_add(mulh(self.k3, jerk), self.k4, acceleration2);
-        let radial = main.wrapping_add(fine.wrapping_mul(32));
-        let ahead = mulh(mulh_add(self.k5, self.k6, rate2), f.w4_q30).wrapping_mul(2);
-        let snap = mulh(self.k7, f.s3_q29).wrapping_mul(32);
-        let tangential = (ahead.wrapping_add(snap) ^ falling).wrapping_sub(falling);
-        // (δ + ib)(c + is), Q32.
-        let re = mulh_sub(mulh(radial, c), tangential, s);
-        let im = mulh_add(mulh(radial, s), tangential, c);
-        let ([ux, uy, uz], [vx, vy, vz]) = (curve.u_nm, curve.v_nm);
-        let one = |u, v| mulh_add(mulh(u, re), v, im);
-        [one(ux, vx), one(uy, vy), one(uz, vz)]
+        let radial = main.wrapping_add(fine.wrapping_mul(16));
+        let ahead = mulh(mulh_add(self.k5, self.k6, rate2), f.w4_q30);
+        let snap = mulh_add(mulh(self.k7, f.w2_q31), self.k8, f.w3_q30);
+        let tangential = ahead.wrapping_add(snap.wrapping_mul(8));
+        (mulh_sub(mulh(radial, c), tangential, s), mulh_add(mulh(radial, s), tangential, c))
     }
 
-    /// Offset on a line, nm, along its unit direction (Q31).
+    /// Offset along a line, nm·2.
     #[inline(always)]
-    pub(crate) fn on_line(&self, direction: &[i32; 3], f: Shapes, falling: i32) -> [i32; 3] {
-        let ahead = mulh_add(mulh(self.k5, f.w4_q30), self.k7, f.s3_q29);
-        let ahead = (ahead ^ falling).wrapping_sub(falling);
-        let [x, y, z] = *direction;
-        [mulh(x, ahead), mulh(y, ahead), mulh(z, ahead)]
-    }
-}
-
-/// Offset at constant rate, nm·2: a·cosφ + b·sinφ.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub(crate) struct Steady {
-    pub(crate) a: [i32; 3],
-    pub(crate) b: [i32; 3],
-}
-
-impl Steady {
-    /// Offset, nm, at most 2 nm below exact (two floors); exactly 0 where there is no correction.
-    #[inline(always)]
-    pub(crate) fn at(&self, c: i32, s: i32) -> [i32; 3] {
-        let ([ax, ay, az], [bx, by, bz]) = (self.a, self.b);
-        let one = |a, b| mulh_add(mulh(a, c), b, s);
-        [one(ax, bx), one(ay, by), one(az, bz)]
+    pub(crate) fn along(&self, f: &Shapes) -> i32 {
+        mulh_add(mulh_add(mulh(self.k5, f.w4_q30), self.k7, f.w2_q31), self.k8, f.w3_q30)
     }
 }
 
 /// A segment ready to run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct Planned {
-    pub(crate) curve: Curve,
-    pub(crate) timing: Timing,
+    pub(crate) axes: [Axis; 3],
     pub(crate) law: Law,
-    pub(crate) steady: Steady,
+    pub(crate) timing: Timing,
+    pub(crate) kind: Kind,
+    /// A zone of the table applies.
+    pub(crate) corrected: bool,
+    /// Segments planned before a stop carry an older one.
+    pub(crate) epoch: u8,
+    /// Helix: nm per turn.
+    pub(crate) rise_nm: [i32; 3],
     /// Bounds on offset (nm) and its change (nm per tick).
     pub(crate) offset_nm: i32,
     pub(crate) slew_nm: i32,
-    /// Ticks to move the offset from what it is to what this segment starts with.
+    /// Ticks to move the offset from what it is to what this segment starts with, and its clock.
     pub(crate) settle_ticks: u32,
     pub(crate) settle_step: i64,
     pub(crate) start_offset_nm: [i32; 3],
-    pub(crate) epoch: u8,
+    pub(crate) end_offset_nm: [i32; 3],
     pub(crate) start_nm: [i32; 3],
     pub(crate) end_nm: [i32; 3],
-    /// A zone of the table applies.
-    pub(crate) corrected: bool,
 }
 
 impl Planned {
-    /// Offset wanted where it stands still, nm, at the weights of that place.
-    pub(crate) fn rest_offset(&self, _c: i32, _s: i32) -> [i32; 3] {
-        [0; 3]
+    /// How far a helix has risen, nm, at so many turns (whole, and their fraction).
+    pub(crate) fn risen(&self, turns: i32, fraction_q32: u32) -> [i32; 3] {
+        self.rise_nm.map(|rise| {
+            let part = i64::from(rise).wrapping_mul(i64::from(fraction_q32)) >> 32;
+            rise.wrapping_mul(turns).wrapping_add(part as i32)
+        })
     }
 
     /// Where it ends, nm.

@@ -1,9 +1,9 @@
 //! From what a program asks for to integers that the tick runs. Runs in the background, in `f64`.
 use super::config::{Config, MAX_POSITION_M, MAX_RADIUS_M, MAX_RAMP_TICKS, ticks};
-use super::planned::{Curve, Kind, Law, Planned, Steady, Timing, base};
+use super::planned::{Axis, Kind, Law, Planned, Timing, base};
 use super::ramp::{FIRST, SECOND, THIRD, clock_step};
 use core::f64::consts::TAU;
-use giotto_shared::angle::phase_from_rad;
+use giotto_shared::angle::{phase_from_rad, sincos};
 use giotto_shared::fixed::to_fixed;
 use giotto_shared::law::{AngularMotion, Operator};
 use giotto_shared::model::Cumulants;
@@ -169,19 +169,12 @@ impl Planner {
         let mut segment =
             self.round(&round, ramp_ticks, |ramp_ticks| share_out(whole, ramp_ticks, cruise_ticks))?;
         // Rounding of centre and radius must not show as a gap at the start: move the arc by that nm or two.
-        for (((b, e), s), p) in segment
-            .curve
-            .base
-            .iter_mut()
-            .zip(&mut segment.end_nm)
-            .zip(&mut segment.start_nm)
-            .zip(self.position_nm)
-        {
-            let gap = p - *s;
-            *b += i64::from(gap) << 31;
-            *e += gap;
-            *s = p;
+        for (i, axis) in segment.axes.iter_mut().enumerate() {
+            let gap = self.position_nm[i] - segment.start_nm[i];
+            axis.base += i64::from(gap) << 32;
+            segment.end_nm[i] += gap;
         }
+        segment.start_nm = self.position_nm;
         self.position_nm = segment.end_nm;
         Ok(segment)
     }
@@ -211,18 +204,21 @@ impl Planner {
         }
         let (ramp_ticks, cruise_ticks) = self.profile(length, feed)?;
         let mut timing = share_out((1u128 << 64) - 1, ramp_ticks, cruise_ticks);
-        self.finish_timing(&mut timing);
-        let v_nm = direction.map(|d| to_fixed(d, 31));
-        let zone = self.zone(None, feed, None);
+        timing.clock_step = clock_step(ramp_ticks);
         let mut segment = self.blank();
-        segment.curve = Curve { kind: Kind::Line, base: from.map(base), u_nm, v_nm, rise_nm: [0; 3] };
+        segment.kind = Kind::Line;
+        for (i, axis) in segment.axes.iter_mut().enumerate() {
+            *axis = Axis { base: base(from[i]), u: u_nm[i], v: to_fixed(direction[i], 31), a: 0, b: 0 };
+        }
         segment.timing = timing;
-        if let Some((operator, limits)) = zone {
+        segment.law.end_term_q2 = end_term(&timing);
+        if let Some((operator, limits)) = self.zone(None, feed, None) {
             let t = f64::from(ramp_ticks) * self.config.tick_s();
             let speed = timing.step as f64 / TURN * length / self.config.tick_s();
-            let nm = 1e9;
-            segment.law.k5 = to_fixed(operator.second_s2 * speed * FIRST / t * nm, 3);
-            segment.law.k7 = to_fixed(operator.fourth_s4 * speed * THIRD / (t * t * t) * nm, 4);
+            let snap = operator.fourth_s4 * speed * THIRD / (t * t * t) * 1e9;
+            segment.law.k5 = to_fixed(operator.second_s2 * speed * FIRST / t * 1e9, 3);
+            segment.law.k7 = to_fixed(snap, 2);
+            segment.law.k8 = to_fixed(-7.0 / 6.0 * snap, 3);
             segment.corrected = true;
             (segment.offset_nm, segment.slew_nm) = limits;
         }
@@ -245,46 +241,48 @@ impl Planner {
         let scale = |a: [f64; 3], by: f64| a.map(|x| to_fixed(x * by, 0));
         let centre_nm = to_nm(&round.centre, "centre")?;
         let flat = round.rise_per_turn == [0.0; 3];
-        let curve = Curve {
-            kind: if flat { Kind::Arc } else { Kind::Helix },
-            base: centre_nm.map(base),
-            u_nm: scale(round.u, round.radius * 1e9),
-            v_nm: scale(round.v, round.radius * 1e9),
-            rise_nm: scale(round.rise_per_turn, 1e9),
-        };
         let mut segment = self.blank();
-        segment.curve = curve;
+        segment.kind = if flat { Kind::Arc } else { Kind::Helix };
+        segment.rise_nm = scale(round.rise_per_turn, 1e9);
+        for (i, axis) in segment.axes.iter_mut().enumerate() {
+            let arm = |a: f64| to_fixed(a * round.radius * 1e9, 1);
+            *axis = Axis { base: base(centre_nm[i]), u: arm(round.u[i]), v: arm(round.v[i]), a: 0, b: 0 };
+        }
         let zone = self.zone(Some((round.centre, round.radius)), round.feed, Some(round.ccw));
-        let mut timing_now = timing(ramp_ticks);
+        segment.timing = timing(ramp_ticks);
         if let Some((operator, limits)) = zone {
             let mut ramp = ramp_ticks;
             for _ in 0..6 {
-                timing_now = timing(ramp);
-                if let Some((law, steady)) = self.law_on_arc(&operator, &timing_now, &curve) {
-                    (segment.law, segment.steady, segment.corrected) = (law, steady, true);
+                let slower = timing(ramp);
+                if let Some((law, radial)) = self.law_on_arc(&operator, &slower) {
+                    (segment.law, segment.timing, segment.corrected) = (law, slower, true);
                     (segment.offset_nm, segment.slew_nm) = limits;
+                    for axis in &mut segment.axes {
+                        axis.a = to_fixed(radial * f64::from(axis.u), 0);
+                        axis.b = to_fixed(radial * f64::from(axis.v), 0);
+                    }
                     break;
                 }
                 ramp = ramp.saturating_mul(2).min(MAX_RAMP_TICKS);
             }
         }
-        self.finish_timing(&mut timing_now);
-        segment.timing = timing_now;
-        let weights = |phase: u64| segment.curve.weights((phase >> 32) as u32);
-        let (c, s) = weights(timing_now.start);
-        segment.start_nm = curve.at(c, s);
-        let (c, s) = weights(timing_now.end);
-        segment.end_nm = curve.at(c, s);
+        segment.timing.clock_step = clock_step(segment.timing.ramp_ticks);
+        segment.law.end_term_q2 = end_term(&segment.timing);
+        let at = |phase: u64| {
+            let (c, s) = sincos((phase >> 32) as u32);
+            segment.axes.map(|a| a.on_arc(c, s))
+        };
+        let (start_nm, mut end_nm) = (at(segment.timing.start), at(segment.timing.end));
         if !flat {
-            let rise = round.rise_per_turn.map(|r| r * total_turns(&timing_now));
-            let risen = scale(rise, 1e9);
-            segment.end_nm = [0, 1, 2].map(|i| segment.end_nm[i] + risen[i]);
+            let risen = scale(round.rise_per_turn.map(|r| r * total_turns(&segment.timing)), 1e9);
+            end_nm = [0, 1, 2].map(|i| end_nm[i] + risen[i]);
         }
+        (segment.start_nm, segment.end_nm) = (start_nm, end_nm);
         Ok(segment)
     }
 
-    /// The operator's fixed-point form on a circle; `None` if a gain is beyond [`MAX_GAIN`].
-    fn law_on_arc(&self, operator: &Operator<f64>, timing: &Timing, curve: &Curve) -> Option<(Law, Steady)> {
+    /// The operator's fixed-point form on a circle, and its gain at constant rate; `None` if a gain is beyond [`MAX_GAIN`].
+    fn law_on_arc(&self, operator: &Operator<f64>, timing: &Timing) -> Option<(Law, f64)> {
         let rate = timing.step as f64 / TURN * TAU / self.config.tick_s();
         let t = f64::from(timing.ramp_ticks) * self.config.tick_s();
         let steady = operator.gain(&AngularMotion { rate, ..Default::default() });
@@ -297,25 +295,23 @@ impl Planner {
             })
             .fold(libm::fabs(steady.radial), f64::max);
         let (a, b) = (operator.second_s2, operator.fourth_s4);
+        let snap = b * rate * THIRD / (t * t * t);
         let k = [
-            (-a * rate * rate, 34),
-            (b * rate * rate * rate * rate, 35),
+            (-a * rate * rate, 33),
+            (b * rate * rate * rate * rate, 34),
             (4.0 * b * rate * rate / (t * t) * SECOND, 32),
             (-3.0 * b * (rate * FIRST / t) * (rate * FIRST / t), 32),
             (a * rate * FIRST / t, 34),
             (-6.0 * b * rate * rate * rate * FIRST / t, 35),
-            (b * rate * THIRD / (t * t * t), 31),
+            (snap, 30),
+            (-7.0 / 6.0 * snap, 31),
         ];
-        let fits = k
-            .iter()
-            .all(|&(k, bits)| libm::fabs(k) < 0.98 * (1u64 << (31 + 32 - bits)) as f64 / (1u64 << 32) as f64);
+        let fits = k.iter().all(|&(k, bits)| libm::fabs(k) * (1u64 << bits) as f64 <= 0.98 * 2_147_483_648.0);
         if !(worst <= MAX_GAIN && fits) {
             return None;
         }
-        let [k1, k2, k3, k4, k5, k6, k7] = k.map(|(k, bits)| to_fixed(k, bits));
-        let scale = |v: [i32; 3]| v.map(|x| to_fixed(steady.radial * f64::from(x), 1));
-        let steady = Steady { a: scale(curve.u_nm), b: scale(curve.v_nm) };
-        Some((Law { k1, k2, k3, k4, k5, k6, k7 }, steady))
+        let [k1, k2, k3, k4, k5, k6, k7, k8] = k.map(|(k, bits)| to_fixed(k, bits));
+        Some((Law { k1, k2, k3, k4, k5, k6, k7, k8, end_term_q2: 0 }, steady.radial))
     }
 
     /// Ramp and constant-rate ticks for a length at no more than a feed.
@@ -337,13 +333,6 @@ impl Planner {
 
     fn ramp_ticks(&self, feed: f64) -> u32 {
         ticks(FeedRamp::within(0.0, feed, &self.config.motion).duration_s * f64::from(self.config.rate_hz))
-    }
-
-    fn finish_timing(&self, timing: &mut Timing) {
-        timing.clock_step = clock_step(timing.ramp_ticks);
-        // ∫ exceeds the sum by T²/12 of the rate's derivative: Δstep/N·S′/12, in units of 2⁻³² turn.
-        let step_q32 = timing.step as f64 / 4_294_967_296.0;
-        timing.end_term_q2 = to_fixed(step_q32 / f64::from(timing.ramp_ticks) * FIRST / 12.0, 2);
     }
 
     fn blank(&self) -> Planned {
@@ -404,6 +393,12 @@ fn fits(zone: &Zone, circle: Option<([f64; 3], f64)>, feed: f64, ccw: Option<boo
     };
     let radius = circle.is_none_or(|(_, radius)| inside(radius, zone.radius_m));
     travel && place && radius && inside(feed, zone.feed_m_s)
+}
+
+/// ∫ of a ramp's rate exceeds its sum by T²/12 of the rate's derivative: step/N·S′/12, in units of 2⁻³² turn, Q2.
+fn end_term(timing: &Timing) -> i32 {
+    let step_q32 = timing.step as f64 / 4_294_967_296.0;
+    to_fixed(step_q32 / f64::from(timing.ramp_ticks) * FIRST / 12.0, 2)
 }
 
 /// Turns from start to end, whole ones included.

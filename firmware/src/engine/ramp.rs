@@ -3,7 +3,7 @@
 //! With x = 2u − 1 and w = 1 − x² (so q = w/4, r = −x) the smoothstep and its derivatives are
 //! S = ½ + x·P(x²), S′ = (315/128) w⁴, S″ = −(315/8) x w³, S‴ = (945/2) w² (1 − 7w/6).
 //! Falling ramps are rising ones run backwards: S and S″ keep their sign, S′ and S‴ change it.
-use giotto_shared::fixed::{mulh, mulh_sub, to_fixed};
+use giotto_shared::fixed::{mulh, mulh_add, to_fixed};
 
 /// S′ = `FIRST`·w⁴.
 pub(crate) const FIRST: f64 = 315.0 / 128.0;
@@ -12,28 +12,30 @@ pub(crate) const SECOND: f64 = 315.0 / 8.0;
 /// S‴ = `THIRD`·w²(1 − 7w/6).
 pub(crate) const THIRD: f64 = 945.0 / 2.0;
 
-/// P(y) = 315/256·(1 − 4y/3 + 6y²/5 − 4y³/7 + y⁴/9), from S′ integrated; each coefficient one bit finer than the
-/// one before it, as Horner's scheme with `mulh` wants it.
-const P: [i32; 5] = [
+/// P(y) = 315/256·(1 − 4y/3 + 6y²/5 − 4y³/7 + y⁴/9), from S′ integrated. Each coefficient is one bit finer than the
+/// one before it, as Horner's scheme with [`mulh_add`] wants it, and positive because its argument is −y. Kept in
+/// memory for the reason given at [`SinCos`](giotto_shared::angle::SinCos).
+pub(crate) const POLYNOMIAL: [i32; 5] = [
     to_fixed(315.0 / 256.0, 28),
     to_fixed(315.0 / 256.0 * 4.0 / 3.0, 29),
     to_fixed(315.0 / 256.0 * 6.0 / 5.0, 30),
     to_fixed(315.0 / 256.0 * 4.0 / 7.0, 31),
     to_fixed(315.0 / 256.0 / 9.0, 32),
 ];
-const SEVEN_SIXTHS_Q31: i32 = to_fixed(7.0 / 12.0, 31);
 
-/// The ramp at one tick.
+/// The ramp at one tick. S‴ is `THIRD`·(w² − 7w³/6).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub(crate) struct Shapes {
     /// S, Q32. Error 2e-8.
     pub(crate) s_q32: u32,
+    /// w², Q31.
+    pub(crate) w2_q31: i32,
+    /// w³, Q30.
+    pub(crate) w3_q30: i32,
     /// w⁴, Q30.
     pub(crate) w4_q30: i32,
     /// x·w³, Q29.
     pub(crate) xw3_q29: i32,
-    /// w²(1 − 7w/6), Q29.
-    pub(crate) s3_q29: i32,
 }
 
 impl Shapes {
@@ -41,30 +43,32 @@ impl Shapes {
     pub(crate) const fn minus(self, later: Self) -> Self {
         Self {
             s_q32: self.s_q32.saturating_sub(later.s_q32),
+            w2_q31: self.w2_q31.wrapping_sub(later.w2_q31),
+            w3_q30: self.w3_q30.wrapping_sub(later.w3_q30),
             w4_q30: self.w4_q30.wrapping_sub(later.w4_q30),
             xw3_q29: self.xw3_q29.wrapping_sub(later.xw3_q29),
-            s3_q29: self.s3_q29.wrapping_sub(later.s3_q29),
         }
     }
 }
 
 /// Evaluates the ramp at x = 2u − 1, Q31.
 #[inline(always)]
-pub(crate) fn shapes(x: i32) -> Shapes {
-    let y_q30 = mulh(x, x);
-    // x = −1 exactly would give y = 1, which Q31 does not hold.
-    let y = y_q30.wrapping_mul(2).wrapping_sub(i32::from(x == i32::MIN));
-    let w = i32::MAX.wrapping_sub(y);
-    let p = mulh_sub(P[0], mulh_sub(P[1], mulh_sub(P[2], mulh_sub(P[3], P[4], y), y), y), y);
+pub(crate) fn shapes(p: &[i32; 5], x: i32) -> Shapes {
+    // −x² in Q31: unlike +1, −1 is a number there.
+    let y = mulh(x, x).wrapping_mul(-2);
+    let w = i32::MAX.wrapping_add(y);
+    let [p0, p1, p2, p3, p4] = *p;
+    let slope = mulh_add(p0, mulh_add(p1, mulh_add(p2, mulh_add(p3, p4, y), y), y), y);
     // ±½ in Q27; at the very end rounding may pass ½, and S must not wrap.
-    let half = mulh(x, p).clamp(-(1 << 26), (1 << 26) - 1);
-    let w2 = mulh(w, w).wrapping_mul(2);
-    let w3_q30 = mulh(w2, w);
+    let half = mulh(x, slope).clamp(-(1 << 26), (1 << 26) - 1);
+    let w2_q31 = mulh(w, w).wrapping_mul(2);
+    let w3_q30 = mulh(w2_q31, w);
     Shapes {
-        s_q32: (half.wrapping_mul(32) as u32).wrapping_add(1 << 31),
-        w4_q30: mulh(w2, w2),
+        s_q32: (half.wrapping_mul(32) as u32) ^ (1 << 31),
+        w2_q31,
+        w3_q30,
+        w4_q30: mulh(w2_q31, w2_q31),
         xw3_q29: mulh(x, w3_q30),
-        s3_q29: mulh(w2, (1 << 30) - 1 - mulh(w, SEVEN_SIXTHS_Q31).wrapping_mul(2)),
     }
 }
 
@@ -121,13 +125,14 @@ mod tests {
         let mut worst = [0.0f64; 4];
         for i in 0..1_000_003i64 {
             let x = ((i * 4295) + i64::from(i32::MIN)).min(i64::from(i32::MAX)) as i32;
-            let f = shapes(x);
+            let f = shapes(&POLYNOMIAL, x);
             let s = smoothstep((f64::from(x) / 2f64.powi(31) + 1.0) / 2.0);
             let got = [
                 f64::from(f.s_q32) / 2f64.powi(32),
                 f64::from(f.w4_q30) / 2f64.powi(30) * FIRST,
                 -f64::from(f.xw3_q29) / 2f64.powi(29) * SECOND,
-                f64::from(f.s3_q29) / 2f64.powi(29) * THIRD,
+                (f64::from(f.w2_q31) / 2f64.powi(31) - 7.0 / 6.0 * f64::from(f.w3_q30) / 2f64.powi(30))
+                    * THIRD,
             ];
             for (w, (g, e)) in worst.iter_mut().zip(got.iter().zip([s.value, s.first, s.second, s.third])) {
                 *w = w.max((g - e).abs());
