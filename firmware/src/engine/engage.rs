@@ -29,6 +29,12 @@ impl Engage {
         self.wanted
     }
 
+    /// All of the correction goes out, and no change is under way.
+    #[inline(always)]
+    pub(crate) const fn full(&self) -> bool {
+        self.full
+    }
+
     /// Asks for on or off. A blend under way is finished first: turning it round would be a step in velocity.
     pub(crate) fn set(&mut self, on: bool) {
         self.wanted = on;
@@ -48,13 +54,10 @@ impl Engage {
     }
 
     /// The share of the offset that goes out this tick.
-    #[inline(always)]
     pub(crate) fn apply(&mut self, offset: [i32; 3]) -> [i32; 3] {
-        if self.full { offset } else { self.blend(offset) }
-    }
-
-    #[inline(never)]
-    fn blend(&mut self, offset: [i32; 3]) -> [i32; 3] {
+        if self.full {
+            return offset;
+        }
         if self.left > 0 {
             self.left = self.left.wrapping_sub(1);
             self.share_q31 = match (self.left, self.heading) {

@@ -10,7 +10,7 @@ use super::planned::{Kind, Planned};
 use super::ramp::{Clock, POLYNOMIAL, Shapes, shapes};
 use super::{Counters, Fault, Output, flag};
 use giotto_shared::angle::{SinCos, sincos_with};
-use giotto_shared::fixed::{mulh, mulh_add};
+use giotto_shared::fixed::mulh;
 
 /// Where the next segment comes from: the receiving end of a lock-free queue.
 pub trait Inbox {
@@ -40,12 +40,16 @@ enum Mode {
     Dwell,
     /// Arc at constant rate.
     ArcCruise,
-    /// Arc in a rising or falling ramp.
-    ArcRamp,
+    /// Arc in a rising ramp.
+    ArcRise,
+    /// Arc in a falling ramp.
+    ArcFall,
     /// Line or helix at constant rate.
     Cruise,
-    /// Line or helix in a ramp.
-    Ramp,
+    /// Line or helix in a rising ramp.
+    Rise,
+    /// Line or helix in a falling ramp.
+    Fall,
     /// Stopped while rising: the rising ramp runs on, a falling one is laid over it. Each has four continuous
     /// derivatives, so their sum has; it never runs backwards because the second is never ahead of the first.
     Both,
@@ -55,8 +59,6 @@ enum Mode {
 #[derive(Clone, Debug)]
 pub struct Executor {
     mode: Mode,
-    /// The ramp in hand ends in standstill.
-    falling: bool,
     left: u32,
     /// Phase; in a ramp the running sum of the steps.
     phase: u64,
@@ -88,13 +90,13 @@ impl Executor {
     pub fn new(position_nm: [i32; 3], engage_ticks: u32, bypass: bool) -> Self {
         Self {
             mode: Mode::Rest,
-            falling: false,
             left: 0,
             phase: 0,
             clock: Clock::default(),
             segment: Planned::default(),
             sincos: SinCos::NEW,
             ramp: POLYNOMIAL,
+            // Bounds of 0 take the careful way, which also minds the engagement.
             guard: Guard::new(0, 0),
             engage: Engage::new(engage_ticks, !bypass),
             counters: Counters::default(),
@@ -145,6 +147,7 @@ impl Executor {
     /// Disengages (`true`) or engages (`false`) the correction, without a step.
     pub fn set_bypass(&mut self, bypass: bool) {
         self.engage.set(!bypass);
+        self.guard.watch(!self.engage.full());
     }
 
     /// Whether the correction is disengaged or on its way to be.
@@ -183,9 +186,10 @@ impl Executor {
         match self.mode {
             Mode::ArcCruise | Mode::Cruise => {
                 let distance = (timing.step >> 1).wrapping_mul(u64::from(timing.ramp_ticks));
-                self.begin_fall(self.phase.wrapping_add(distance));
+                self.end = self.phase.wrapping_add(distance);
+                self.begin_fall();
             }
-            Mode::ArcRamp | Mode::Ramp if !self.falling => {
+            Mode::ArcRise | Mode::Rise => {
                 // ∫ of the two ramps together: one step for each tick between their starts.
                 let apart = timing.ramp_ticks.wrapping_sub(self.left);
                 self.end = timing.start.wrapping_add(timing.step.wrapping_mul(u64::from(apart)));
@@ -201,12 +205,13 @@ impl Executor {
     /// One tick. See the module for its contract.
     #[inline]
     pub fn tick(&mut self, inbox: &mut impl Inbox) -> Output {
-        self.counters.ticks = self.counters.ticks.wrapping_add(1);
         match self.mode {
             Mode::ArcCruise => self.arc_cruise(),
-            Mode::ArcRamp => self.arc_ramp(),
+            Mode::ArcRise => self.arc_ramp::<false>(),
+            Mode::ArcFall => self.arc_ramp::<true>(),
             Mode::Cruise => self.cruise(),
-            Mode::Ramp => self.any_ramp(),
+            Mode::Rise => self.any_ramp(false),
+            Mode::Fall => self.any_ramp(true),
             Mode::Both => self.both(),
             Mode::Settle => self.settle(),
             Mode::Dwell => self.dwell(),
@@ -220,7 +225,7 @@ impl Executor {
         self.phase = phase;
         self.left = self.left.wrapping_sub(1);
         if self.left == 0 {
-            self.begin_fall(self.segment.timing.end);
+            self.begin_arc_fall();
         }
         self.arc_steady(phase, flag::MOVING | flag::CRUISE)
     }
@@ -229,39 +234,71 @@ impl Executor {
     fn arc_steady(&mut self, phase: u64, flags: u16) -> Output {
         let (c, s) = sincos_with(&self.sincos, (phase >> 32) as u32);
         let [x, y, z] = &self.segment.axes;
-        let nominal = [x.on_arc(c, s), y.on_arc(c, s), z.on_arc(c, s)];
-        let offset = [x.steady(c, s), y.steady(c, s), z.steady(c, s)];
-        self.finish(nominal, offset, flags)
+        let wanted = [x.steady(c, s), y.steady(c, s), z.steady(c, s)];
+        self.arc_out(c, s, wanted, flags)
+    }
+
+    /// The offset first, the position last: so the tick needs the fewest registers. The rare case is a call with
+    /// scalar arguments: arrays would pass through memory in every tick.
+    #[inline(always)]
+    fn arc_out(&mut self, c: i32, s: i32, wanted: [i32; 3], flags: u16) -> Output {
+        let [wx, wy, wz] = wanted;
+        if !self.guard.pass_easily([wx, wy, wz]) {
+            return self.arc_out_with_care(c, s, wx, wy, wz, flags);
+        }
+        let [x, y, z] = &self.segment.axes;
+        Output::new([x.on_arc(c, s), y.on_arc(c, s), z.on_arc(c, s)], [wx, wy, wz], flags)
+    }
+
+    #[inline(never)]
+    fn arc_out_with_care(&mut self, c: i32, s: i32, wx: i32, wy: i32, wz: i32, flags: u16) -> Output {
+        let axes = &self.segment.axes;
+        let nominal = [axes[0].on_arc(c, s), axes[1].on_arc(c, s), axes[2].on_arc(c, s)];
+        self.finish(nominal, [wx, wy, wz], flags)
     }
 
     #[inline(always)]
-    fn arc_ramp(&mut self) -> Output {
+    fn arc_ramp<const FALLING: bool>(&mut self) -> Output {
         self.left = self.left.wrapping_sub(1);
         let shape = shapes(&self.ramp, self.clock.advance());
         if self.left == 0 {
-            return self.end_ramp();
+            return if FALLING { self.standstill() } else { self.arc_top() };
         }
         let step = scaled(self.segment.timing.step, shape.s_q32);
         self.phase = self.phase.wrapping_add(step);
-        let (c, s) = sincos_with(&self.sincos, self.ramp_phase(step, &shape));
-        let (re, im) = self.segment.law.gain(&shape, c, s);
+        let law = if FALLING { &self.segment.fall } else { &self.segment.rise };
+        let phase_q32 = ramp_phase(self.phase, step, law.end_term(&shape));
+        let (c, s) = sincos_with(&self.sincos, phase_q32);
+        let (re, im) = law.gain(&shape, c, s);
         let [x, y, z] = &self.segment.axes;
-        let nominal = [x.on_arc(c, s), y.on_arc(c, s), z.on_arc(c, s)];
-        let offset = [
-            mulh_add(mulh(x.u, re), x.v, im),
-            mulh_add(mulh(y.u, re), y.v, im),
-            mulh_add(mulh(z.u, re), z.v, im),
-        ];
-        self.finish(nominal, offset, flag::MOVING)
+        let [nx, ny, nz] = [x.on_arc(c, s), y.on_arc(c, s), z.on_arc(c, s)];
+        let [wx, wy, wz] = [x.turned(re, im), y.turned(re, im), z.turned(re, im)];
+        if !self.guard.pass_easily([wx, wy, wz]) {
+            return self.arc_out_with_care(c, s, wx, wy, wz, flag::MOVING);
+        }
+        Output::new([nx, ny, nz], [wx, wy, wz], flag::MOVING)
     }
 
-    /// Phase in a ramp. ∫ of the rate is the trapezoidal sum less T²/12 of its derivative (Euler–Maclaurin); the next
-    /// term is below 1e-5 of a step from 32 ticks up.
+    /// Top of the rising ramp of an arc: the phase is set to its exact value.
+    #[inline(never)]
+    fn arc_top(&mut self) -> Output {
+        let phase = self.segment.timing.up;
+        self.phase = phase;
+        self.left = self.segment.timing.cruise_ticks;
+        self.mode = Mode::ArcCruise;
+        if self.left == 0 {
+            self.begin_arc_fall();
+        }
+        self.arc_steady(phase, flag::MOVING)
+    }
+
     #[inline(always)]
-    fn ramp_phase(&self, step: u64, shape: &Shapes) -> u32 {
-        ((self.phase >> 32) as u32)
-            .wrapping_sub((step >> 33) as u32)
-            .wrapping_sub(self.segment.law.end_term(shape) as u32)
+    fn begin_arc_fall(&mut self) {
+        self.mode = Mode::ArcFall;
+        self.left = self.segment.timing.ramp_ticks;
+        self.clock = Clock::falling(self.segment.timing.clock_step);
+        // So that the sum of steps less half the last one is the phase.
+        self.phase = self.phase.wrapping_add(self.segment.timing.step >> 1);
     }
 
     #[inline(never)]
@@ -271,19 +308,19 @@ impl Executor {
         let (nominal, offset) = self.steady_at(phase);
         self.left = self.left.wrapping_sub(1);
         if self.left == 0 {
-            self.begin_fall(self.segment.timing.end);
+            self.begin_fall();
         }
         self.finish(nominal, offset, flag::MOVING | flag::CRUISE)
     }
 
     #[inline(never)]
-    fn any_ramp(&mut self) -> Output {
+    fn any_ramp(&mut self, falling: bool) -> Output {
         self.left = self.left.wrapping_sub(1);
         let shape = shapes(&self.ramp, self.clock.advance());
         if self.left == 0 {
-            return self.end_ramp();
+            return if falling { self.standstill() } else { self.top() };
         }
-        self.ramp_at(shape)
+        self.ramp_at(shape, falling)
     }
 
     #[inline(never)]
@@ -295,51 +332,46 @@ impl Executor {
             // The rising ramp is over: what remains is the falling one alone.
             self.clock = self.second.mirrored();
             self.left = self.second_left;
-            self.falling = true;
-            self.mode = if self.segment.kind == Kind::Arc { Mode::ArcRamp } else { Mode::Ramp };
-            self.segment.law.turn_round();
+            self.mode = if self.segment.kind == Kind::Arc { Mode::ArcFall } else { Mode::Fall };
             let shape = shapes(&self.ramp, self.clock.here());
-            return self.ramp_at(shape);
+            return self.ramp_at(shape, true);
         }
-        self.ramp_at(up.minus(down))
+        self.ramp_at(up.minus(down), false)
     }
 
     /// One tick of a ramp on any curve.
-    fn ramp_at(&mut self, shape: Shapes) -> Output {
+    fn ramp_at(&mut self, shape: Shapes, falling: bool) -> Output {
         let step = scaled(self.segment.timing.step, shape.s_q32);
         self.advance(step);
-        let phase = self.ramp_phase(step, &shape);
+        let law = if falling { &self.segment.fall } else { &self.segment.rise };
+        let phase = ramp_phase(self.phase, step, law.end_term(&shape));
         let nominal = self.place(phase);
         let axes = &self.segment.axes;
         let offset = if self.segment.kind == Kind::Line {
-            let along = self.segment.law.along(&shape);
+            let along = law.along(&shape);
             [mulh(axes[0].v, along), mulh(axes[1].v, along), mulh(axes[2].v, along)]
         } else {
             let (c, s) = sincos_with(&self.sincos, phase);
-            let (re, im) = self.segment.law.gain(&shape, c, s);
-            axes.map(|a| mulh_add(mulh(a.u, re), a.v, im))
+            let (re, im) = law.gain(&shape, c, s);
+            axes.map(|a| a.turned(re, im))
         };
         self.finish(nominal, offset, flag::MOVING)
     }
 
-    /// End of a ramp: the phase is set to its exact value.
     #[inline(never)]
-    fn end_ramp(&mut self) -> Output {
-        if self.falling { self.standstill() } else { self.top() }
-    }
-
     fn top(&mut self) -> Output {
         let timing = self.segment.timing;
         self.set_phase(timing.up);
         let (nominal, offset) = self.steady_at(timing.up);
         self.left = timing.cruise_ticks;
-        self.mode = if self.segment.kind == Kind::Arc { Mode::ArcCruise } else { Mode::Cruise };
+        self.mode = Mode::Cruise;
         if self.left == 0 {
-            self.begin_fall(timing.end);
+            self.begin_fall();
         }
         self.finish(nominal, offset, flag::MOVING)
     }
 
+    #[inline(never)]
     fn standstill(&mut self) -> Output {
         self.set_phase(self.end);
         self.mode = Mode::Rest;
@@ -353,16 +385,14 @@ impl Executor {
         self.finish(self.rest_nm, self.rest_offset_nm, flag::MOVING)
     }
 
-    #[inline(never)]
-    fn begin_fall(&mut self, end: u64) {
+    fn begin_fall(&mut self) {
+        if self.segment.kind == Kind::Arc {
+            return self.begin_arc_fall();
+        }
         let timing = self.segment.timing;
-        self.mode = if self.segment.kind == Kind::Arc { Mode::ArcRamp } else { Mode::Ramp };
-        self.falling = true;
+        self.mode = Mode::Fall;
         self.left = timing.ramp_ticks;
         self.clock = Clock::falling(timing.clock_step);
-        self.end = end;
-        self.segment.law.turn_round();
-        // So that the sum of steps less half the last one is the phase.
         self.advance(timing.step >> 1);
     }
 
@@ -377,6 +407,7 @@ impl Executor {
             } else {
                 self.segment = next;
                 self.guard.set(next.offset_nm, next.slew_nm);
+                self.guard.watch(!self.engage.full());
                 let uncorrected = u32::from(!next.corrected);
                 self.counters.uncorrected = self.counters.uncorrected.wrapping_add(uncorrected);
                 self.mode = Mode::Settle;
@@ -416,10 +447,9 @@ impl Executor {
                 self.left = timing.cruise_ticks;
                 Mode::Dwell
             }
-            Kind::Arc => Mode::ArcRamp,
-            Kind::Line | Kind::Helix => Mode::Ramp,
+            Kind::Arc => Mode::ArcRise,
+            Kind::Line | Kind::Helix => Mode::Rise,
         };
-        self.falling = false;
         self.clock = Clock::rising(timing.clock_step);
         self.phase = timing.start;
         self.turns = 0;
@@ -482,10 +512,10 @@ impl Executor {
         (nominal, self.segment.axes.map(|a| a.steady(c, s)))
     }
 
-    /// Engagement, bounds, and out.
-    #[inline(always)]
+    #[inline(never)]
     fn finish(&mut self, nominal: [i32; 3], wanted: [i32; 3], flags: u16) -> Output {
         let wanted = self.engage.apply(wanted);
+        self.guard.watch(!self.engage.full());
         let (offset, verdict) = self.guard.pass(wanted);
         let mut flags = flags;
         if verdict.offset_cut | verdict.slew_cut {
@@ -493,13 +523,15 @@ impl Executor {
             self.counters.slew_cuts = self.counters.slew_cuts.wrapping_add(u32::from(verdict.slew_cut));
             flags |= flag::CUT;
         }
-        let ([nx, ny, nz], [ox, oy, oz]) = (nominal, offset);
-        Output {
-            nominal_nm: nominal,
-            corrected_nm: [nx.wrapping_add(ox), ny.wrapping_add(oy), nz.wrapping_add(oz)],
-            flags,
-        }
+        Output::new(nominal, offset, flags)
     }
+}
+
+/// Phase in a ramp from the sum of steps. ∫ of the rate is the trapezoidal sum less T²/12 of its derivative
+/// (Euler–Maclaurin); the next term is below 1e-5 of a step from 32 ticks up.
+#[inline(always)]
+fn ramp_phase(sum: u64, step: u64, end_term: i32) -> u32 {
+    ((sum >> 32) as u32).wrapping_sub((step >> 33) as u32).wrapping_sub(end_term as u32)
 }
 
 /// step·share, share in Q32.

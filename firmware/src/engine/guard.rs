@@ -37,30 +37,35 @@ impl Guard {
         *self = Self { last_nm: self.last_nm, ..Self::new(offset_nm, slew_nm) };
     }
 
+    /// While watched, nothing passes easily.
+    pub(crate) fn watch(&mut self, watched: bool) {
+        self.easy_offset_nm = if watched { 0 } else { easy(self.offset_nm) };
+    }
+
     /// The offset that passed last, nm.
     #[cfg(test)]
     pub(crate) const fn last_nm(&self) -> [i32; 3] {
         self.last_nm
     }
 
-    /// The offset that may go out, axis by axis.
+    /// Lets the offset pass unchanged if that is easily seen to be within the bounds.
     #[inline(always)]
-    pub(crate) fn pass(&mut self, wanted: [i32; 3]) -> ([i32; 3], Verdict) {
+    pub(crate) fn pass_easily(&mut self, wanted: [i32; 3]) -> bool {
         let ([x, y, z], [lx, ly, lz]) = (wanted, self.last_nm);
         // v or its ones' complement, whichever is not negative: below 2ⁿ if and only if −2ⁿ ≤ v < 2ⁿ.
         let size = |v: i32| (v ^ (v >> 31)) as u32;
         let change = |now: i32, last: i32| size(now.wrapping_sub(last));
         let offset = size(x) | size(y) | size(z);
         let slew = change(x, lx) | change(y, ly) | change(z, lz);
-        if offset >= self.easy_offset_nm || slew >= self.easy_slew_nm {
-            return self.cut(wanted);
+        let easy = offset < self.easy_offset_nm && slew < self.easy_slew_nm;
+        if easy {
+            self.last_nm = wanted;
         }
-        self.last_nm = wanted;
-        (wanted, Verdict::default())
+        easy
     }
 
-    #[inline(never)]
-    fn cut(&mut self, wanted: [i32; 3]) -> ([i32; 3], Verdict) {
+    /// The offset that may go out, axis by axis.
+    pub(crate) fn pass(&mut self, wanted: [i32; 3]) -> ([i32; 3], Verdict) {
         let mut verdict = Verdict::default();
         let mut passed = [0; 3];
         for ((out, want), last) in passed.iter_mut().zip(wanted).zip(self.last_nm) {
@@ -79,6 +84,17 @@ impl Guard {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_passes_easily_is_within_the_bounds() {
+        for v in [0, 511, -512, 512, -513, 1000, -1000, i32::MAX, i32::MIN] {
+            let mut guard = Guard::new(1000, i32::MAX);
+            let easy = guard.pass_easily([0, v, 0]);
+            assert_eq!(easy, (-512..512).contains(&v), "{v}");
+            assert_eq!(guard.last_nm()[1], if easy { v } else { 0 });
+        }
+        assert!(!Guard::new(0, 0).pass_easily([0; 3]));
+    }
 
     #[test]
     fn nothing_passes_beyond_its_bounds_and_everything_within_passes_unchanged() {

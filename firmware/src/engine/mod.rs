@@ -50,6 +50,15 @@ pub struct Output {
     pub flags: u16,
 }
 
+impl Output {
+    #[inline(always)]
+    fn new(nominal_nm: [i32; 3], offset_nm: [i32; 3], flags: u16) -> Self {
+        let ([nx, ny, nz], [ox, oy, oz]) = (nominal_nm, offset_nm);
+        let corrected_nm = [nx.wrapping_add(ox), ny.wrapping_add(oy), nz.wrapping_add(oz)];
+        Self { nominal_nm, corrected_nm, flags }
+    }
+}
+
 /// Why nothing runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
@@ -62,8 +71,6 @@ pub enum Fault {
 /// Counts since start; they wrap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct Counters {
-    /// Ticks.
-    pub ticks: u32,
     /// Segments finished.
     pub segments: u32,
     /// Segments begun for which no zone of the table holds.

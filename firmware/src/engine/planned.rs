@@ -50,6 +50,12 @@ impl Axis {
         (self.base.wrapping_add(i64::from(self.u).wrapping_mul(i64::from(share_q32))) >> 32) as i32
     }
 
+    /// A vector of the plane turned and scaled by re + i·im (Q31), nm: its coordinate on this axis.
+    #[inline(always)]
+    pub(crate) fn turned(&self, re: i32, im: i32) -> i32 {
+        mulh_add(mulh(self.u, re), self.v, im)
+    }
+
     /// Correction at constant rate, nm; at most 2 nm below exact (two floors), exactly 0 where there is none.
     #[inline(always)]
     pub(crate) fn steady(&self, c: i32, s: i32) -> i32 {
@@ -75,8 +81,8 @@ pub(crate) struct Timing {
 
 /// The operator in a ramp, in fixed point. `W` is the share of the constant rate.
 ///
-/// On an arc the complex gain δ + ib (Q32):
-/// δ = W²(k1 + k2 W²) + k3 W·xw³ + k4 w⁸, b = w⁴(k5 + k6 W²) + k7 w² + k8 w³.
+/// On an arc the complex gain δ + ib (Q32, |k| < 2³¹):
+/// δ = W²(k1 + k2 W²) + k3 W·xw³ + (k4 w⁴) w⁴, b = w⁴(k5 + k6 W²) + k7 w² + k8 w³.
 /// On a line the offset along it, nm·2: k5 w⁴ + k7 w² + k8 w³.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub(crate) struct Law {
@@ -86,32 +92,37 @@ pub(crate) struct Law {
     pub(crate) k2: i32,
     /// Q32.
     pub(crate) k3: i32,
-    /// Q32.
+    /// Q30.
     pub(crate) k4: i32,
-    /// Q34; on a line nm·2³.
+    /// Q33; on a line nm·2².
     pub(crate) k5: i32,
-    /// Q35.
+    /// Q34.
     pub(crate) k6: i32,
     /// Q30; on a line nm·2².
     pub(crate) k7: i32,
     /// Q31; on a line nm·2³.
     pub(crate) k8: i32,
-    /// What the sum of rates lacks of the phase (Euler–Maclaurin), units of 2⁻³² turn at w⁴ = 1, Q2.
-    pub(crate) end_term_q2: i32,
+    /// What the sum of rates lacks of the phase (Euler–Maclaurin), units of 2⁻³² turn at w⁴ = 1, Q1.
+    pub(crate) end_term_q1: i32,
 }
 
 impl Law {
     /// The law of the same ramp run backwards in time: odd derivatives change their sign.
-    pub(crate) fn turn_round(&mut self) {
-        for k in [&mut self.k5, &mut self.k6, &mut self.k7, &mut self.k8, &mut self.end_term_q2] {
-            *k = k.wrapping_neg();
+    pub(crate) const fn turned_round(self) -> Self {
+        Self {
+            k5: -self.k5,
+            k6: -self.k6,
+            k7: -self.k7,
+            k8: -self.k8,
+            end_term_q1: -self.end_term_q1,
+            ..self
         }
     }
 
     /// Euler–Maclaurin term, units of 2⁻³² turn.
     #[inline(always)]
     pub(crate) fn end_term(&self, f: &Shapes) -> i32 {
-        mulh(f.w4_q30, self.end_term_q2)
+        mulh(f.w4_q31, self.end_term_q1)
     }
 
     /// (δ + ib)(c + is) in Q31.
@@ -121,10 +132,9 @@ impl Law {
         let rate2 = mulh(rate, rate).wrapping_mul(2);
         let main = mulh(mulh_add(self.k1, self.k2, rate2), rate2);
         let jerk = mulh(rate, f.xw3_q29);
-        let acceleration2 = mulh(f.w4_q30, f.w4_q30);
-        let fine = mulh_add(mulh(self.k3, jerk), self.k4, acceleration2);
+        let fine = mulh_add(mulh(self.k3, jerk), mulh(self.k4, f.w4_q31), f.w4_q31);
         let radial = main.wrapping_add(fine.wrapping_mul(16));
-        let ahead = mulh(mulh_add(self.k5, self.k6, rate2), f.w4_q30);
+        let ahead = mulh(mulh_add(self.k5, self.k6, rate2), f.w4_q31);
         let snap = mulh_add(mulh(self.k7, f.w2_q31), self.k8, f.w3_q30);
         let tangential = ahead.wrapping_add(snap.wrapping_mul(8));
         (mulh_sub(mulh(radial, c), tangential, s), mulh_add(mulh(radial, s), tangential, c))
@@ -133,7 +143,7 @@ impl Law {
     /// Offset along a line, nm·2.
     #[inline(always)]
     pub(crate) fn along(&self, f: &Shapes) -> i32 {
-        mulh_add(mulh_add(mulh(self.k5, f.w4_q30), self.k7, f.w2_q31), self.k8, f.w3_q30)
+        mulh_add(mulh_add(mulh(self.k5, f.w4_q31), self.k7, f.w2_q31), self.k8, f.w3_q30)
     }
 }
 
@@ -141,7 +151,9 @@ impl Law {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct Planned {
     pub(crate) axes: [Axis; 3],
-    pub(crate) law: Law,
+    /// The law in the rising and in the falling ramp.
+    pub(crate) rise: Law,
+    pub(crate) fall: Law,
     pub(crate) timing: Timing,
     pub(crate) kind: Kind,
     /// A zone of the table applies.

@@ -211,17 +211,18 @@ impl Planner {
             *axis = Axis { base: base(from[i]), u: u_nm[i], v: to_fixed(direction[i], 31), a: 0, b: 0 };
         }
         segment.timing = timing;
-        segment.law.end_term_q2 = end_term(&timing);
+        segment.rise.end_term_q1 = end_term(&timing);
         if let Some((operator, limits)) = self.zone(None, feed, None) {
             let t = f64::from(ramp_ticks) * self.config.tick_s();
             let speed = timing.step as f64 / TURN * length / self.config.tick_s();
             let snap = operator.fourth_s4 * speed * THIRD / (t * t * t) * 1e9;
-            segment.law.k5 = to_fixed(operator.second_s2 * speed * FIRST / t * 1e9, 3);
-            segment.law.k7 = to_fixed(snap, 2);
-            segment.law.k8 = to_fixed(-7.0 / 6.0 * snap, 3);
+            segment.rise.k5 = to_fixed(operator.second_s2 * speed * FIRST / t * 1e9, 2);
+            segment.rise.k7 = to_fixed(snap, 2);
+            segment.rise.k8 = to_fixed(-7.0 / 6.0 * snap, 3);
             segment.corrected = true;
             (segment.offset_nm, segment.slew_nm) = limits;
         }
+        segment.fall = segment.rise.turned_round();
         segment.end_nm = to;
         self.position_nm = to;
         Ok(segment)
@@ -255,7 +256,7 @@ impl Planner {
             for _ in 0..6 {
                 let slower = timing(ramp);
                 if let Some((law, radial)) = self.law_on_arc(&operator, &slower) {
-                    (segment.law, segment.timing, segment.corrected) = (law, slower, true);
+                    (segment.rise, segment.timing, segment.corrected) = (law, slower, true);
                     (segment.offset_nm, segment.slew_nm) = limits;
                     for axis in &mut segment.axes {
                         axis.a = to_fixed(radial * f64::from(axis.u), 0);
@@ -267,7 +268,8 @@ impl Planner {
             }
         }
         segment.timing.clock_step = clock_step(segment.timing.ramp_ticks);
-        segment.law.end_term_q2 = end_term(&segment.timing);
+        segment.rise.end_term_q1 = end_term(&segment.timing);
+        segment.fall = segment.rise.turned_round();
         let at = |phase: u64| {
             let (c, s) = sincos((phase >> 32) as u32);
             segment.axes.map(|a| a.on_arc(c, s))
@@ -300,9 +302,9 @@ impl Planner {
             (-a * rate * rate, 33),
             (b * rate * rate * rate * rate, 34),
             (4.0 * b * rate * rate / (t * t) * SECOND, 32),
-            (-3.0 * b * (rate * FIRST / t) * (rate * FIRST / t), 32),
-            (a * rate * FIRST / t, 34),
-            (-6.0 * b * rate * rate * rate * FIRST / t, 35),
+            (-3.0 * b * (rate * FIRST / t) * (rate * FIRST / t), 30),
+            (a * rate * FIRST / t, 33),
+            (-6.0 * b * rate * rate * rate * FIRST / t, 34),
             (snap, 30),
             (-7.0 / 6.0 * snap, 31),
         ];
@@ -311,7 +313,7 @@ impl Planner {
             return None;
         }
         let [k1, k2, k3, k4, k5, k6, k7, k8] = k.map(|(k, bits)| to_fixed(k, bits));
-        Some((Law { k1, k2, k3, k4, k5, k6, k7, k8, end_term_q2: 0 }, steady.radial))
+        Some((Law { k1, k2, k3, k4, k5, k6, k7, k8, end_term_q1: 0 }, steady.radial))
     }
 
     /// Ramp and constant-rate ticks for a length at no more than a feed.
@@ -395,10 +397,10 @@ fn fits(zone: &Zone, circle: Option<([f64; 3], f64)>, feed: f64, ccw: Option<boo
     travel && place && radius && inside(feed, zone.feed_m_s)
 }
 
-/// ∫ of a ramp's rate exceeds its sum by T²/12 of the rate's derivative: step/N·S′/12, in units of 2⁻³² turn, Q2.
+/// ∫ of a ramp's rate exceeds its sum by T²/12 of the rate's derivative: step/N·S′/12, in units of 2⁻³² turn, Q1.
 fn end_term(timing: &Timing) -> i32 {
     let step_q32 = timing.step as f64 / 4_294_967_296.0;
-    to_fixed(step_q32 / f64::from(timing.ramp_ticks) * FIRST / 12.0, 2)
+    to_fixed(step_q32 / f64::from(timing.ramp_ticks) * FIRST / 12.0, 1)
 }
 
 /// Turns from start to end, whole ones included.

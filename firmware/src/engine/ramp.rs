@@ -32,8 +32,8 @@ pub(crate) struct Shapes {
     pub(crate) w2_q31: i32,
     /// w³, Q30.
     pub(crate) w3_q30: i32,
-    /// w⁴, Q30.
-    pub(crate) w4_q30: i32,
+    /// w⁴, Q31.
+    pub(crate) w4_q31: i32,
     /// x·w³, Q29.
     pub(crate) xw3_q29: i32,
 }
@@ -45,7 +45,7 @@ impl Shapes {
             s_q32: self.s_q32.saturating_sub(later.s_q32),
             w2_q31: self.w2_q31.wrapping_sub(later.w2_q31),
             w3_q30: self.w3_q30.wrapping_sub(later.w3_q30),
-            w4_q30: self.w4_q30.wrapping_sub(later.w4_q30),
+            w4_q31: self.w4_q31.wrapping_sub(later.w4_q31),
             xw3_q29: self.xw3_q29.wrapping_sub(later.xw3_q29),
         }
     }
@@ -67,7 +67,7 @@ pub(crate) fn shapes(p: &[i32; 5], x: i32) -> Shapes {
         s_q32: (half.wrapping_mul(32) as u32) ^ (1 << 31),
         w2_q31,
         w3_q30,
-        w4_q30: mulh(w2_q31, w2_q31),
+        w4_q31: mulh(w2_q31, w2_q31).wrapping_mul(2),
         xw3_q29: mulh(x, w3_q30),
     }
 }
@@ -129,7 +129,7 @@ mod tests {
             let s = smoothstep((f64::from(x) / 2f64.powi(31) + 1.0) / 2.0);
             let got = [
                 f64::from(f.s_q32) / 2f64.powi(32),
-                f64::from(f.w4_q30) / 2f64.powi(30) * FIRST,
+                f64::from(f.w4_q31) / 2f64.powi(31) * FIRST,
                 -f64::from(f.xw3_q29) / 2f64.powi(29) * SECOND,
                 (f64::from(f.w2_q31) / 2f64.powi(31) - 7.0 / 6.0 * f64::from(f.w3_q30) / 2f64.powi(30))
                     * THIRD,
