@@ -1,6 +1,7 @@
 //! giotto on the host: measure, fit, explain, deploy, prove. The binary is a thin face over this library.
 #![forbid(unsafe_code)]
 
+pub mod analysis;
 pub mod campaign;
 pub mod causes;
 pub mod cli;

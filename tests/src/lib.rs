@@ -2,7 +2,8 @@
 //!
 //! [`machine`] moves in the time domain and shares nothing with the simulation under test; [`effects`]
 //! hides known errors in it, scaled to a wanted misfit; [`files`] writes such campaigns with their truth;
-//! [`study`] judges what `diagnose` makes of them.
+//! [`command`] runs the real binary; [`study`] judges what `diagnose` makes of them.
+pub mod command;
 pub mod effects;
 pub mod files;
 pub mod machine;

@@ -172,14 +172,20 @@ pub(super) fn unit_hint(relative: f64) -> String {
     }
 }
 
-/// Measured against programmed duration of one turn, for files with angles of their own.
-pub(super) fn feed(entry: &Entry, turn_s: f64, notes: &mut Vec<Note>) -> Result<(), CampaignError> {
+/// Measured over programmed duration of one turn, refused where only a wrong unit explains it.
+pub(super) fn slowness(entry: &Entry, turn_s: f64) -> Result<f64, CampaignError> {
     let programmed_s = TAU * entry.radius_m / entry.feed_m_s;
     let ratio = turn_s / programmed_s;
     if !(1.0 / LONGEST_TURN..=LONGEST_TURN).contains(&ratio) {
         let problem = Problem::TooLong { measured_s: turn_s, programmed_s, hint: duration_hint(ratio) };
         return Err(CampaignError::new(Place::at(&entry.path, 2, 1), problem));
     }
+    Ok(ratio)
+}
+
+/// Measured against programmed feed, for files with angles of their own.
+pub(super) fn feed(entry: &Entry, turn_s: f64, notes: &mut Vec<Note>) -> Result<(), CampaignError> {
+    let ratio = slowness(entry, turn_s)?;
     if ratio < 0.97 {
         notes.push(fast(entry, ratio));
     }
@@ -193,16 +199,10 @@ pub(super) fn duration(
     deviation: &[f64],
     notes: &mut Vec<Note>,
 ) -> Result<Option<u32>, CampaignError> {
-    let programmed_s = TAU * entry.radius_m / entry.feed_m_s;
-    let ratio = turn_s / programmed_s;
-    let at = Place::at(&entry.path, deviation.len() + 1, 1);
-    if !(1.0 / LONGEST_TURN..=LONGEST_TURN).contains(&ratio) {
-        let problem = Problem::TooLong { measured_s: turn_s, programmed_s, hint: duration_hint(ratio) };
-        return Err(CampaignError::new(at, problem));
-    }
+    let ratio = slowness(entry, turn_s)?;
     if ratio < SHORTEST_TURN {
-        let problem = Problem::TooShort { measured_s: turn_s, programmed_s, share: ratio };
-        return Err(CampaignError::new(at, problem));
+        let problem = Problem::TooShort { measured_s: turn_s, programmed_s: turn_s / ratio, share: ratio };
+        return Err(CampaignError::new(Place::at(&entry.path, deviation.len() + 1, 1), problem));
     }
     if ratio < 0.97 {
         notes.push(fast(entry, ratio));
@@ -229,9 +229,9 @@ fn fast(entry: &Entry, ratio: f64) -> Note {
 fn duration_hint(ratio: f64) -> String {
     let near = |factor: f64| (ratio / factor - 1.0).abs() < 0.2;
     if near(1e3) {
-        "1000 times as long, as if time were in ms, the feed in m/s or the radius in m".to_owned()
+        "1000 times as long, as if time were in ms, the radius in m or the feed in µm/s".to_owned()
     } else if near(1e-3) {
-        "1000 times shorter, as if the radius were in µm or the feed in µm/s".to_owned()
+        "1000 times shorter, as if the feed were in m/s or the radius in µm".to_owned()
     } else if near(60.0) {
         "60 times as long, as if the feed were in mm/min".to_owned()
     } else if near(1.0 / 60.0) {
@@ -259,7 +259,7 @@ fn repeats(deviation: &[f64], laps: usize) -> bool {
         }
         2.0 / m * f64::hypot(c, s)
     };
-    let noise = 6.0 * scatter(&used) * (2.0 / m).sqrt();
+    let noise = 6.0 * sample_noise(&used) * (2.0 / m).sqrt();
     let all: Vec<(usize, f64)> = (1..=8 * laps).map(|order| (order, amplitude(order))).collect();
     let strongest = |multiple: bool| {
         all.iter().filter(|(o, _)| o.is_multiple_of(laps) == multiple).map(|(_, a)| *a).fold(0.0, f64::max)
@@ -268,25 +268,29 @@ fn repeats(deviation: &[f64], laps: usize) -> bool {
     own > noise && (other <= noise || other < 0.02 * own)
 }
 
-/// Standard deviation of the sample noise from second differences, robust.
-pub(super) fn scatter(values: &[f64]) -> f64 {
-    if values.len() < 3 {
+/// Standard deviation of white noise on a smooth sequence: the root mean square of the smaller nine tenths of the
+/// second differences, so that steps, spikes and outliers do not enter.
+pub fn sample_noise(values: &[f64]) -> f64 {
+    const SHARE: f64 = 0.9;
+    // ∫x²φ(x)dx over the central nine tenths of N(0, 1), over 0.9: 1 − 2zφ(z)/0.9 at z = 1.644854.
+    const TRIMMED_VARIANCE: f64 = 0.623_016;
+    if values.len() < 12 {
         return 0.0;
     }
-    let stride = (values.len() - 2).div_ceil(1 << 14);
-    let mut second: Vec<f64> = (1..values.len() - 1)
+    let stride = (values.len() - 2).div_ceil(1 << 15);
+    let mut squares: Vec<f64> = (1..values.len() - 1)
         .step_by(stride)
-        .map(|k| (values[k + 1] - 2.0 * values[k] + values[k - 1]).abs())
+        .map(|k| (values[k + 1] - 2.0 * values[k] + values[k - 1]).powi(2))
         .collect();
-    let middle = second.len() / 2;
-    let (_, median, _) = second.select_nth_unstable_by(middle, f64::total_cmp);
-    // Median of |N(0, σ)| is 0.6745 σ; the second difference of white noise has variance 6σ².
-    *median / (0.674_489_75 * 6f64.sqrt())
+    let kept = (squares.len() as f64 * SHARE).round() as usize;
+    squares.select_nth_unstable_by(kept - 1, f64::total_cmp);
+    // The second difference of white noise has variance 6σ².
+    (squares[..kept].iter().sum::<f64>() / kept as f64 / TRIMMED_VARIANCE / 6.0).sqrt()
 }
 
 /// Identity of a measurement by its noise: two runs of a machine never share it.
 pub(super) fn fingerprint(deviation: &[f64]) -> Option<u64> {
-    if scatter(deviation) < SMALLEST_NOISE_M {
+    if sample_noise(deviation) < SMALLEST_NOISE_M {
         return None;
     }
     let mix = |h: u64, v: &f64| (h ^ v.to_bits()).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29);

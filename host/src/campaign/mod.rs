@@ -18,6 +18,7 @@ mod table;
 mod tests;
 mod write;
 
+pub use check::sample_noise;
 pub use error::{CampaignError, Place, Problem};
 pub use giotto_shared::Direction;
 pub use manifest::{Entry, Manifest, SHORTEST_ARC_DEG};

@@ -21,6 +21,8 @@ pub struct Loaded {
     pub turn_s: Option<f64>,
     /// What the reader should know.
     pub notes: Vec<Note>,
+    /// Number of samples; stays when the samples themselves are dropped.
+    pub rows: usize,
     /// Several laps are likely: how many. A slowed-down controller looks the same in one run.
     pub(super) laps: Option<u32>,
     /// Identifies the noise of the measurement; `None` where there is none.
@@ -93,6 +95,9 @@ pub(super) fn load(entry: &Entry, keep_time: bool) -> Result<Loaded, CampaignErr
     } else if let Some((field, deviation)) =
         take(&mut table, |c| matches!(c, Column::Deviation(_) | Column::Radius))
     {
+        if let (Some((clock, ..)), None) = (&clock, table.index(|c| c == Column::Angle)) {
+            check::slowness(entry, clock.turn_s)?; // a wrong radius explains more than a wrong deviation
+        }
         run.samples.deviation_m = deviations(entry, table.header[field], field, deviation)?;
         if let Some((_, mut angle)) = take(&mut table, |c| c == Column::Angle) {
             angle.iter_mut().for_each(|a| *a = a.to_radians());
@@ -143,7 +148,8 @@ fn finish(
 ) -> Result<Loaded, CampaignError> {
     let fingerprint = check::fingerprint(&run.samples.deviation_m);
     run.samples.time_s = time;
-    Ok(Loaded { run, frame, turn_s, notes, laps, fingerprint })
+    let rows = run.samples.deviation_m.len();
+    Ok(Loaded { rows, run, frame, turn_s, notes, laps, fingerprint })
 }
 
 fn take(table: &mut Table, wanted: impl Fn(Column) -> bool) -> Option<(usize, Vec<f64>)> {

@@ -1,11 +1,119 @@
 //! `giotto analyze`: least-squares circle, radius size error, out-of-roundness, harmonics, ISO 230-4 of each run.
 use super::{Failure, Output};
+use crate::analysis::{self, Document, Harmonic, Report};
+use crate::campaign::{CampaignError, Direction, Manifest};
+use comfy_table::{CellAlignment, Table, presets};
+use std::path::PathBuf;
 
 /// Arguments of `giotto analyze`.
 #[derive(clap::Args, Debug)]
-pub struct Args {}
+pub struct Args {
+    /// Directory of the campaign.
+    campaign: PathBuf,
+}
 
 /// Runs the command.
-pub fn run(_args: Args, _out: Output) -> Result<(), Failure> {
-    Err(Failure::usage("giotto analyze is not in this build"))
+pub fn run(args: Args, out: Output) -> Result<(), Failure> {
+    let manifest = Manifest::open(&args.campaign)?;
+    let bar = if out.draws() {
+        indicatif::ProgressBar::new(manifest.runs.len() as u64).with_message("runs")
+    } else {
+        indicatif::ProgressBar::hidden()
+    };
+    let report = analysis::of_files(&manifest, || bar.inc(1));
+    bar.finish_and_clear();
+    let report = report?;
+    report.notes.iter().for_each(|note| out.note(note));
+    if out.json {
+        return out.document(&Document::of(&report));
+    }
+    show(&report, out);
+    Ok(())
+}
+
+impl From<CampaignError> for Failure {
+    fn from(error: CampaignError) -> Self {
+        let help = error.help();
+        Self::input(error).help(help)
+    }
+}
+
+fn table(header: &[&str]) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING).set_header(header.iter().copied());
+    for (k, column) in table.column_iter_mut().enumerate() {
+        column.set_cell_alignment(if k == 0 { CellAlignment::Left } else { CellAlignment::Right });
+    }
+    table
+}
+
+fn um(si: f64) -> String {
+    format!("{:.1}", si * 1e6)
+}
+
+fn show(report: &Report, out: Output) {
+    let title = [&report.name, &report.machine].map(String::as_str).join(" — ");
+    out.say(format_args!("{title}: {} runs", report.runs.len()));
+    out.say("");
+    let mut runs = table(&[
+        "run",
+        "R mm",
+        "feed mm/s",
+        "",
+        "measured",
+        "ΔR µm",
+        "±95 %",
+        "roundness µm",
+        "2θ",
+        "3θ",
+        "4θ",
+        "noise µm",
+        "centre mm",
+    ]);
+    for run in &report.runs {
+        let size = |order: usize| {
+            let found = run.harmonics.iter().find(|h| h.order == order);
+            found.map_or_else(|| "–".to_owned(), |h: &Harmonic| um(h.cos_m.hypot(h.sin_m)))
+        };
+        let arc = run.arc_rad.map_or_else(String::new, |a| format!(" ({:.0}°)", a.to_degrees()));
+        runs.add_row([
+            format!("{}{arc}", run.file),
+            format!("{}", (run.radius_m * 1e6).round() / 1e3),
+            format!("{}", (run.feed_m_s * 1e6).round() / 1e3),
+            if run.direction == Direction::Ccw { "ccw" } else { "cw" }.to_owned(),
+            run.measured_feed_m_s.map_or_else(|| "–".to_owned(), |f| format!("{:.1}", f * 1e3)),
+            um(run.radius_error_m),
+            format!("{:.2}", 1.96 * run.radius_error_se_m * 1e6),
+            um(run.out_of_roundness_m),
+            size(2),
+            size(3),
+            size(4),
+            format!("{:.2}", run.noise_m * 1e6),
+            format!("{:.3} {:.3}", run.centre_m[0] * 1e3, run.centre_m[1] * 1e3),
+        ]);
+    }
+    out.say(runs);
+    for (run, frame) in report.runs.iter().zip(&report.frames) {
+        if let Some(plane) = frame.and_then(|f| f.plane) {
+            let (tilt, flat) = (plane.tilt_rad.to_degrees(), plane.flatness_m * 1e6);
+            out.say(format_args!("{}: plane tilted by {tilt:.3}°, flat within {flat:.1} µm", run.file));
+        }
+    }
+    out.say("");
+    out.say("ISO 230-4, µm (G about the least-squares circle, F from the nominal circle as centred, D of both directions)");
+    let mut iso = table(&["R mm", "feed mm/s", "G cw", "G ccw", "G(b)", "F max", "F min", "D"]);
+    let maybe = |v: Option<f64>| v.map_or_else(|| "–".to_owned(), um);
+    for row in &report.iso230_4 {
+        iso.add_row([
+            format!("{}", (row.radius_m * 1e6).round() / 1e3),
+            format!("{}", (row.feed_m_s * 1e6).round() / 1e3),
+            maybe(row.g_cw_m),
+            maybe(row.g_ccw_m),
+            maybe(row.g_b_m),
+            um(row.f_max_m),
+            um(row.f_min_m),
+            maybe(row.d_m),
+        ]);
+    }
+    out.say(iso);
 }

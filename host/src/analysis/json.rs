@@ -1,0 +1,123 @@
+//! The contract's JSON of `analyze`. Units end the names; what a run does not have is `null`.
+use super::{Iso230, Report, RunAnalysis};
+use crate::campaign::{Direction, Frame};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// The document.
+#[derive(Debug, Serialize)]
+pub struct Document {
+    runs: Vec<RunEntry>,
+    iso230_4: Vec<IsoEntry>,
+}
+
+#[derive(Debug, Serialize)]
+struct RunEntry {
+    file: String,
+    radius_mm: f64,
+    feed_mm_s: f64,
+    direction: Direction,
+    measured_feed_mm_s: Option<f64>,
+    centre_mm: [f64; 2],
+    radius_error_um: f64,
+    radius_error_se_um: f64,
+    out_of_roundness_um: f64,
+    harmonics_um: BTreeMap<usize, Coefficients>,
+    noise_um: f64,
+    samples: usize,
+    /// Only for runs that do not cover the turn.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    arc_deg: Option<f64>,
+    /// Only for files with z.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    plane: Option<PlaneEntry>,
+}
+
+#[derive(Debug, Serialize)]
+struct Coefficients {
+    cos: f64,
+    sin: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct PlaneEntry {
+    centre_mm: [f64; 3],
+    normal: [f64; 3],
+    tilt_deg: f64,
+    flatness_um: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct IsoEntry {
+    radius_mm: f64,
+    feed_mm_s: f64,
+    g_cw_um: Option<f64>,
+    g_ccw_um: Option<f64>,
+    g_b_um: Option<f64>,
+    f_max_um: f64,
+    f_min_um: f64,
+    d_um: Option<f64>,
+}
+
+/// Radii and feeds were written in mm; 0.1 m × 1e3 must not become 100.00000000000001.
+fn mm(si: f64) -> f64 {
+    (si * 1e12).round() / 1e9
+}
+
+fn um(si: f64) -> f64 {
+    si * 1e6
+}
+
+impl Document {
+    /// The document of a report.
+    pub fn of(report: &Report) -> Self {
+        Self {
+            runs: report.runs.iter().zip(&report.frames).map(|(r, f)| run(r, f.as_ref())).collect(),
+            iso230_4: report.iso230_4.iter().map(iso).collect(),
+        }
+    }
+}
+
+fn run(run: &RunAnalysis, frame: Option<&Frame>) -> RunEntry {
+    RunEntry {
+        file: run.file.clone(),
+        radius_mm: mm(run.radius_m),
+        feed_mm_s: mm(run.feed_m_s),
+        direction: run.direction,
+        measured_feed_mm_s: run.measured_feed_m_s.map(|f| f * 1e3),
+        centre_mm: run.centre_m.map(|c| c * 1e3),
+        radius_error_um: um(run.radius_error_m),
+        radius_error_se_um: um(run.radius_error_se_m),
+        out_of_roundness_um: um(run.out_of_roundness_m),
+        harmonics_um: run
+            .harmonics
+            .iter()
+            .map(|h| (h.order, Coefficients { cos: um(h.cos_m), sin: um(h.sin_m) }))
+            .collect(),
+        noise_um: um(run.noise_m),
+        samples: run.samples,
+        arc_deg: run.arc_rad.map(f64::to_degrees),
+        plane: frame.and_then(|f| {
+            let plane = f.plane?;
+            Some(PlaneEntry {
+                centre_mm: f.origin_m.map(|c| c * 1e3),
+                normal: plane.normal,
+                tilt_deg: plane.tilt_rad.to_degrees(),
+                flatness_um: um(plane.flatness_m),
+            })
+        }),
+    }
+}
+
+fn iso(iso: &Iso230) -> IsoEntry {
+    IsoEntry {
+        radius_mm: mm(iso.radius_m),
+        feed_mm_s: mm(iso.feed_m_s),
+        g_cw_um: iso.g_cw_m.map(um),
+        g_ccw_um: iso.g_ccw_m.map(um),
+        g_b_um: iso.g_b_m.map(um),
+        f_max_um: um(iso.f_max_m),
+        f_min_um: um(iso.f_min_m),
+        d_um: iso.d_m.map(um),
+    }
+}

@@ -1,0 +1,28 @@
+//! What each run shows by itself: circle, size, form, noise, feed; and pairs of directions by ISO 230-4.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `points` | polar samples as points of the plane, walked in parallel |
+//! | `run` | one run: least-squares circle, harmonics, noise |
+//! | `harmonics` | least-squares Fourier coefficients at any spacing |
+//! | `iso230` | G, G(b), F, D of a pair of runs |
+//! | `parity` | even and odd part of a pair |
+//! | `report` | whole campaigns, in memory or from files |
+//! | `json` | the contract's document |
+mod harmonics;
+mod iso230;
+mod json;
+mod parity;
+mod points;
+mod report;
+mod run;
+#[cfg(test)]
+mod tests;
+
+pub use harmonics::{HIGHEST_ORDER, Harmonic};
+pub use iso230::{Iso230, pairs};
+pub use json::Document;
+pub use parity::{EvenOdd, even_odd, profile};
+pub use points::Polar;
+pub use report::{Report, of_campaign, of_files};
+pub use run::{RunAnalysis, of_run};

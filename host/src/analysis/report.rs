@@ -1,0 +1,132 @@
+//! Whole campaigns.
+use super::iso230::{self, Iso230, Kept};
+use super::run::{RunAnalysis, of_run};
+use crate::campaign::{
+    Campaign, CampaignError, Frame, Loaded, Manifest, Note, Place, Problem, Run, Together,
+};
+use giotto_shared::circle::CircleError;
+use rayon::prelude::*;
+
+/// Analysis of a campaign.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    /// Name of the campaign.
+    pub name: String,
+    /// Machine under test.
+    pub machine: String,
+    /// One entry a run, in file order.
+    pub runs: Vec<RunAnalysis>,
+    /// One entry a pair, in order of first appearance.
+    pub iso230_4: Vec<Iso230>,
+    /// Where the circles of files with positions lie, by run.
+    pub frames: Vec<Option<Frame>>,
+    /// What the reader should know.
+    pub notes: Vec<Note>,
+}
+
+/// Analysis of a campaign in memory.
+///
+/// # Errors
+/// A run through which no circle goes, by index.
+pub fn of_campaign(campaign: &Campaign) -> Result<Report, (usize, CircleError)> {
+    let runs: Result<Vec<_>, _> = campaign
+        .runs
+        .par_iter()
+        .enumerate()
+        .map(|(index, run)| of_run(run, None).map_err(|error| (index, error)))
+        .collect();
+    let runs = runs?;
+    let groups = iso230::pairs(campaign.runs.iter().map(of));
+    let keep = |run: &Run| Kept::of(run.samples.angle_rad.clone(), run.samples.deviation_m.clone());
+    let iso: Vec<Vec<Iso230>> = groups
+        .par_iter()
+        .map(|group| {
+            let pair = |[cw, ccw]: &[Option<usize>; 2]| {
+                let [a, b] = [cw, ccw].map(|i| i.map(|i| (&runs[i], keep(&campaign.runs[i]))));
+                iso230::of_pair(a.as_ref().map(|(r, k)| (*r, k)), b.as_ref().map(|(r, k)| (*r, k)))
+            };
+            group.iter().filter_map(pair).collect()
+        })
+        .collect();
+    let frames = vec![None; runs.len()];
+    let (name, machine) = (campaign.name.clone(), campaign.machine.clone());
+    Ok(Report { name, machine, runs, iso230_4: iso.concat(), frames, notes: Vec::new() })
+}
+
+fn of(run: &Run) -> (f64, f64, crate::campaign::Direction) {
+    (run.radius_m, run.feed_m_s, run.direction)
+}
+
+/// What is left of a run when its samples are gone.
+struct Done {
+    index: usize,
+    analysis: RunAnalysis,
+    kept: Kept,
+    loaded: Loaded,
+}
+
+/// A pair: its figures and its runs.
+type Pair = (Option<Iso230>, Vec<Done>);
+
+/// Analysis of a campaign on disk: each pair of runs is read, analysed and forgotten, so that memory does not
+/// grow with the samples. `progress` is called after each run.
+///
+/// # Errors
+/// As [`crate::campaign::read`].
+pub fn of_files(manifest: &Manifest, progress: impl Fn() + Sync) -> Result<Report, CampaignError> {
+    let groups = iso230::pairs(manifest.runs.iter().map(|r| (r.radius_m, r.feed_m_s, r.direction)));
+    let pairs: Vec<[Option<usize>; 2]> = groups.concat();
+    let one = |index: usize| -> Result<Done, (usize, CampaignError)> {
+        let mut loaded = manifest.load(index).map_err(|e| (index, e))?;
+        let mut analysis = of_run(&loaded.run, loaded.turn_s).map_err(|e| {
+            let at = Place::at(&manifest.runs[index].path, 2, 1);
+            (index, CampaignError::new(at, Problem::NoCircle { reason: e.to_string() }))
+        })?;
+        if let Some(frame) = loaded.frame {
+            analysis.centre_m =
+                [frame.origin_m[0] + analysis.centre_m[0], frame.origin_m[1] + analysis.centre_m[1]];
+        }
+        let samples = &mut loaded.run.samples;
+        let kept = Kept::of(std::mem::take(&mut samples.angle_rad), std::mem::take(&mut samples.deviation_m));
+        progress();
+        Ok(Done { index, analysis, kept, loaded })
+    };
+    let done: Vec<Result<Pair, (usize, CampaignError)>> = pairs
+        .par_iter()
+        .map(|pair| {
+            let [cw, ccw] = pair.map(|i| i.map(one).transpose());
+            let both = [cw?, ccw?];
+            let [a, b] = [0, 1].map(|i: usize| both[i].as_ref().map(|d| (&d.analysis, &d.kept)));
+            let iso = iso230::of_pair(a, b);
+            let rest = both.into_iter().flatten().map(|d| Done { kept: Kept::default(), ..d }).collect();
+            Ok((iso, rest))
+        })
+        .collect();
+    // The first problem in file order, whichever pair met it.
+    if let Some((_, error)) = done.iter().filter_map(|r| r.as_ref().err()).min_by_key(|(index, _)| *index) {
+        return Err(error.clone());
+    }
+    let mut together = Together::new(manifest);
+    let (mut iso, mut runs) = (Vec::new(), Vec::new());
+    for (pair, rest) in done.into_iter().flatten() {
+        iso.extend(pair);
+        runs.extend(rest);
+    }
+    runs.sort_by_key(|d| d.index);
+    runs.iter().for_each(|d| together.add(d.index, &d.loaded));
+    together.check()?;
+    let mut report = Report {
+        name: manifest.name.clone(),
+        machine: manifest.machine.clone(),
+        runs: Vec::with_capacity(runs.len()),
+        iso230_4: iso,
+        frames: Vec::with_capacity(runs.len()),
+        notes: manifest.notes.clone(),
+    };
+    for done in runs {
+        report.runs.push(done.analysis);
+        report.frames.push(done.loaded.frame);
+        report.notes.extend(done.loaded.notes);
+    }
+    Ok(report)
+}
