@@ -7,4 +7,5 @@ pub mod command;
 pub mod effects;
 pub mod files;
 pub mod machine;
+pub mod paper;
 pub mod study;
