@@ -31,9 +31,9 @@ fn subtracting_one_noisy_run_makes_the_intervals_too_narrow() {
 fn printed_numbers_that_follow_from_the_printed_model_do_and_the_others_do_not() {
     assert!((critical_f(0.05, 1, 24).unwrap() - 4.26).abs() < 0.005);
     let f = follows().unwrap();
-    // A scatter between runs that gives the printed F1 exists, and it is one that a robot has …
-    assert!((1.0..3.0).contains(&f.scatter_um.unwrap()), "{F1}: {f:?}");
-    // … but F2 is then three times the printed one and F2/1 half as much again: the paper's feeds were others.
+    // A scatter between runs that gives the printed F1 is as large as the bound of 4 µm on every residual …
+    assert!((4.0..5.0).contains(&f.scatter_um.unwrap()), "{F1}: {f:?}");
+    // … and F2 is then three times the printed one, F2/1 half as much again: the paper's feeds were others.
     assert!(f.f2 > 3.0 * F2 && f.f21 > 1.4 * F21, "{f:?}");
     // Table 1's intervals cannot be those of f²/R and f⁴/R³ over these feeds, whatever the scatter: a ratio has no scatter in it.
     assert!((HALF_BETA1 / HALF_BETA2 - 16.0).abs() < 0.1);
