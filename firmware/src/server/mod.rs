@@ -264,8 +264,8 @@ impl<F: NorFlash, M: Motion> Server<F, M> {
             slots: [self.store.state(0), self.store.state(1)],
             probation: self.probation,
             tick: now.tick,
-            raw_m: now.raw_m,
-            corrected_m: now.corrected_m,
+            raw_nm: now.raw_nm,
+            corrected_nm: now.corrected_nm,
             counters: Counters {
                 tick_overruns: now.tick_overruns,
                 offset_clamps: now.offset_clamps,

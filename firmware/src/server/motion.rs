@@ -9,10 +9,10 @@ pub struct Snapshot {
     pub state: MotionState,
     /// Ticks since boot, wrapping.
     pub tick: u32,
-    /// Programmed position, m.
-    pub raw_m: Pose,
-    /// Corrected position, m.
-    pub corrected_m: Pose,
+    /// Programmed position, nm.
+    pub raw_nm: Pose,
+    /// Corrected position, nm.
+    pub corrected_nm: Pose,
     /// Ticks that were not finished when the next was due.
     pub tick_overruns: u32,
     /// Set-points whose offset was clamped.

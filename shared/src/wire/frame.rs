@@ -4,7 +4,7 @@ use super::CRC;
 use serde::Serialize;
 
 /// Longest payload: the largest message is a batch of set-points.
-pub const MAX_PAYLOAD: usize = 192;
+pub const MAX_PAYLOAD: usize = 208;
 /// Length of the CRC.
 const CRC_BYTES: usize = 4;
 /// Longest content of a frame before COBS.

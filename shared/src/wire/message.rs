@@ -241,8 +241,8 @@ pub struct Counters {
     pub lost_bytes: u32,
 }
 
-/// A position in the plane of the path and along its normal, m.
-pub type Pose = [f32; 3];
+/// A position, nm: whole numbers, so that a set-point is on the host what it was in the tick.
+pub type Pose = [i32; 3];
 
 /// The controller's state.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -259,10 +259,10 @@ pub struct Status {
     pub probation: Probation,
     /// Ticks since boot, wrapping.
     pub tick: u32,
-    /// Programmed position, m.
-    pub raw_m: Pose,
-    /// Corrected position, m.
-    pub corrected_m: Pose,
+    /// Programmed position, nm.
+    pub raw_nm: Pose,
+    /// Corrected position, nm.
+    pub corrected_nm: Pose,
     /// Counts.
     pub counters: Counters,
 }
@@ -270,10 +270,10 @@ pub struct Status {
 /// A set-point before and after the correction.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SetPoint {
-    /// Programmed position, m.
-    pub raw_m: Pose,
-    /// Corrected position, m.
-    pub corrected_m: Pose,
+    /// Programmed position, nm.
+    pub raw_nm: Pose,
+    /// Corrected position, nm.
+    pub corrected_nm: Pose,
 }
 
 /// Consecutive set-points.

@@ -35,8 +35,8 @@ impl Motion for Bench {
         Snapshot {
             state: self.state,
             tick: 0,
-            raw_m: [0.0; 3],
-            corrected_m: [0.0; 3],
+            raw_nm: [0; 3],
+            corrected_nm: [0; 3],
             tick_overruns: 0,
             offset_clamps: 0,
             slew_clamps: 0,

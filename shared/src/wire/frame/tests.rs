@@ -53,8 +53,8 @@ fn largest_messages_fit() {
         slots: [slot; 2],
         probation: Probation::FirstRun,
         tick: most,
-        raw_m: [1.0; 3],
-        corrected_m: [1.0; 3],
+        raw_nm: [i32::MIN; 3],
+        corrected_nm: [i32::MIN; 3],
         counters: Counters {
             tick_overruns: most,
             offset_clamps: most,
@@ -67,7 +67,7 @@ fn largest_messages_fit() {
             lost_bytes: most,
         },
     }));
-    let point = SetPoint { raw_m: [1.0; 3], corrected_m: [1.0; 3] };
+    let point = SetPoint { raw_nm: [i32::MIN; 3], corrected_nm: [i32::MIN; 3] };
     framed(&FromController::SetPoints(SetPoints {
         index: most,
         tick: most,
