@@ -25,9 +25,24 @@ impl<F: NorFlash, M: Motion> Server<F, M> {
                 break;
             }
         }
-        while let Some(frame) = self.set_points() {
-            link.write_all(frame)?;
+        if self.on_link {
+            while let Some(frame) = self.set_points() {
+                link.write_all(frame)?;
+            }
         }
         link.flush()
+    }
+
+    /// Sends the set-points that are due to the board's own port for them, unless the link has asked for them.
+    ///
+    /// # Errors
+    /// Those of the port.
+    pub fn stream<L: Write>(&mut self, port: &mut L) -> Result<(), L::Error> {
+        if !self.on_link {
+            while let Some(frame) = self.set_points() {
+                port.write_all(frame)?;
+            }
+        }
+        port.flush()
     }
 }

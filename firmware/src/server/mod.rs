@@ -20,7 +20,8 @@ use embedded_storage::nor_flash::NorFlash;
 use giotto_shared::table::{FORMAT_VERSION, MAX_IMAGE_BYTES, SCHEMA_HASH, bounds};
 use giotto_shared::wire::{
     self, Accumulator, CHUNK, Chunk, CircleRun, Command, Counters, FromController, Identity, MAX_FRAME,
-    MotionRefusal, MotionState, PROTOCOL_VERSION, Probation, Refusal, Reply, RunField, SetPoints, Status,
+    MotionRefusal, MotionState, PROTOCOL_VERSION, Probation, Refusal, Reply, RunField, SET_POINTS, SetPoints,
+    Status,
 };
 use session::{Session, Turn};
 use upload::Upload;
@@ -56,9 +57,10 @@ pub struct Server<F, M> {
     probation: Probation,
     /// Asked for by the host; without a table the engine is in bypass anyway.
     bypass: bool,
-    /// Set-points sent in this run.
-    sent: u32,
     every: u16,
+    on_link: bool,
+    /// A set-point that does not continue the batch before it.
+    held: Option<TimedSetPoint>,
     lost_bytes: u32,
     reset: bool,
     frame: [u8; MAX_FRAME],
@@ -81,8 +83,9 @@ impl<F: NorFlash, M: Motion> Server<F, M> {
             written: None,
             probation: Probation::None,
             bypass: false,
-            sent: 0,
             every: 0,
+            on_link: false,
+            held: None,
             lost_bytes: 0,
             reset: false,
             frame: [0; MAX_FRAME],
@@ -147,25 +150,30 @@ impl<F: NorFlash, M: Motion> Server<F, M> {
         self.session.answer(head, reply)
     }
 
-    /// The next frame of set-points for a subscriber, if one is due.
-    pub fn set_points(&mut self) -> Option<&[u8]> {
-        let first = self.motion.next_set_point()?;
-        let mut batch = SetPoints {
-            index: self.sent,
-            tick: first.tick,
-            every: self.every,
-            last: first.last,
-            points: heapless::Vec::new(),
-        };
-        let _ = batch.points.push(first.point);
-        while !batch.last && !batch.points.is_full() {
-            let Some(next) = self.motion.next_set_point() else { break };
-            batch.last = next.last;
-            let _ = batch.points.push(next.point);
+    /// The next frame of set-points, once it is full or the run has ended.
+    fn set_points(&mut self) -> Option<&[u8]> {
+        let moving = matches!(self.motion.snapshot().state, MotionState::Running | MotionState::Stopping);
+        if moving && self.motion.set_points_waiting() < SET_POINTS {
+            return None;
         }
-        self.sent = self.sent.wrapping_add(batch.points.len() as u32);
-        let message = FromController::SetPoints(batch);
-        wire::encode(&message, &mut self.frame).ok().map(|frame| &*frame)
+        let first = self.held.take().or_else(|| self.motion.next_set_point())?;
+        let (tick, every) = (first.tick, self.every);
+        let mut batch = SetPoints { tick, every, last: first.last, points: heapless::Vec::new() };
+        let mut due = first.tick;
+        let mut next = Some(first);
+        while let Some(point) = next.take() {
+            if point.tick != due {
+                self.held = Some(point);
+                break;
+            }
+            batch.last = point.last;
+            due = due.wrapping_add(u32::from(every));
+            if batch.points.push(point.point).is_err() || batch.points.is_full() || batch.last {
+                break;
+            }
+            next = self.motion.next_set_point();
+        }
+        wire::encode(&FromController::SetPoints(batch), &mut self.frame).ok().map(|frame| &*frame)
     }
 
     fn execute(&mut self, command: Command) -> Result<Reply, Refusal> {
@@ -188,10 +196,7 @@ impl<F: NorFlash, M: Motion> Server<F, M> {
             }
             Command::RunCircle(run) => self.run_circle(&run)?,
             Command::Stop => self.motion.stop(),
-            Command::Subscribe { every } => {
-                self.every = every;
-                self.motion.subscribe(every);
-            }
+            Command::Subscribe { every, on_link } => self.subscribe(every, on_link),
             Command::Reset => {
                 self.idle()?;
                 self.reset = true;
@@ -199,6 +204,12 @@ impl<F: NorFlash, M: Motion> Server<F, M> {
             Command::Provision { .. } => return Err(Refusal::NoSignatures),
         }
         Ok(Reply::Done)
+    }
+
+    /// Sends every so many ticks' set-point, on the link or on the port for set-points; 0: none.
+    pub fn subscribe(&mut self, every: u16, on_link: bool) {
+        (self.every, self.on_link) = (every, on_link);
+        self.motion.subscribe(every);
     }
 
     fn idle(&self) -> Result<(), Refusal> {
@@ -234,7 +245,6 @@ impl<F: NorFlash, M: Motion> Server<F, M> {
             return Err(Refusal::ProbationOver);
         }
         self.motion.run_circle(run).map_err(Refusal::Motion)?;
-        self.sent = 0;
         if self.probation == Probation::Fresh {
             self.probation = Probation::FirstRun;
         }

@@ -60,6 +60,9 @@ pub trait Motion {
     /// Gives every so many ticks' set-point of a run to [`Motion::next_set_point`]; 0: none.
     fn subscribe(&mut self, every: u16);
 
+    /// Set-points that wait to be taken.
+    fn set_points_waiting(&self) -> usize;
+
     /// The oldest set-point not yet taken.
     fn next_set_point(&mut self) -> Option<TimedSetPoint>;
 }

@@ -76,6 +76,8 @@ pub enum Command {
     Subscribe {
         /// Ticks from one set-point to the next.
         every: u16,
+        /// On the link between replies; otherwise on the board's own port for set-points.
+        on_link: bool,
     },
     /// Warm reset, when idle.
     Reset,
@@ -279,9 +281,7 @@ pub struct SetPoint {
 /// Consecutive set-points.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SetPoints {
-    /// Set-points sent since the run began before these: a gap shows a loss.
-    pub index: u32,
-    /// Tick of the first.
+    /// Tick of the first; a gap to the batch before shows a loss.
     pub tick: u32,
     /// Ticks from one to the next.
     pub every: u16,

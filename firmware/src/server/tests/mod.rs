@@ -68,6 +68,10 @@ impl Motion for Bench {
 
     fn subscribe(&mut self, _: u16) {}
 
+    fn set_points_waiting(&self) -> usize {
+        0
+    }
+
     fn next_set_point(&mut self) -> Option<TimedSetPoint> {
         None
     }

@@ -69,7 +69,6 @@ fn largest_messages_fit() {
     }));
     let point = SetPoint { raw_nm: [i32::MIN; 3], corrected_nm: [i32::MIN; 3] };
     framed(&FromController::SetPoints(SetPoints {
-        index: most,
         tick: most,
         every: u16::MAX,
         last: true,
