@@ -1,0 +1,131 @@
+//! Words that the tick writes and the background reads, and the other way round.
+use crate::engine::{Counters, Output};
+use crate::server::Snapshot;
+use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU8, AtomicU16, AtomicU32, Ordering::Relaxed};
+use core::sync::atomic::{Ordering, compiler_fence};
+use giotto_shared::wire::MotionState;
+
+/// State of the engine as the tick leaves it, and wishes of the background. On one core, so that a
+/// compiler fence orders what the interrupt writes.
+#[derive(Debug)]
+pub struct Shared {
+    // Written by the tick.
+    tick: AtomicU32,
+    state: AtomicU8,
+    epoch: AtomicU8,
+    raw_nm: [AtomicI32; 3],
+    corrected_nm: [AtomicI32; 3],
+    overruns: AtomicU32,
+    offset_cuts: AtomicU32,
+    slew_cuts: AtomicU32,
+    dropped: AtomicU32,
+    // Written by the background.
+    pub(super) bypass: AtomicBool,
+    pub(super) stop: AtomicBool,
+    pub(super) every: AtomicU16,
+    // Written by the board.
+    pub(super) stop_input: AtomicBool,
+}
+
+impl Default for Shared {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+const REST: u8 = 0;
+const RUNNING: u8 = 1;
+const STOPPING: u8 = 2;
+const FAULT: u8 = 3;
+
+impl Shared {
+    /// At rest at the origin, bypassed.
+    pub const fn new() -> Self {
+        const NM: AtomicI32 = AtomicI32::new(0);
+        Self {
+            tick: AtomicU32::new(0),
+            state: AtomicU8::new(REST),
+            epoch: AtomicU8::new(0),
+            raw_nm: [NM; 3],
+            corrected_nm: [NM; 3],
+            overruns: AtomicU32::new(0),
+            offset_cuts: AtomicU32::new(0),
+            slew_cuts: AtomicU32::new(0),
+            dropped: AtomicU32::new(0),
+            bypass: AtomicBool::new(true),
+            stop: AtomicBool::new(false),
+            every: AtomicU16::new(0),
+            stop_input: AtomicBool::new(false),
+        }
+    }
+
+    /// The board's stop input: a run under way stops within limits, from the next tick on.
+    pub fn press_stop(&self) {
+        self.stop_input.store(true, Relaxed);
+    }
+
+    /// Publishes a tick.
+    pub(super) fn publish(&self, tick: u32, state: MotionState, epoch: u8, output: &Output, counters: &Counters) {
+        let state = match state {
+            MotionState::Idle => REST,
+            MotionState::Running => RUNNING,
+            MotionState::Stopping => STOPPING,
+            MotionState::Fault => FAULT,
+        };
+        self.state.store(state, Relaxed);
+        self.epoch.store(epoch, Relaxed);
+        for (word, nm) in self.raw_nm.iter().zip(output.nominal_nm) {
+            word.store(nm, Relaxed);
+        }
+        for (word, nm) in self.corrected_nm.iter().zip(output.corrected_nm) {
+            word.store(nm, Relaxed);
+        }
+        self.overruns.store(counters.overruns, Relaxed);
+        self.offset_cuts.store(counters.offset_cuts, Relaxed);
+        self.slew_cuts.store(counters.slew_cuts, Relaxed);
+        compiler_fence(Ordering::Release);
+        self.tick.store(tick, Relaxed);
+    }
+
+    /// Counts a set-point that found no room.
+    pub(super) fn drop_one(&self) {
+        self.dropped.store(self.dropped.load(Relaxed).wrapping_add(1), Relaxed);
+    }
+
+    /// Epoch of the executor after the last tick.
+    pub(super) fn epoch(&self) -> u8 {
+        self.epoch.load(Relaxed)
+    }
+
+    /// All words of one tick: read again if a tick came between.
+    pub(super) fn snapshot(&self) -> Snapshot {
+        loop {
+            let tick = self.tick.load(Relaxed);
+            compiler_fence(Ordering::Acquire);
+            let snapshot = self.read(tick);
+            compiler_fence(Ordering::Acquire);
+            if self.tick.load(Relaxed) == tick {
+                return snapshot;
+            }
+        }
+    }
+
+    fn read(&self, tick: u32) -> Snapshot {
+        let place = |words: &[AtomicI32; 3]| words.each_ref().map(|word| word.load(Relaxed));
+        Snapshot {
+            state: match self.state.load(Relaxed) {
+                REST => MotionState::Idle,
+                RUNNING => MotionState::Running,
+                STOPPING => MotionState::Stopping,
+                _ => MotionState::Fault,
+            },
+            tick,
+            raw_nm: place(&self.raw_nm),
+            corrected_nm: place(&self.corrected_nm),
+            tick_overruns: self.overruns.load(Relaxed),
+            offset_clamps: self.offset_cuts.load(Relaxed),
+            slew_clamps: self.slew_cuts.load(Relaxed),
+            dropped_set_points: self.dropped.load(Relaxed),
+        }
+    }
+}

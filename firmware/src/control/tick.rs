@@ -1,0 +1,117 @@
+//! The interrupt's half: one tick of the executor, its wishes before and its report after.
+use super::ports::{Receiver, Sender};
+use super::shared::Shared;
+use crate::engine::{Executor, Inbox, Output, Planned};
+use crate::server::TimedSetPoint;
+use core::ops::Deref;
+use core::sync::atomic::Ordering::Relaxed;
+use giotto_shared::wire::{MotionState, SetPoint};
+
+/// What the timer interrupt owns.
+pub struct Tick<S, I, O> {
+    executor: Executor,
+    shared: S,
+    segments: Segments<I>,
+    set_points: O,
+    now: u32,
+    bypass: bool,
+    /// Ticks to the next set-point of the record; 0: none is being made.
+    until_next: u16,
+    recording: bool,
+}
+
+/// The queue, as the executor wants it.
+struct Segments<I>(I);
+
+impl<I: Receiver<Planned>> Inbox for Segments<I> {
+    #[inline]
+    fn take(&mut self) -> Option<Planned> {
+        self.0.receive()
+    }
+}
+
+impl<S, I, O> Tick<S, I, O>
+where
+    S: Deref<Target = Shared>,
+    I: Receiver<Planned>,
+    O: Sender<TimedSetPoint>,
+{
+    /// At rest at the origin, bypassed.
+    pub fn new(executor: Executor, shared: S, segments: I, set_points: O) -> Self {
+        let segments = Segments(segments);
+        Self { executor, shared, segments, set_points, now: 0, bypass: true, until_next: 1, recording: false }
+    }
+
+    /// Once a period. Takes the wishes of the background, lets the executor make one set-point and reports it;
+    /// the executor states the timing contract. `late`: the last tick was not finished when this one was due.
+    #[inline]
+    pub fn tick(&mut self, late: bool) -> Output {
+        self.wishes(late);
+        let output = self.executor.tick(&mut self.segments);
+        self.now = self.now.wrapping_add(1);
+        let state = self.state();
+        self.record(&output, state);
+        self.shared.publish(self.now, state, self.executor.epoch(), &output, self.executor.counters());
+        output
+    }
+
+    #[inline]
+    fn wishes(&mut self, late: bool) {
+        if late {
+            self.executor.overrun();
+        }
+        if self.shared.stop.load(Relaxed) || self.shared.stop_input.load(Relaxed) {
+            self.shared.stop.store(false, Relaxed);
+            self.shared.stop_input.store(false, Relaxed);
+            self.executor.stop();
+        }
+        let bypass = self.shared.bypass.load(Relaxed);
+        if bypass != self.bypass {
+            self.bypass = bypass;
+            self.executor.set_bypass(bypass);
+        }
+    }
+
+    #[inline]
+    fn state(&self) -> MotionState {
+        let at_rest = self.executor.idle() && self.segments.0.waiting() == 0;
+        if !at_rest {
+            if self.executor.stopping() { MotionState::Stopping } else { MotionState::Running }
+        } else if self.executor.fault().is_some() {
+            MotionState::Fault
+        } else {
+            MotionState::Idle
+        }
+    }
+
+    /// Hands every so many ticks' set-point to the background, from the first of a run to the first after it.
+    #[inline]
+    fn record(&mut self, output: &Output, state: MotionState) {
+        let every = self.shared.every.load(Relaxed);
+        let moving = matches!(state, MotionState::Running | MotionState::Stopping);
+        if every == 0 {
+            self.recording = false;
+            return;
+        }
+        if !self.recording {
+            if !moving {
+                return;
+            }
+            self.recording = true;
+            self.until_next = 1;
+        }
+        self.until_next = self.until_next.wrapping_sub(1);
+        if self.until_next != 0 {
+            return;
+        }
+        self.until_next = every;
+        let (raw_nm, corrected_nm) = (output.nominal_nm, output.corrected_nm);
+        let point = SetPoint { raw_nm, corrected_nm };
+        let timed = TimedSetPoint { tick: self.now, point, last: !moving };
+        match self.set_points.send(timed) {
+            // The last one is tried again: without it the reader would wait for ever.
+            Ok(()) => self.recording = moving,
+            Err(_) => self.shared.drop_one(),
+        }
+    }
+}

@@ -1,0 +1,233 @@
+//! Requests and replies. Each request is repeated until it is answered; the controller sees to it that it
+//! happens once.
+use super::error::ControllerError;
+use super::link::Link;
+use giotto_shared::table::SCHEMA_HASH;
+use giotto_shared::wire::{
+    self, Accumulator, CHUNK, Command, FromController, Identity, MAX_FRAME, PROTOCOL_VERSION, Reply, Request,
+    SetPoints, Status,
+};
+use std::time::Duration;
+
+/// After so long without an answer a request is sent again.
+const REPEAT_AFTER: Duration = Duration::from_millis(300);
+/// After so long the controller is given up: erasing the sector of a large flash takes up to 2 s.
+const GIVE_UP_AFTER: Duration = Duration::from_secs(5);
+/// As above, for the first request: who does not answer now will not.
+const GIVE_UP_HELLO_AFTER: Duration = Duration::from_secs(3);
+
+/// A controller on the other end of a link, its session open.
+pub struct Controller {
+    link: Box<dyn Link>,
+    name: String,
+    accumulator: Accumulator,
+    session: u16,
+    seq: u16,
+    /// Bytes received and not yet looked at.
+    pending: std::collections::VecDeque<u8>,
+    pub(super) set_points: Vec<SetPoints>,
+    identity: Identity,
+    repeats: u32,
+}
+
+impl std::fmt::Debug for Controller {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Controller").field("port", &self.name).field("identity", &self.identity).finish()
+    }
+}
+
+/// What came in: the answer waited for, or a batch of set-points that has been put away.
+enum Arrival {
+    Reply(Reply),
+    SetPoints,
+}
+
+impl Controller {
+    /// Opens a session over `link`; `session` should differ from client to client.
+    ///
+    /// # Errors
+    /// [`ControllerError::NoAnswer`], [`ControllerError::OtherProtocol`], [`ControllerError::OtherSchema`].
+    pub fn connect(link: Box<dyn Link>, name: &str, session: u16) -> Result<Self, ControllerError> {
+        let nobody = Identity {
+            board: heapless::String::new(),
+            build: heapless::String::new(),
+            protocol: 0,
+            table_format: 0,
+            schema_hash: 0,
+            max_image_bytes: 0,
+            tick_hz: 0,
+            signed_only: false,
+        };
+        let mut controller = Self {
+            link,
+            name: name.to_owned(),
+            accumulator: Accumulator::new(),
+            session,
+            seq: 0,
+            pending: std::collections::VecDeque::new(),
+            set_points: Vec::new(),
+            identity: nobody,
+            repeats: 0,
+        };
+        controller.hello()?;
+        Ok(controller)
+    }
+
+    fn hello(&mut self) -> Result<(), ControllerError> {
+        let Reply::Identity(identity) = self.exchange(Command::Hello, GIVE_UP_HELLO_AFTER)? else {
+            return Err(ControllerError::WrongReply);
+        };
+        let (port, theirs) = (self.name.clone(), identity.protocol);
+        if theirs != PROTOCOL_VERSION {
+            return Err(ControllerError::OtherProtocol { port, theirs, ours: PROTOCOL_VERSION });
+        }
+        let theirs = identity.schema_hash;
+        if theirs != SCHEMA_HASH {
+            return Err(ControllerError::OtherSchema { port, theirs, ours: SCHEMA_HASH });
+        }
+        self.identity = identity;
+        Ok(())
+    }
+
+    /// Who it is.
+    pub const fn identity(&self) -> &Identity {
+        &self.identity
+    }
+
+    /// The name it was opened by.
+    pub fn port(&self) -> &str {
+        &self.name
+    }
+
+    /// Requests that had to be sent again, so far.
+    pub const fn repeats(&self) -> u32 {
+        self.repeats
+    }
+
+    /// State and slots.
+    ///
+    /// # Errors
+    /// [`ControllerError::NoAnswer`], [`ControllerError::Lost`].
+    pub fn status(&mut self) -> Result<Status, ControllerError> {
+        match self.ask(Command::Status)? {
+            Reply::Status(status) => Ok(status),
+            _ => Err(ControllerError::WrongReply),
+        }
+    }
+
+    /// A command that is answered by "done".
+    ///
+    /// # Errors
+    /// [`ControllerError::Refused`] and those of the link.
+    pub fn command(&mut self, command: Command) -> Result<(), ControllerError> {
+        match self.ask(command)? {
+            Reply::Done => Ok(()),
+            _ => Err(ControllerError::WrongReply),
+        }
+    }
+
+    /// The first `length` bytes of a slot.
+    ///
+    /// # Errors
+    /// [`ControllerError::Refused`] and those of the link.
+    pub fn read_slot(&mut self, slot: u8, length: usize) -> Result<Vec<u8>, ControllerError> {
+        let mut bytes = Vec::with_capacity(length);
+        while bytes.len() < length {
+            let offset = u16::try_from(bytes.len()).map_err(|_| ControllerError::WrongReply)?;
+            let piece = (length - bytes.len()).min(CHUNK);
+            match self.ask(Command::ReadBack { slot, offset, length: piece as u8 })? {
+                Reply::Data { offset: at, data } if at == offset && data.len() == piece => bytes.extend(data),
+                _ => return Err(ControllerError::WrongReply),
+            }
+        }
+        Ok(bytes)
+    }
+
+    /// Warm reset; returns when the controller answers again.
+    ///
+    /// # Errors
+    /// [`ControllerError::Refused`] while a run is in progress; [`ControllerError::NoAnswer`].
+    pub fn reset(&mut self) -> Result<(), ControllerError> {
+        self.command(Command::Reset)?;
+        self.set_points.clear();
+        self.hello()
+    }
+
+    /// Asks, repeats, and returns the answer.
+    pub(super) fn ask(&mut self, command: Command) -> Result<Reply, ControllerError> {
+        self.exchange(command, GIVE_UP_AFTER)
+    }
+
+    fn exchange(&mut self, command: Command, give_up_after: Duration) -> Result<Reply, ControllerError> {
+        self.seq = self.seq.wrapping_add(1);
+        let request = Request { session: self.session, seq: self.seq, command };
+        let mut buffer = [0; MAX_FRAME];
+        let frame = wire::encode(&request, &mut buffer).map_err(|_| ControllerError::WrongReply)?.to_vec();
+        let give_up_at = self.link.now() + give_up_after;
+        let mut attempts = 0;
+        while attempts == 0 || self.link.now() < give_up_at {
+            self.repeats += u32::from(attempts > 0);
+            attempts += 1;
+            // A zero first: it closes whatever a disturbed line has left open.
+            self.send(&[0])?;
+            self.send(&frame)?;
+            let until = give_up_at.min(self.link.now() + REPEAT_AFTER);
+            while let Some(arrival) = self.arrival(until)? {
+                if let Arrival::Reply(reply) = arrival {
+                    return match reply {
+                        Reply::Refused(refusal) => Err(ControllerError::Refused(refusal)),
+                        reply => Ok(reply),
+                    };
+                }
+            }
+        }
+        Err(ControllerError::NoAnswer { port: self.name.clone(), waited: give_up_after })
+    }
+
+    /// Waits for a batch of set-points (put away in `set_points`); `false`: none came in time.
+    pub(super) fn wait_for_set_points(&mut self, time: Duration) -> Result<bool, ControllerError> {
+        let until = self.link.now() + time;
+        while let Some(arrival) = self.arrival(until)? {
+            if matches!(arrival, Arrival::SetPoints) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> Result<(), ControllerError> {
+        self.link.send(bytes).map_err(|error| lost(&self.name, &error))
+    }
+
+    /// The next message that is for us.
+    fn arrival(&mut self, until: Duration) -> Result<Option<Arrival>, ControllerError> {
+        loop {
+            while let Some(byte) = self.pending.pop_front() {
+                let Some(payload) = self.accumulator.push(byte) else { continue };
+                match postcard::from_bytes(payload) {
+                    Ok(FromController::Reply { session, seq, reply })
+                        if session == self.session && seq == self.seq =>
+                    {
+                        return Ok(Some(Arrival::Reply(reply)));
+                    }
+                    Ok(FromController::SetPoints(batch)) => {
+                        self.set_points.push(batch);
+                        return Ok(Some(Arrival::SetPoints));
+                    }
+                    // An answer to an earlier request that was sent twice, or a message of another build.
+                    Ok(FromController::Reply { .. }) | Err(_) => {}
+                }
+            }
+            let mut buffer = [0; 4096];
+            let count = self.link.receive(&mut buffer, until).map_err(|error| lost(&self.name, &error))?;
+            if count == 0 {
+                return Ok(None);
+            }
+            self.pending.extend(&buffer[..count]);
+        }
+    }
+}
+
+fn lost(port: &str, error: &std::io::Error) -> ControllerError {
+    ControllerError::Lost { port: port.to_owned(), reason: error.to_string() }
+}

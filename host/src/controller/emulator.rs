@@ -1,0 +1,207 @@
+//! The firmware image in QEMU: UART0 on a pty, as a serial device would be, UART1 on a socket.
+use super::error::ControllerError;
+use super::image::{self, Board};
+use super::link::Link;
+use super::serial::SerialLink;
+use std::io::{self, BufRead, BufReader};
+use std::os::unix::net::UnixStream;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc;
+use std::time::Duration;
+use tempfile::TempDir;
+
+/// Name of the emulator's program; `GIOTTO_QEMU` names another.
+const PROGRAM: &str = "qemu-system-arm";
+/// How long it may take to say where its pty is.
+const START_TIME: Duration = Duration::from_secs(10);
+
+/// How fast time goes in the emulator.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pace {
+    /// Time counts instructions and skips over waiting: faster than the clock, and the same every time.
+    Fast,
+    /// By the clock on the wall.
+    Clock,
+}
+
+/// An emulator that runs an image; dropped, it is ended.
+#[derive(Debug)]
+pub struct Emulator {
+    process: Child,
+    pty: String,
+    folder: TempDir,
+}
+
+fn program() -> String {
+    std::env::var("GIOTTO_QEMU").unwrap_or_else(|_| PROGRAM.to_owned())
+}
+
+impl Emulator {
+    /// Starts the image at `image`, or the workspace's for QEMU's mps2-an386.
+    ///
+    /// # Errors
+    /// [`ControllerError::NoEmulator`], [`ControllerError::NoImage`], [`ControllerError::Emulator`].
+    pub fn start(
+        image: Option<&Path>,
+        pace: Pace,
+        note: &mut dyn FnMut(&str),
+    ) -> Result<Self, ControllerError> {
+        Self::start_board(Board::Mps2An386, image, pace, note)
+    }
+
+    /// As [`Emulator::start`], for any board.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn start_board(
+        board: Board,
+        image: Option<&Path>,
+        pace: Pace,
+        note: &mut dyn FnMut(&str),
+    ) -> Result<Self, ControllerError> {
+        let program = program();
+        let found = Command::new(&program).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
+        if found.is_err() {
+            return Err(ControllerError::NoEmulator { program });
+        }
+        let image = match image {
+            Some(path) if path.is_file() => path.to_owned(),
+            Some(path) => {
+                let reason = "no such file".to_owned();
+                return Err(ControllerError::NoImage { path: path.to_owned(), reason });
+            }
+            None => image::ensure(board, note)?,
+        };
+        let folder = tempfile::Builder::new().prefix("giotto-qemu-").tempdir().map_err(|e| failed(&e))?;
+        let mut command = Command::new(&program);
+        command.args(["-machine", board.machine(), "-nographic", "-monitor", "none", "-kernel"]).arg(&image);
+        command.args(["-serial", "pty"]);
+        for name in ["uart1", "uart2"] {
+            let path = folder.path().join(name);
+            command.arg("-chardev").arg(format!("socket,id={name},path={},server=on,wait=off", path.display()));
+            command.args(["-serial", &format!("chardev:{name}")]);
+        }
+        if pace == Pace::Fast {
+            // 32 ns for an instruction, about what the 25 MHz of the board allow.
+            command.args(["-icount", "shift=5,sleep=off,align=off"]);
+        }
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut process = command.spawn().map_err(|error| failed(&error))?;
+        match find_pty(&mut process) {
+            Ok(pty) => Ok(Self { process, pty, folder }),
+            Err(error) => {
+                end(&mut process);
+                Err(error)
+            }
+        }
+    }
+
+    /// Path of the pty that is UART0.
+    pub fn pty(&self) -> &str {
+        &self.pty
+    }
+
+    /// Path of the socket that is UART1, where set-points stream.
+    pub fn stream_path(&self) -> PathBuf {
+        self.folder.path().join("uart1")
+    }
+
+    /// Connects to UART1.
+    ///
+    /// # Errors
+    /// Those of the socket.
+    pub fn stream(&self) -> io::Result<UnixStream> {
+        UnixStream::connect(self.stream_path())
+    }
+
+    /// Connects to UART2, where the log goes in defmt's encoding.
+    ///
+    /// # Errors
+    /// Those of the socket.
+    pub fn log(&self) -> io::Result<UnixStream> {
+        UnixStream::connect(self.folder.path().join("uart2"))
+    }
+
+    /// Waits until the emulator ends by itself.
+    ///
+    /// # Errors
+    /// Those of the system.
+    pub fn wait(&mut self) -> io::Result<()> {
+        self.process.wait().map(drop)
+    }
+
+    /// Opens UART0; the emulator ends with the link.
+    ///
+    /// # Errors
+    /// Those of [`SerialLink::open`].
+    pub fn into_link(self) -> Result<EmulatorLink, ControllerError> {
+        let serial = SerialLink::open(&self.pty, super::port::BAUD)?;
+        Ok(EmulatorLink { serial, _emulator: self })
+    }
+}
+
+fn end(process: &mut Child) {
+    // It may have ended by itself; then there is nothing to do.
+    let _ = process.kill();
+    let _ = process.wait();
+}
+
+impl Drop for Emulator {
+    fn drop(&mut self) {
+        end(&mut self.process);
+    }
+}
+
+fn failed(error: &io::Error) -> ControllerError {
+    ControllerError::Emulator { reason: error.to_string() }
+}
+
+/// Reads "char device redirected to PATH (label serial0)".
+fn find_pty(process: &mut Child) -> Result<String, ControllerError> {
+    let (sender, lines) = mpsc::channel();
+    let readers: [Option<Box<dyn io::Read + Send>>; 2] = [
+        process.stdout.take().map(|pipe| Box::new(pipe) as _),
+        process.stderr.take().map(|pipe| Box::new(pipe) as _),
+    ];
+    for reader in readers.into_iter().flatten() {
+        let sender = sender.clone();
+        std::thread::spawn(move || {
+            // Read to the end, so that the emulator never waits for a full pipe.
+            for line in BufReader::new(reader).lines().map_while(Result::ok) {
+                let _ = sender.send(line);
+            }
+        });
+    }
+    drop(sender);
+    let mut words = Vec::new();
+    while let Ok(line) = lines.recv_timeout(START_TIME) {
+        let path = line.strip_prefix("char device redirected to ").and_then(|rest| rest.split(' ').next());
+        if let Some(path) = path {
+            return Ok(path.to_owned());
+        }
+        words.push(line);
+    }
+    let reason = if words.is_empty() { "it says nothing".to_owned() } else { words.join("; ") };
+    Err(ControllerError::Emulator { reason })
+}
+
+/// UART0 of an emulator, which lives as long as this.
+pub struct EmulatorLink {
+    serial: SerialLink,
+    _emulator: Emulator,
+}
+
+impl Link for EmulatorLink {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.serial.send(bytes)
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], until: Duration) -> io::Result<usize> {
+        self.serial.receive(buffer, until)
+    }
+
+    fn now(&self) -> Duration {
+        self.serial.now()
+    }
+}

@@ -1,0 +1,176 @@
+//! A table onto a controller, and the proof that it is there.
+use super::client::Controller;
+use super::error::ControllerError;
+use giotto_shared::table::{self, Header};
+use giotto_shared::wire::{CHUNK, CRC, Chunk, Command, FlashFault, Refusal, Reply, SlotState, Status, TableInfo};
+
+/// How often an upload begins anew before it is given up.
+const UPLOADS: u32 = 3;
+
+/// How far a flash has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    /// Bytes sent of bytes in all.
+    Sent(usize, usize),
+    /// Programmed into the slot.
+    Programmed,
+    /// Read back and equal.
+    ReadBack,
+    /// In use, on probation.
+    Committed,
+    /// It is the one that boots.
+    Confirmed,
+}
+
+/// A table that is on the controller for good.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Flashed {
+    /// Its slot.
+    pub slot: u8,
+    /// Its generation.
+    pub generation: u32,
+    /// CRC-32 of its image.
+    pub crc: u32,
+    /// Bytes of its image.
+    pub bytes: usize,
+}
+
+/// Whether the controller corrects with a given table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// Byte for byte.
+    Same {
+        /// Its slot.
+        slot: u8,
+    },
+    /// The table in use is another one.
+    Differs {
+        /// Slot of the table in use.
+        slot: u8,
+        /// First byte that differs.
+        offset: usize,
+    },
+    /// No table is in use.
+    None,
+}
+
+/// What is known of the slot whose table is in use.
+pub fn active_table(status: &Status) -> Option<(u8, TableInfo)> {
+    let slot = status.active?;
+    match status.slots.get(usize::from(slot)) {
+        Some(SlotState::Table(info)) => Some((slot, *info)),
+        _ => None,
+    }
+}
+
+impl Controller {
+    /// Writes the image to the slot not in use, reads it back, commits and confirms. Until the last step a
+    /// reset brings the old table back.
+    ///
+    /// # Errors
+    /// [`ControllerError::Table`] if the image is no table (nothing is sent then), [`ControllerError::Refused`],
+    /// [`ControllerError::ReadBack`], those of the link. The old table is then in use, or returns at the next boot.
+    pub fn flash(
+        &mut self,
+        image: &[u8],
+        progress: &mut dyn FnMut(Progress),
+    ) -> Result<Flashed, ControllerError> {
+        table::decode(image)?;
+        let slot = self.write(image, progress)?;
+        self.read_back(slot, image)?;
+        progress(Progress::ReadBack);
+        self.command(Command::Commit)?;
+        progress(Progress::Committed);
+        self.command(Command::Confirm)?;
+        progress(Progress::Confirmed);
+        let crc = Header::read(image)?.crc;
+        match active_table(&self.status()?) {
+            Some((active, TableInfo { generation: Some(generation), crc: theirs, .. }))
+                if active == slot && theirs == crc =>
+            {
+                Ok(Flashed { slot, generation, crc, bytes: image.len() })
+            }
+            _ => Err(ControllerError::ReadBack { slot, offset: 0 }),
+        }
+    }
+
+    /// Uploads and programs, without committing; returns the slot.
+    ///
+    /// # Errors
+    /// [`ControllerError::Refused`], those of the link.
+    pub fn write(
+        &mut self,
+        image: &[u8],
+        progress: &mut dyn FnMut(Progress),
+    ) -> Result<u8, ControllerError> {
+        let mut attempt = 1;
+        loop {
+            match self.try_write(image, progress) {
+                // Something got between the chunks of this upload: begin again.
+                Err(ControllerError::Refused(
+                    Refusal::NoUpload | Refusal::OutOfOrder { .. } | Refusal::UploadIncomplete,
+                )) if attempt < UPLOADS => attempt += 1,
+                result => return result,
+            }
+        }
+    }
+
+    fn try_write(
+        &mut self,
+        image: &[u8],
+        progress: &mut dyn FnMut(Progress),
+    ) -> Result<u8, ControllerError> {
+        let max = self.identity().max_image_bytes;
+        let length = u16::try_from(image.len()).ok().filter(|length| *length <= max);
+        let length = length.ok_or(ControllerError::Refused(Refusal::UploadTooLong { max }))?;
+        self.command(Command::WriteBegin { length, crc: CRC.checksum(image) })?;
+        for (index, piece) in image.chunks(CHUNK).enumerate() {
+            let sent = index * CHUNK;
+            progress(Progress::Sent(sent, image.len()));
+            let data = Chunk::from_slice(piece).map_err(|_| ControllerError::WrongReply)?;
+            self.command(Command::WriteChunk { offset: sent as u16, data })?;
+        }
+        progress(Progress::Sent(image.len(), image.len()));
+        match self.ask(Command::WriteEnd)? {
+            Reply::Written { slot } => {
+                progress(Progress::Programmed);
+                Ok(slot)
+            }
+            _ => Err(ControllerError::WrongReply),
+        }
+    }
+
+    fn read_back(&mut self, slot: u8, image: &[u8]) -> Result<(), ControllerError> {
+        let back = self.read_slot(slot, image.len())?;
+        match first_difference(&back, image) {
+            None => Ok(()),
+            Some(offset) => Err(ControllerError::ReadBack { slot, offset }),
+        }
+    }
+
+    /// Compares the table in use with an image, byte for byte as it is in flash.
+    ///
+    /// # Errors
+    /// Those of the link.
+    pub fn verify(&mut self, image: &[u8]) -> Result<Verdict, ControllerError> {
+        let Some((slot, info)) = active_table(&self.status()?) else { return Ok(Verdict::None) };
+        let stored = self.read_slot(slot, usize::from(info.length))?;
+        Ok(match first_difference(&stored, image) {
+            None => Verdict::Same { slot },
+            Some(offset) => Verdict::Differs { slot, offset },
+        })
+    }
+}
+
+fn first_difference(a: &[u8], b: &[u8]) -> Option<usize> {
+    let differs = a.iter().zip(b).position(|(a, b)| a != b);
+    differs.or_else(|| (a.len() != b.len()).then(|| a.len().min(b.len())))
+}
+
+/// Whether a refusal means that the flash itself is at fault.
+pub fn is_flash_fault(error: &ControllerError) -> Option<FlashFault> {
+    match error {
+        ControllerError::Refused(Refusal::Flash(fault)) => Some(*fault),
+        _ => None,
+    }
+}

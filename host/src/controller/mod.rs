@@ -1,0 +1,28 @@
+//! The client side of the wire: opening a port, the virtual controller, the emulated image, and what is done
+//! with them.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`client`] | requests and replies over any [`link`](link::Link): status, slots, runs |
+//! | [`flash`] | a table onto a controller, and the proof that it is there |
+//! | [`recording`] | circles run, set-points received |
+//! | [`port`] | what `--port` may name, and opening it |
+//! | [`serial`] | a serial device |
+//! | [`virtual_controller`] | the firmware's library in this process, in simulated time, or behind a pty |
+//! | [`emulator`] | the firmware image in QEMU |
+//! | [`image`] | finding or building that image |
+pub mod client;
+pub mod emulator;
+pub mod error;
+pub mod flash;
+pub mod image;
+pub mod link;
+pub mod port;
+pub mod recording;
+pub mod serial;
+pub mod virtual_controller;
+
+pub use client::Controller;
+pub use error::ControllerError;
+pub use port::{OpenOptions, Port, open};
+pub use recording::{Circle, Recording, SetPointRecord};

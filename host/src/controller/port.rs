@@ -1,0 +1,78 @@
+//! What `--port` may name, and opening it.
+use super::client::Controller;
+use super::emulator::{Emulator, Pace};
+use super::error::ControllerError;
+use super::serial::SerialLink;
+use super::virtual_controller::VirtualLink;
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// Baud rate of a serial device unless told otherwise; set-points at 1 kHz need some 30 kB/s.
+pub const BAUD: u32 = 460_800;
+
+/// Where a controller is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Port {
+    /// The firmware's library in this process, in simulated time.
+    Sim,
+    /// The firmware image in QEMU, started for this call.
+    Qemu,
+    /// A serial device.
+    Device(String),
+}
+
+impl FromStr for Port {
+    type Err = std::convert::Infallible;
+
+    fn from_str(name: &str) -> Result<Self, Self::Err> {
+        Ok(match name {
+            "sim" => Self::Sim,
+            "qemu" => Self::Qemu,
+            device => Self::Device(device.to_owned()),
+        })
+    }
+}
+
+/// How to open it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct OpenOptions {
+    /// Firmware image for QEMU; `None`: the one of this workspace, built if it is missing.
+    pub image: Option<PathBuf>,
+    /// Baud rate of a serial device.
+    pub baud: u32,
+}
+
+impl Default for OpenOptions {
+    fn default() -> Self {
+        Self { image: None, baud: BAUD }
+    }
+}
+
+/// Opens a controller and its session. `note` is told of what takes long (building an image).
+///
+/// # Errors
+/// Any [`ControllerError`] but a refusal.
+pub fn open(
+    port: &Port,
+    options: &OpenOptions,
+    note: &mut dyn FnMut(&str),
+) -> Result<Controller, ControllerError> {
+    match port {
+        Port::Sim => Controller::connect(Box::new(VirtualLink::new()), "sim", 1),
+        Port::Qemu => {
+            let emulator = Emulator::start(options.image.as_deref(), Pace::Fast, note)?;
+            Controller::connect(Box::new(emulator.into_link()?), "qemu", 1)
+        }
+        Port::Device(path) => {
+            let link = SerialLink::open(path, options.baud)?;
+            Controller::connect(Box::new(link), path, session())
+        }
+    }
+}
+
+/// A session number that another client is unlikely to have: no two opened within 65 s of a process id.
+fn session() -> u16 {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    (now.as_millis() as u16) ^ (std::process::id() as u16).rotate_left(8)
+}

@@ -1,0 +1,118 @@
+//! Circles run on a controller, and the set-points it made of them.
+use super::client::Controller;
+use super::error::ControllerError;
+use giotto_shared::Direction;
+use giotto_shared::wire::{CircleRun, Command, MotionState, Pose};
+use std::time::Duration;
+
+/// After so long without a set-point the controller is asked whether it still runs.
+const SILENCE: Duration = Duration::from_millis(500);
+
+/// Circles to run. SI.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Circle {
+    /// Centre in the machine, m.
+    pub centre_m: [f64; 3],
+    /// Programmed radius, m.
+    pub radius_m: f64,
+    /// Programmed feed, m/s.
+    pub feed_m_s: f64,
+    /// Sense.
+    pub direction: Direction,
+    /// Whole turns at constant feed.
+    pub laps: u16,
+    /// Polar angle at which they begin, rad.
+    pub start_rad: f64,
+}
+
+impl Circle {
+    /// `laps` turns about the origin from polar angle 0.
+    pub const fn new(radius_m: f64, feed_m_s: f64, direction: Direction, laps: u16) -> Self {
+        Self { centre_m: [0.0; 3], radius_m, feed_m_s, direction, laps, start_rad: 0.0 }
+    }
+}
+
+/// One set-point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SetPointRecord {
+    /// Since the first set-point, s.
+    pub time_s: f64,
+    /// As programmed, m.
+    pub programmed_m: [f64; 3],
+    /// As commanded to the drives, m.
+    pub corrected_m: [f64; 3],
+}
+
+/// All set-points of a run, evenly spaced: from rest through approach, entry, turns and exit to rest.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    /// Distance in time, s.
+    pub dt_s: f64,
+    /// The set-points.
+    pub points: Vec<SetPointRecord>,
+}
+
+fn metres(nm: Pose) -> [f64; 3] {
+    nm.map(|nm| f64::from(nm) * 1e-9)
+}
+
+impl Controller {
+    /// Starts circles; returns at once.
+    ///
+    /// # Errors
+    /// [`ControllerError::Refused`] and those of the link.
+    pub fn start_circle(&mut self, circle: &Circle) -> Result<(), ControllerError> {
+        self.command(Command::RunCircle(CircleRun {
+            centre_m: circle.centre_m.map(|c| c as f32),
+            radius_m: circle.radius_m as f32,
+            feed_m_s: circle.feed_m_s as f32,
+            direction: circle.direction,
+            laps: circle.laps,
+            start_rad: circle.start_rad as f32,
+        }))
+    }
+
+    /// Runs circles to their end and returns every `every`th set-point.
+    ///
+    /// # Errors
+    /// [`ControllerError::Refused`]; [`ControllerError::SetPointsLost`] if the record has a gap; those of the link.
+    pub fn run_circle(&mut self, circle: &Circle, every: u16) -> Result<Recording, ControllerError> {
+        let every = every.max(1);
+        self.command(Command::Subscribe { every, on_link: true })?;
+        self.set_points.clear();
+        self.start_circle(circle)?;
+        while !self.set_points.last().is_some_and(|batch| batch.last) {
+            if !self.wait_for_set_points(SILENCE)? {
+                let running = matches!(self.status()?.motion, MotionState::Running | MotionState::Stopping);
+                // The last batch may have come while the status was asked for.
+                if !running && !self.set_points.last().is_some_and(|batch| batch.last) {
+                    return Err(ControllerError::SetPointsLost { lost: 1 });
+                }
+            }
+        }
+        self.command(Command::Subscribe { every: 0, on_link: true })?;
+        self.recording(every)
+    }
+
+    fn recording(&mut self, every: u16) -> Result<Recording, ControllerError> {
+        let dt_s = f64::from(every) / f64::from(self.identity().tick_hz);
+        let mut points = Vec::new();
+        let mut due = None;
+        let mut lost = 0;
+        for batch in self.set_points.drain(..) {
+            let gap = batch.tick.wrapping_sub(due.unwrap_or(batch.tick));
+            lost += (gap / u32::from(every)) as usize;
+            due = Some(batch.tick.wrapping_add(batch.points.len() as u32 * u32::from(every)));
+            points.extend(batch.points);
+        }
+        if lost > 0 {
+            return Err(ControllerError::SetPointsLost { lost });
+        }
+        let timed = points.into_iter().enumerate().map(|(index, point)| SetPointRecord {
+            time_s: index as f64 * dt_s,
+            programmed_m: metres(point.raw_nm),
+            corrected_m: metres(point.corrected_nm),
+        });
+        Ok(Recording { dt_s, points: timed.collect() })
+    }
+}

@@ -1,0 +1,243 @@
+//! The firmware's library on the host: the same server, store, planner and tick, over a flash in memory.
+//!
+//! In this process ([`VirtualLink`]) time is simulated: it passes only while someone waits for an answer, as fast
+//! as the ticks can be computed. Behind a pty ([`serve`]) it is the clock's.
+use super::error::ControllerError;
+use super::link::Link;
+use giotto_firmware::control::{Desk, Receiver, SEGMENTS, SET_POINTS, Sender, Shared, Tick};
+use giotto_firmware::engine::{Config, Executor, Planned, Planner};
+use giotto_firmware::server::{Board, Server, TimedSetPoint};
+use giotto_firmware::store::{Layout, ram::RamFlash};
+use std::collections::VecDeque;
+use std::convert::Infallible;
+use std::io::{self, Read, Write};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Ticks a second.
+pub const TICK_HZ: u32 = 1000;
+/// Bytes of a slot.
+const SLOT: usize = 4096;
+/// Two slots, each one erase unit.
+const LAYOUT: Layout = Layout::new([0, SLOT as u32], SLOT as u32);
+const BOARD: Board = Board { name: "virtual", tick_hz: TICK_HZ };
+
+/// Flash of a virtual controller.
+pub type Flash = RamFlash<{ 2 * SLOT }, SLOT>;
+
+/// A queue whose two ends are in one process.
+#[derive(Debug)]
+struct Queue<T> {
+    things: Arc<Mutex<VecDeque<T>>>,
+    capacity: usize,
+}
+
+impl<T> Queue<T> {
+    /// Both ends.
+    fn new(capacity: usize) -> (Self, Self) {
+        let things = Arc::new(Mutex::new(VecDeque::with_capacity(capacity)));
+        (Self { things: Arc::clone(&things), capacity }, Self { things, capacity })
+    }
+
+    fn with<R>(&self, act: impl FnOnce(&mut VecDeque<T>) -> R) -> R {
+        act(&mut self.things.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl<T> Sender<T> for Queue<T> {
+    fn send(&mut self, thing: T) -> Result<(), T> {
+        let capacity = self.capacity;
+        self.with(|things| {
+            if things.len() == capacity {
+                return Err(thing);
+            }
+            things.push_back(thing);
+            Ok(())
+        })
+    }
+
+    fn waiting(&self) -> usize {
+        self.with(|things| things.len())
+    }
+}
+
+impl<T> Receiver<T> for Queue<T> {
+    fn receive(&mut self) -> Option<T> {
+        self.with(VecDeque::pop_front)
+    }
+
+    fn waiting(&self) -> usize {
+        self.with(|things| things.len())
+    }
+}
+
+type VirtualTick = Tick<Arc<Shared>, Queue<Planned>, Queue<TimedSetPoint>>;
+type VirtualServer = Server<Flash, Desk<Arc<Shared>, Queue<Planned>, Queue<TimedSetPoint>>>;
+
+/// The port of a virtual controller: bytes for it, bytes from it.
+#[derive(Debug, Default)]
+struct Wires {
+    to_controller: VecDeque<u8>,
+    to_host: VecDeque<u8>,
+}
+
+impl embedded_io::ErrorType for Wires {
+    type Error = Infallible;
+}
+
+impl embedded_io::Read for Wires {
+    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Infallible> {
+        let count = buffer.len().min(self.to_controller.len());
+        for (to, from) in buffer.iter_mut().zip(self.to_controller.drain(..count)) {
+            *to = from;
+        }
+        Ok(count)
+    }
+}
+
+impl embedded_io::ReadReady for Wires {
+    fn read_ready(&mut self) -> Result<bool, Infallible> {
+        Ok(!self.to_controller.is_empty())
+    }
+}
+
+impl embedded_io::Write for Wires {
+    fn write(&mut self, buffer: &[u8]) -> Result<usize, Infallible> {
+        self.to_host.extend(buffer);
+        Ok(buffer.len())
+    }
+
+    fn flush(&mut self) -> Result<(), Infallible> {
+        Ok(())
+    }
+}
+
+/// A controller without hardware.
+pub struct VirtualController {
+    server: VirtualServer,
+    tick: VirtualTick,
+    wires: Wires,
+    ticks: u64,
+}
+
+impl Default for VirtualController {
+    fn default() -> Self {
+        Self::boot(Flash::new())
+    }
+}
+
+impl VirtualController {
+    /// Boots with what is in the flash.
+    pub fn boot(flash: Flash) -> Self {
+        let config = Config::robot(TICK_HZ);
+        let shared = Arc::new(Shared::new());
+        let (segments_in, segments_out) = Queue::new(SEGMENTS);
+        let (points_in, points_out) = Queue::new(SET_POINTS);
+        let origin = [0; 3];
+        let executor = Executor::new(origin, config.engage_ticks(), true);
+        let planner = Planner::new(&config, origin);
+        let desk = Desk::new(planner, Arc::clone(&shared), segments_in, points_out);
+        let server = Server::boot(BOARD, flash, LAYOUT, desk);
+        let tick = Tick::new(executor, shared, segments_out, points_in);
+        Self { server, tick, wires: Wires::default(), ticks: 0 }
+    }
+
+    /// Takes bytes from the host.
+    pub fn receive(&mut self, bytes: &[u8]) {
+        self.wires.to_controller.extend(bytes);
+    }
+
+    /// Answers what has come, then lets one period pass.
+    pub fn step(&mut self) {
+        let Ok(()) = self.server.serve(&mut self.wires);
+        if self.server.reset_requested() {
+            self.reset();
+        }
+        self.tick.tick(false);
+        self.ticks += 1;
+    }
+
+    /// Bytes for the host.
+    pub fn take(&mut self, buffer: &mut [u8]) -> usize {
+        let count = buffer.len().min(self.wires.to_host.len());
+        for (to, from) in buffer.iter_mut().zip(self.wires.to_host.drain(..count)) {
+            *to = from;
+        }
+        count
+    }
+
+    /// Warm reset: the flash stays.
+    fn reset(&mut self) {
+        let flash = self.server.store_mut().flash_mut().clone();
+        let wires = std::mem::take(&mut self.wires);
+        let ticks = self.ticks;
+        *self = Self { wires, ticks, ..Self::boot(flash) };
+    }
+}
+
+/// A virtual controller in this process, in simulated time.
+#[derive(Default)]
+pub struct VirtualLink {
+    controller: VirtualController,
+}
+
+impl VirtualLink {
+    /// A controller that has just booted, its flash erased.
+    pub fn new() -> Self {
+        Self::default()
+    }
+}
+
+impl Link for VirtualLink {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.controller.receive(bytes);
+        Ok(())
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], until: Duration) -> io::Result<usize> {
+        loop {
+            let count = self.controller.take(buffer);
+            if count > 0 || self.now() >= until {
+                return Ok(count);
+            }
+            self.controller.step();
+        }
+    }
+
+    fn now(&self) -> Duration {
+        Duration::from_millis(self.controller.ticks * 1000 / u64::from(TICK_HZ))
+    }
+}
+
+/// Serves a virtual controller on a pty, by the clock, until the process ends. `ready` is told the path once
+/// it can be opened.
+///
+/// # Errors
+/// Those of the pty.
+pub fn serve(ready: &mut dyn FnMut(&str)) -> Result<Infallible, ControllerError> {
+    use serialport::{SerialPort, TTYPort};
+    let cannot = |reason: String| ControllerError::CannotOpen { port: "pty".to_owned(), reason };
+    let (mut near, far) = TTYPort::pair().map_err(|error| cannot(error.description))?;
+    let path = far.name().ok_or_else(|| cannot("it has no name".to_owned()))?;
+    // Kept open so that the near end never sees a hang-up; not exclusive, and not locked, so that a client can.
+    let mut far = far;
+    far.set_exclusive(false).map_err(|error| cannot(error.description))?;
+    near.set_timeout(Duration::from_millis(1)).map_err(|error| cannot(error.description))?;
+    ready(&path);
+    let mut controller = VirtualController::default();
+    let started = Instant::now();
+    let mut buffer = [0; 4096];
+    loop {
+        match near.read(&mut buffer) {
+            Ok(count) => controller.receive(&buffer[..count]),
+            Err(error) if matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::Interrupted) => {}
+            Err(error) => return Err(cannot(error.to_string())),
+        }
+        let due = (started.elapsed().as_secs_f64() * f64::from(TICK_HZ)) as u64;
+        while controller.ticks < due {
+            controller.step();
+            let count = controller.take(&mut buffer);
+            near.write_all(&buffer[..count]).map_err(|error| cannot(error.to_string()))?;
+        }
+    }
+}
