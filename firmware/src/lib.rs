@@ -2,6 +2,8 @@
 //!
 //! | module | holds | knows nothing of |
 //! |---|---|---|
+//! | [`engine`] | programs in, set-points out, one a tick | links, flash |
+//! | [`control`] | the engine split between interrupt and background | registers |
 //! | [`store`] | two slots of flash, confirmations, power cuts | what a table means |
 //! | [`engine`] | programs in, one set-point a tick out | flash, serial ports |
 //! | [`server`] | the protocol state machine: request in, reply out | registers, serial ports |
@@ -11,6 +13,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod control;
 pub mod engine;
 pub mod server;
 pub mod store;

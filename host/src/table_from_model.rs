@@ -1,15 +1,15 @@
 //! From a model to the table that a controller corrects with: one zone, where the model was fitted.
 use crate::causes::{Cause, Effect};
 use crate::model_file::{ModelFile, Servo};
-use giotto_shared::Axis;
 use giotto_shared::model::{Cumulants, RadiusModel};
 use giotto_shared::table::{self, Limits, Table, TableError, Travel, Zone, bounds};
 use giotto_shared::term::Term;
 
 /// Room that the limits of the table leave above the largest correction inside its zone.
 const HEADROOM: f64 = 2.0;
-/// Widening of a range, so that its ends stay inside in single precision.
-const MARGIN: f64 = 1e-6;
+/// Least limits: room to engage and disengage even a correction that is all but nothing.
+const LEAST_OFFSET_M: f64 = 20e-6;
+const LEAST_SLEW_M_S: f64 = 1e-3;
 
 /// Why a model has no table.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -131,10 +131,147 @@ fn reach(term: &Term<f64>, radius: f64, feed: f64, omega: f64) -> f64 {
     offset.abs()
 }
 
-fn single(axis: Axis, term: Term<f64>) -> Term<f32> {
-    let _ = axis;
-    match term {
-        Term::RadiusOffset { offset_m } => Term::RadiusOffset { offset_m: offset_m as f32 },
-        _ => Term::RadiusOffset { offset_m: 0.0 },
+/// The table of a model.
+///
+/// # Errors
+/// [`ModelTableError`]; a table that is returned passes [`Table::validate`].
+pub fn table_from_model(model: &ModelFile) -> Result<ModelTable, ModelTableError> {
+    let mut cumulants = cumulants(&model.servo);
+    let mut terms: Vec<Term<f64>> = Vec::new();
+    let mut left_out = Vec::new();
+    for effect in &model.effects {
+        match share(effect)? {
+            Share::Term(term) => terms.push(term),
+            Share::Kappa4(kappa4) => cumulants.kappa4_s4 += kappa4,
+            Share::Nothing => left_out.push(effect.cause),
+        }
+    }
+    let count = terms.len();
+    let single = terms.iter().map(|term| term.map(|value| value as f32));
+    let radius_m = model.valid.radius_mm.map(|mm| mm * 1e-3);
+    let feed_m_s = model.valid.feed_mm_s.map(|mm_s| mm_s * 1e-3);
+    let mut zone = Zone {
+        place_m: None,
+        radius_m: radius_m.map(|r| r as f32),
+        feed_m_s: feed_m_s.map(|f| f as f32),
+        travel: Travel::Both,
+        cumulants: Cumulants { kappa2_s2: cumulants.kappa2_s2 as f32, kappa4_s4: cumulants.kappa4_s4 as f32 },
+        terms: heapless::Vec::new(),
+    };
+    for term in single {
+        zone.terms.push(term).map_err(|_| ModelTableError::TooManyTerms { count })?;
+    }
+    let mut zones = heapless::Vec::new();
+    // A table holds at least one zone.
+    let _ = zones.push(zone);
+    let limits = limits(&cumulants, &terms, radius_m, feed_m_s);
+    let table = Table { machine: cut(&model.machine), zones, limits };
+    table.validate()?;
+    Ok(ModelTable { table, left_out })
+}
+
+/// Limits that the largest correction inside the zone meets with room to spare.
+fn limits(cumulants: &Cumulants<f64>, terms: &[Term<f64>], radius_m: [f64; 2], feed_m_s: [f64; 2]) -> Limits {
+    let [smallest, largest] = radius_m;
+    let [_, fastest] = feed_m_s;
+    let omega = fastest / smallest;
+    let k2 = cumulants.kappa2_s2;
+    let fourth = k2 * k2 / 8.0 - cumulants.kappa4_s4 / 24.0;
+    // R·(κ2/2·ω² + …·ω⁴) with ω = f/R falls with R, so the smallest circle asks for the most.
+    let law = smallest * omega * omega * (0.5 * k2.abs() + fourth.abs() * omega * omega);
+    let terms: f64 = terms.iter().map(|term| reach(term, largest, fastest, omega)).sum();
+    let offset = (HEADROOM * (law + terms)).max(LEAST_OFFSET_M);
+    // Ovals turn twice a turn.
+    let slew = (HEADROOM * 2.0 * offset * omega).max(LEAST_SLEW_M_S);
+    Limits {
+        // What is beyond the image's bounds is clamped by the controller and counted.
+        offset_m: (offset as f32).min(bounds::OFFSET_MAX_M),
+        slew_m_s: (slew as f32).min(bounds::SLEW_MAX_M_S),
+    }
+}
+
+/// A name, cut to fit, at a character's border.
+fn cut(name: &str) -> heapless::String<32> {
+    let mut out = heapless::String::new();
+    for character in name.chars() {
+        if out.push(character).is_err() {
+            break;
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model_file::{FORMAT, Valid};
+    use giotto_shared::Axis;
+
+    fn paper() -> ModelFile {
+        ModelFile {
+            format: FORMAT,
+            campaign: "lab".to_owned(),
+            machine: "ABB IRB 1600-6/1.45".to_owned(),
+            servo: Servo::Beta { beta1_s2: -23.29e-6, beta2_s4: -0.23e-6, half_width95: [0.0; 2] },
+            valid: Valid { radius_mm: [100.0, 300.0], feed_mm_s: [20.0, 700.0] },
+            effects: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn the_paper_robot_gets_its_cumulants() {
+        let ModelTable { table, left_out } = table_from_model(&paper()).unwrap();
+        let zone = &table.zones[0];
+        assert!((f64::from(zone.cumulants.kappa2_s2) / 46.58e-6 - 1.0).abs() < 1e-6);
+        assert!((f64::from(zone.cumulants.kappa4_s4) / -5.526_509e-6 - 1.0).abs() < 1e-6);
+        assert!(left_out.is_empty());
+        // 169 um at R = 100 mm, 700 mm/s (Eq. 15), with room for twice as much.
+        assert!((335e-6..345e-6).contains(&f64::from(table.limits.offset_m)), "{:?}", table.limits);
+    }
+
+    #[test]
+    fn servo_kinds_agree_where_they_mean_the_same() {
+        let lag = cumulants(&Servo::Lag { kv_per_s: 50.0 });
+        // 1/sqrt(1 + w^2/kv^2) = 1 - w^2/(2 kv^2) + 3 w^4/(8 kv^4)
+        let beta = cumulants(&Servo::Beta {
+            beta1_s2: -0.5 / 2500.0,
+            beta2_s4: 0.375 / 6_250_000.0,
+            half_width95: [0.0; 2],
+        });
+        assert!((lag.kappa2_s2 / beta.kappa2_s2 - 1.0).abs() < 1e-12);
+        assert!((lag.kappa4_s4 / beta.kappa4_s4 - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn effects_become_terms_in_si() {
+        let effect =
+            |cause, axis, value| Effect { cause, axis, value, ci95: [0.0; 2], params: Default::default() };
+        let mut model = paper();
+        model.effects = vec![
+            effect(Cause::Squareness, None, 120.0),
+            effect(Cause::Backlash, Some(Axis::Y), 0.01),
+            effect(Cause::Vibration, None, 40.0),
+        ];
+        let ModelTable { table, left_out } = table_from_model(&model).unwrap();
+        let expected =
+            [Term::Squareness { shear_rad: 120e-6_f32 }, Term::Backlash { axis: Axis::Y, step_m: 10e-6 }];
+        for (term, expected) in table.zones[0].terms.iter().zip(expected) {
+            assert!(format!("{term:?}").starts_with(format!("{expected:?}").split('{').next().unwrap()));
+        }
+        assert_eq!((table.zones[0].terms.len(), left_out), (2, vec![Cause::Vibration]));
+        model.effects[1].axis = None;
+        let missing = ModelTableError::MissingParameter { cause: Cause::Backlash, name: "axis" };
+        assert_eq!(table_from_model(&model), Err(missing));
+    }
+
+    #[test]
+    fn a_model_beyond_the_controller_is_refused() {
+        let mut model = paper();
+        model.servo = Servo::Beta { beta1_s2: -1.0, beta2_s4: 0.0, half_width95: [0.0; 2] };
+        assert!(matches!(table_from_model(&model), Err(ModelTableError::Table(_))));
+        let mut model = paper();
+        model.valid.radius_mm = [300.0, 100.0];
+        let empty = table_from_model(&model);
+        assert!(matches!(empty, Err(ModelTableError::Table(TableError::EmptyRange { .. }))), "{empty:?}");
     }
 }

@@ -65,7 +65,14 @@ impl Shared {
     }
 
     /// Publishes a tick.
-    pub(super) fn publish(&self, tick: u32, state: MotionState, epoch: u8, output: &Output, counters: &Counters) {
+    pub(super) fn publish(
+        &self,
+        tick: u32,
+        state: MotionState,
+        epoch: u8,
+        output: &Output,
+        counters: &Counters,
+    ) {
         let state = match state {
             MotionState::Idle => REST,
             MotionState::Running => RUNNING,

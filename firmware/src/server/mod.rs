@@ -27,7 +27,7 @@ use session::{Session, Turn};
 use upload::Upload;
 
 /// Most turns of one run.
-pub const MAX_LAPS: u16 = 10_000;
+pub const MAX_LAPS: u32 = 10_000;
 /// Largest centripetal acceleration of a programmed circle, m/s²: five g, above any robot or machine tool.
 pub const CENTRIPETAL_MAX_M_S2: f32 = 50.0;
 
@@ -304,17 +304,19 @@ fn cut(name: &str) -> heapless::String<16> {
 
 /// Checks a run against the bounds of the image.
 fn check_run(run: &CircleRun) -> Result<(), MotionRefusal> {
-    let within = |field, value: f32, lo: f32, hi: f32| {
-        // Written so that NaN fails.
-        if value >= lo && value <= hi {
+    let within = |field, value: f64, lo: f32, hi: f32| {
+        // Programmed values are decimal, bounds single precision: a bound that was meant to be met is met. Written
+        // so that NaN fails.
+        let (low, high) = (f64::from(lo), f64::from(hi));
+        if value >= low - 1e-6 * low.abs() && value <= high + 1e-6 * high.abs() {
             Ok(())
         } else {
-            Err(MotionRefusal::OutOfBounds { field, value, lo, hi })
+            Err(MotionRefusal::OutOfBounds { field, value: value as f32, lo, hi })
         }
     };
     within(RunField::Radius, run.radius_m, bounds::RADIUS_MIN_M, bounds::RADIUS_MAX_M)?;
     within(RunField::Feed, run.feed_m_s, bounds::FEED_MIN_M_S, bounds::FEED_MAX_M_S)?;
-    within(RunField::Laps, f32::from(run.laps), 1.0, f32::from(MAX_LAPS))?;
+    within(RunField::Laps, f64::from(run.laps), 1.0, MAX_LAPS as f32)?;
     within(RunField::Start, run.start_rad, -bounds::PHASE_MAX_RAD, bounds::PHASE_MAX_RAD)?;
     for coordinate in run.centre_m {
         within(RunField::Centre, coordinate, -bounds::PLACE_MAX_M, bounds::PLACE_MAX_M)?;

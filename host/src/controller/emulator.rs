@@ -61,7 +61,8 @@ impl Emulator {
         note: &mut dyn FnMut(&str),
     ) -> Result<Self, ControllerError> {
         let program = program();
-        let found = Command::new(&program).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
+        let found =
+            Command::new(&program).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
         if found.is_err() {
             return Err(ControllerError::NoEmulator { program });
         }
@@ -79,7 +80,9 @@ impl Emulator {
         command.args(["-serial", "pty"]);
         for name in ["uart1", "uart2"] {
             let path = folder.path().join(name);
-            command.arg("-chardev").arg(format!("socket,id={name},path={},server=on,wait=off", path.display()));
+            command
+                .arg("-chardev")
+                .arg(format!("socket,id={name},path={},server=on,wait=off", path.display()));
             command.args(["-serial", &format!("chardev:{name}")]);
         }
         if pace == Pace::Fast {

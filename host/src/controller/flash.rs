@@ -2,7 +2,9 @@
 use super::client::Controller;
 use super::error::ControllerError;
 use giotto_shared::table::{self, Header};
-use giotto_shared::wire::{CHUNK, CRC, Chunk, Command, FlashFault, Refusal, Reply, SlotState, Status, TableInfo};
+use giotto_shared::wire::{
+    CHUNK, CRC, Chunk, Command, FlashFault, Refusal, Reply, SlotState, Status, TableInfo,
+};
 
 /// How often an upload begins anew before it is given up.
 const UPLOADS: u32 = 3;
@@ -98,11 +100,7 @@ impl Controller {
     ///
     /// # Errors
     /// [`ControllerError::Refused`], those of the link.
-    pub fn write(
-        &mut self,
-        image: &[u8],
-        progress: &mut dyn FnMut(Progress),
-    ) -> Result<u8, ControllerError> {
+    pub fn write(&mut self, image: &[u8], progress: &mut dyn FnMut(Progress)) -> Result<u8, ControllerError> {
         let mut attempt = 1;
         loop {
             match self.try_write(image, progress) {
@@ -115,11 +113,7 @@ impl Controller {
         }
     }
 
-    fn try_write(
-        &mut self,
-        image: &[u8],
-        progress: &mut dyn FnMut(Progress),
-    ) -> Result<u8, ControllerError> {
+    fn try_write(&mut self, image: &[u8], progress: &mut dyn FnMut(Progress)) -> Result<u8, ControllerError> {
         let max = self.identity().max_image_bytes;
         let length = u16::try_from(image.len()).ok().filter(|length| *length <= max);
         let length = length.ok_or(ControllerError::Refused(Refusal::UploadTooLong { max }))?;

@@ -113,7 +113,8 @@ pub fn workspace() -> PathBuf {
 
 /// Where cargo puts the image of a board.
 pub fn path(board: Board) -> PathBuf {
-    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from);
+    let target =
+        std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from);
     target.join(TARGET).join(PROFILE).join(board.name())
 }
 

@@ -22,7 +22,11 @@ pub mod recording;
 pub mod serial;
 pub mod virtual_controller;
 
+#[cfg(test)]
+mod tests;
+
 pub use client::Controller;
 pub use error::ControllerError;
+pub use giotto_shared::path::CircleRun;
 pub use port::{OpenOptions, Port, open};
-pub use recording::{Circle, Recording, SetPointRecord};
+pub use recording::{Recording, SetPointRecord, circle};

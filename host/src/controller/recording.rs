@@ -8,28 +8,9 @@ use std::time::Duration;
 /// After so long without a set-point the controller is asked whether it still runs.
 const SILENCE: Duration = Duration::from_millis(500);
 
-/// Circles to run. SI.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Circle {
-    /// Centre in the machine, m.
-    pub centre_m: [f64; 3],
-    /// Programmed radius, m.
-    pub radius_m: f64,
-    /// Programmed feed, m/s.
-    pub feed_m_s: f64,
-    /// Sense.
-    pub direction: Direction,
-    /// Whole turns at constant feed.
-    pub laps: u16,
-    /// Polar angle at which they begin, rad.
-    pub start_rad: f64,
-}
-
-impl Circle {
-    /// `laps` turns about the origin from polar angle 0.
-    pub const fn new(radius_m: f64, feed_m_s: f64, direction: Direction, laps: u16) -> Self {
-        Self { centre_m: [0.0; 3], radius_m, feed_m_s, direction, laps, start_rad: 0.0 }
-    }
+/// `laps` turns about the origin from polar angle 0; SI.
+pub const fn circle(radius_m: f64, feed_m_s: f64, direction: Direction, laps: u32) -> CircleRun {
+    CircleRun { centre_m: [0.0; 3], radius_m, feed_m_s, direction, laps, start_rad: 0.0 }
 }
 
 /// One set-point.
@@ -61,22 +42,15 @@ impl Controller {
     ///
     /// # Errors
     /// [`ControllerError::Refused`] and those of the link.
-    pub fn start_circle(&mut self, circle: &Circle) -> Result<(), ControllerError> {
-        self.command(Command::RunCircle(CircleRun {
-            centre_m: circle.centre_m.map(|c| c as f32),
-            radius_m: circle.radius_m as f32,
-            feed_m_s: circle.feed_m_s as f32,
-            direction: circle.direction,
-            laps: circle.laps,
-            start_rad: circle.start_rad as f32,
-        }))
+    pub fn start_circle(&mut self, circle: &CircleRun) -> Result<(), ControllerError> {
+        self.command(Command::RunCircle(*circle))
     }
 
     /// Runs circles to their end and returns every `every`th set-point.
     ///
     /// # Errors
     /// [`ControllerError::Refused`]; [`ControllerError::SetPointsLost`] if the record has a gap; those of the link.
-    pub fn run_circle(&mut self, circle: &Circle, every: u16) -> Result<Recording, ControllerError> {
+    pub fn run_circle(&mut self, circle: &CircleRun, every: u16) -> Result<Recording, ControllerError> {
         let every = every.max(1);
         self.command(Command::Subscribe { every, on_link: true })?;
         self.set_points.clear();

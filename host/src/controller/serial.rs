@@ -40,7 +40,9 @@ impl Link for SerialLink {
         let left = until.saturating_sub(self.now()).max(Duration::from_millis(1));
         self.port.set_timeout(left).map_err(io::Error::from)?;
         match self.port.read(buffer) {
-            Err(error) if matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::Interrupted) => Ok(0),
+            Err(error) if matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::Interrupted) => {
+                Ok(0)
+            }
             // A pty whose other end is gone reads as an empty stream.
             Ok(0) => Err(io::Error::new(io::ErrorKind::BrokenPipe, "the other end has closed the port")),
             result => result,

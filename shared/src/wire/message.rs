@@ -1,6 +1,6 @@
 //! The messages. A change here is a change of [`PROTOCOL_VERSION`].
 use super::Refusal;
-use crate::Direction;
+use crate::path::CircleRun;
 use serde::{Deserialize, Serialize};
 
 /// Version of the messages of this build; both sides must have the same.
@@ -86,23 +86,6 @@ pub enum Command {
         /// Ed25519 public key.
         key: [u8; 32],
     },
-}
-
-/// Circles to run, about the origin of the controller's plane, starting and ending at `start_rad`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct CircleRun {
-    /// Centre in the machine, m: chooses the zone.
-    pub centre_m: [f32; 3],
-    /// Programmed radius, m.
-    pub radius_m: f32,
-    /// Programmed feed, m/s.
-    pub feed_m_s: f32,
-    /// Direction.
-    pub direction: Direction,
-    /// Whole turns at full feed, beside entry and exit.
-    pub laps: u16,
-    /// Polar angle of start and end, rad.
-    pub start_rad: f32,
 }
 
 /// From the controller.

@@ -20,10 +20,12 @@ pub mod frame;
 pub mod message;
 pub mod refusal;
 
+/// A circle is asked for as the engine takes it.
+pub use crate::path::CircleRun;
 pub use frame::{Accumulator, FrameCounts, MAX_FRAME, MAX_PAYLOAD, encode};
 pub use message::{
-    CHUNK, Chunk, CircleRun, Command, Counters, FromController, Identity, MotionState, PROTOCOL_VERSION,
-    Pose, Probation, Reply, Request, SET_POINTS, SetPoint, SetPoints, SlotState, Status, TableInfo,
+    CHUNK, Chunk, Command, Counters, FromController, Identity, MotionState, PROTOCOL_VERSION, Pose,
+    Probation, Reply, Request, SET_POINTS, SetPoint, SetPoints, SlotState, Status, TableInfo,
 };
 pub use refusal::{FlashFault, MotionRefusal, Refusal, RunField};
 

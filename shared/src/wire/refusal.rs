@@ -123,6 +123,9 @@ pub enum MotionRefusal {
         /// Largest allowed.
         hi: f32,
     },
+    /// Each number is inside its bounds, but the path or its duration is not.
+    #[error("the path does not fit the feed, the workspace or the time of this controller")]
+    Unreachable,
     /// The queue of segments is full.
     #[error("no room in the queue of segments")]
     QueueFull,

@@ -173,12 +173,12 @@ fn strangers_and_newer_hosts_are_told() {
 fn runs_out_of_bounds_are_refused() {
     let Command::RunCircle(good) = circle() else { panic!() };
     let bad = [
-        CircleRun { radius_m: f32::NAN, ..good },
+        CircleRun { radius_m: f64::NAN, ..good },
         CircleRun { radius_m: 2.0, ..good },
         CircleRun { feed_m_s: 0.0, ..good },
         CircleRun { laps: 0, ..good },
         CircleRun { start_rad: 7.0, ..good },
-        CircleRun { centre_m: [0.0, f32::INFINITY, 0.0], ..good },
+        CircleRun { centre_m: [0.0, f64::INFINITY, 0.0], ..good },
         CircleRun { radius_m: 0.01, feed_m_s: 1.0, ..good },
     ];
     let mut desk = fresh();

@@ -92,10 +92,13 @@ fn golden_frame() {
         1,                                              // session
         0xac, 0x02,                                     // sequence 300
         10,                                             // run circle
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,             // centre
-        0xcd, 0xcc, 0xcc, 0x3d, 0, 0, 0, 0x3f,          // radius, feed
+        0, 0, 0, 0, 0, 0, 0, 0,                         // centre
+        0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0,
+        0x9a, 0x99, 0x99, 0x99, 0x99, 0x99, 0xb9, 0x3f, // radius
+        0, 0, 0, 0, 0, 0, 0xe0, 0x3f,                   // feed
         1, 2,                                           // clockwise, two laps
-        0, 0, 0, 0,                                     // start
+        0, 0, 0, 0, 0, 0, 0, 0,                         // start
     ];
     let mut accumulator = Accumulator::new();
     let found = frame.iter().find_map(|&byte| accumulator.push(byte).map(<[u8]>::to_vec)).unwrap();
