@@ -9,5 +9,5 @@ pub mod controller;
 pub mod fit;
 pub mod model_file;
 pub mod simulation;
-pub mod toml_file;
 pub mod table_from_model;
+pub mod toml_file;
