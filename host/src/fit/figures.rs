@@ -32,6 +32,8 @@ const COLOURS: [RGBColor; 6] = [
     RGBColor(230, 159, 0),
     RGBColor(60, 60, 60),
 ];
+/// Room for the key under the axes, pixels.
+const KEY_HEIGHT: u32 = 28;
 /// Steps of a drawn curve.
 const CURVE_STEPS: usize = 100;
 
@@ -105,9 +107,8 @@ fn series(
 /// A range that holds all values and zero, with room around them.
 fn room(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
     let (low, high) = values.fold((0.0_f64, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
-    let margin = 0.06 * (high - low).max(1e-3);
-    let pad = |edge: f64, by: f64| if edge == 0.0 && by > 0.0 { edge } else { edge + by };
-    pad(low, -margin)..pad(high, if low < 0.0 { margin.copysign(high.max(1e-9)) } else { margin })
+    let margin = 0.05 * (high - low).max(1e-3);
+    low - margin..high + margin
 }
 
 fn draw(file: &'static str, title: &str, value: &str, series: &[Series]) -> Result<Figure, FigureError> {
@@ -129,6 +130,7 @@ fn render(svg: &mut String, title: &str, value: &str, series: &[Series]) -> Resu
     let mut chart: Chart<'_, '_> = ChartBuilder::on(&root)
         .caption(title, (FONT, 17))
         .margin(14)
+        .margin_bottom(14 + KEY_HEIGHT)
         .x_label_area_size(44)
         .y_label_area_size(62)
         .build_cartesian_2d(x, y)
@@ -151,28 +153,20 @@ fn render(svg: &mut String, title: &str, value: &str, series: &[Series]) -> Resu
         let mark = |p: &(f64, f64, bool)| {
             Circle::new((p.0, p.1), 4, if p.2 { colour.filled() } else { colour.stroke_width(2) })
         };
-        let fitted = s.points.iter().any(|p| p.2);
-        chart
-            .draw_series(s.points.iter().map(mark))
-            .map_err(|e| words(&e))?
-            .label(format!(
-                "R {} mm{}",
-                trimmed_mm(s.radius_m),
-                if fitted { ", fitted" } else { ", predicted" }
-            ))
-            .legend(move |(x, y)| {
-                Circle::new((x + 8, y), 4, if fitted { colour.filled() } else { colour.stroke_width(2) })
-            });
+        chart.draw_series(s.points.iter().map(mark)).map_err(|e| words(&e))?;
     }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::LowerLeft)
-        .margin(12)
-        .label_font((FONT, 13))
-        .background_style(WHITE.mix(0.85))
-        .border_style(BLACK.mix(0.3))
-        .draw()
-        .map_err(|e| words(&e))?;
+    drop(chart);
+    // The key has a line of its own: nothing lies under it.
+    let y = (SIZE.1 - KEY_HEIGHT / 2 - 8) as i32;
+    for (i, (s, colour)) in series.iter().zip(COLOURS.iter().cycle()).enumerate() {
+        let x = 80 + 200 * i as i32;
+        let fitted = s.points.iter().any(|p| p.2);
+        let text =
+            format!("R {} mm, {}", trimmed_mm(s.radius_m), if fitted { "fitted" } else { "predicted" });
+        let style = if fitted { colour.filled() } else { colour.stroke_width(2) };
+        root.draw(&Circle::new((x, y), 4, style)).map_err(|e| words(&e))?;
+        root.draw(&Text::new(text, (x + 12, y - 6), (FONT, 13))).map_err(|e| words(&e))?;
+    }
     root.present().map_err(|e| words(&e))
 }
 
