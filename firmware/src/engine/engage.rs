@@ -12,7 +12,7 @@ pub(crate) struct Engage {
     wanted: bool,
     /// Where the blend in hand leads, or where it led.
     heading: bool,
-    left: u32,
+    blending: bool,
     ticks: u32,
     clock: Clock,
 }
@@ -21,7 +21,7 @@ impl Engage {
     /// Settled on or off.
     pub(crate) fn new(ticks: u32, on: bool) -> Self {
         let share_q31 = if on { i32::MAX } else { 0 };
-        Self { full: on, share_q31, wanted: on, heading: on, left: 0, ticks, clock: Clock::default() }
+        Self { full: on, share_q31, wanted: on, heading: on, blending: false, ticks, clock: Clock::default() }
     }
 
     /// Whether it is, or is to be, on.
@@ -38,7 +38,7 @@ impl Engage {
     /// Asks for on or off. A blend under way is finished first: turning it round would be a step in velocity.
     pub(crate) fn set(&mut self, on: bool) {
         self.wanted = on;
-        if self.left == 0 {
+        if !self.blending {
             self.begin();
         }
     }
@@ -48,7 +48,7 @@ impl Engage {
             self.heading = self.wanted;
             let step = clock_step(self.ticks);
             self.clock = if self.heading { Clock::rising(step) } else { Clock::falling(step) };
-            self.left = self.ticks;
+            self.blending = true;
             self.full = false;
         }
     }
@@ -58,15 +58,16 @@ impl Engage {
         if self.full {
             return offset;
         }
-        if self.left > 0 {
-            self.left = self.left.wrapping_sub(1);
-            self.share_q31 = match (self.left, self.heading) {
-                (0, true) => i32::MAX,
-                (0, false) => 0,
-                _ => (shapes(&POLYNOMIAL, self.clock.advance()).s_q32 >> 1) as i32,
+        if self.blending {
+            let (x, end) = self.clock.advance();
+            self.share_q31 = match (end, self.heading) {
+                (true, true) => i32::MAX,
+                (true, false) => 0,
+                _ => (shapes(&POLYNOMIAL, x).s_q32 >> 1) as i32,
             };
-            if self.left == 0 {
+            if end {
                 self.full = self.heading;
+                self.blending = false;
                 self.begin();
             }
             if self.full {

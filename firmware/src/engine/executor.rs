@@ -65,7 +65,7 @@ pub struct Executor {
     clock: Clock,
     segment: Planned,
     sincos: SinCos,
-    ramp: [i32; 5],
+    ramp: [i32; 3],
     guard: Guard,
     engage: Engage,
     counters: Counters,
@@ -74,8 +74,6 @@ pub struct Executor {
     /// Whole turns, for the rise of a helix.
     turns: i32,
     second: Clock,
-    /// Ticks that the second ramp runs longer than the first.
-    second_left: u32,
     /// Programmed position where it stands or last stood.
     rest_nm: [i32; 3],
     /// Offset wanted there, before engagement.
@@ -103,7 +101,6 @@ impl Executor {
             end: 0,
             turns: 0,
             second: Clock::default(),
-            second_left: 0,
             rest_nm: position_nm,
             rest_offset_nm: [0; 3],
             epoch: 0,
@@ -191,10 +188,9 @@ impl Executor {
             }
             Mode::ArcRise | Mode::Rise => {
                 // ∫ of the two ramps together: one step for each tick between their starts.
-                let apart = timing.ramp_ticks.wrapping_sub(self.left);
+                let apart = self.clock.elapsed();
                 self.end = timing.start.wrapping_add(timing.step.wrapping_mul(u64::from(apart)));
                 self.second = Clock::rising(timing.clock_step);
-                self.second_left = apart;
                 self.mode = if apart == 0 { Mode::Rest } else { Mode::Both };
             }
             // At the end of a settling or dwelling in hand the segment is seen to be of an old epoch.
@@ -257,13 +253,18 @@ impl Executor {
         self.finish(nominal, [wx, wy, wz], flags)
     }
 
+    #[inline(never)]
+    fn out_with_care(&mut self, nx: i32, ny: i32, nz: i32, wx: i32, wy: i32, wz: i32, flags: u16) -> Output {
+        self.finish([nx, ny, nz], [wx, wy, wz], flags)
+    }
+
     #[inline(always)]
     fn arc_ramp<const FALLING: bool>(&mut self) -> Output {
-        self.left = self.left.wrapping_sub(1);
-        let shape = shapes(&self.ramp, self.clock.advance());
-        if self.left == 0 {
+        let (x, end) = self.clock.advance();
+        if end {
             return if FALLING { self.standstill() } else { self.arc_top() };
         }
+        let shape = shapes(&self.ramp, x);
         let step = scaled(self.segment.timing.step, shape.s_q32);
         self.phase = self.phase.wrapping_add(step);
         let law = if FALLING { &self.segment.fall } else { &self.segment.rise };
@@ -274,7 +275,7 @@ impl Executor {
         let [nx, ny, nz] = [x.on_arc(c, s), y.on_arc(c, s), z.on_arc(c, s)];
         let [wx, wy, wz] = [x.turned(re, im), y.turned(re, im), z.turned(re, im)];
         if !self.guard.pass_easily([wx, wy, wz]) {
-            return self.arc_out_with_care(c, s, wx, wy, wz, flag::MOVING);
+            return self.out_with_care(nx, ny, nz, wx, wy, wz, flag::MOVING);
         }
         Output::new([nx, ny, nz], [wx, wy, wz], flag::MOVING)
     }
@@ -295,7 +296,6 @@ impl Executor {
     #[inline(always)]
     fn begin_arc_fall(&mut self) {
         self.mode = Mode::ArcFall;
-        self.left = self.segment.timing.ramp_ticks;
         self.clock = Clock::falling(self.segment.timing.clock_step);
         // So that the sum of steps less half the last one is the phase.
         self.phase = self.phase.wrapping_add(self.segment.timing.step >> 1);
@@ -315,28 +315,25 @@ impl Executor {
 
     #[inline(never)]
     fn any_ramp(&mut self, falling: bool) -> Output {
-        self.left = self.left.wrapping_sub(1);
-        let shape = shapes(&self.ramp, self.clock.advance());
-        if self.left == 0 {
+        let (x, end) = self.clock.advance();
+        if end {
             return if falling { self.standstill() } else { self.top() };
         }
-        self.ramp_at(shape, falling)
+        self.ramp_at(shapes(&self.ramp, x), falling)
     }
 
     #[inline(never)]
     fn both(&mut self) -> Output {
-        self.left = self.left.wrapping_sub(1);
-        let up = shapes(&self.ramp, self.clock.advance());
-        let down = shapes(&self.ramp, self.second.advance());
-        if self.left == 0 {
+        let (x, end) = self.clock.advance();
+        let (later, _) = self.second.advance();
+        if end {
             // The rising ramp is over: what remains is the falling one alone.
             self.clock = self.second.mirrored();
-            self.left = self.second_left;
             self.mode = if self.segment.kind == Kind::Arc { Mode::ArcFall } else { Mode::Fall };
             let shape = shapes(&self.ramp, self.clock.here());
             return self.ramp_at(shape, true);
         }
-        self.ramp_at(up.minus(down), false)
+        self.ramp_at(shapes(&self.ramp, x).minus(shapes(&self.ramp, later)), false)
     }
 
     /// One tick of a ramp on any curve.
@@ -391,7 +388,6 @@ impl Executor {
         }
         let timing = self.segment.timing;
         self.mode = Mode::Fall;
-        self.left = timing.ramp_ticks;
         self.clock = Clock::falling(timing.clock_step);
         self.advance(timing.step >> 1);
     }
@@ -411,7 +407,6 @@ impl Executor {
                 let uncorrected = u32::from(!next.corrected);
                 self.counters.uncorrected = self.counters.uncorrected.wrapping_add(uncorrected);
                 self.mode = Mode::Settle;
-                self.left = next.settle_ticks;
                 self.clock = Clock::rising(next.settle_step);
                 return self.finish(self.rest_nm, self.rest_offset_nm, flag::SETTLING);
             }
@@ -423,9 +418,9 @@ impl Executor {
     #[inline(never)]
     fn settle(&mut self) -> Output {
         let target = self.segment.start_offset_nm;
-        self.left = self.left.wrapping_sub(1);
-        let share = shapes(&self.ramp, self.clock.advance()).s_q32;
-        if self.left == 0 || self.rest_offset_nm == target {
+        let (x, end) = self.clock.advance();
+        let share = shapes(&self.ramp, x).s_q32;
+        if end || self.rest_offset_nm == target {
             self.rest_offset_nm = target;
             self.begin_segment();
             return self.finish(self.rest_nm, target, flag::SETTLING);
@@ -440,13 +435,10 @@ impl Executor {
 
     fn begin_segment(&mut self) {
         let timing = self.segment.timing;
-        self.left = timing.ramp_ticks;
+        self.left = timing.cruise_ticks;
         self.mode = match self.segment.kind {
             _ if self.segment.epoch != self.epoch => Mode::Rest,
-            Kind::Dwell => {
-                self.left = timing.cruise_ticks;
-                Mode::Dwell
-            }
+            Kind::Dwell => Mode::Dwell,
             Kind::Arc => Mode::ArcRise,
             Kind::Line | Kind::Helix => Mode::Rise,
         };

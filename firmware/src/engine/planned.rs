@@ -165,8 +165,7 @@ pub struct Planned {
     /// Bounds on offset (nm) and its change (nm per tick).
     pub(crate) offset_nm: i32,
     pub(crate) slew_nm: i32,
-    /// Ticks to move the offset from what it is to what this segment starts with, and its clock.
-    pub(crate) settle_ticks: u32,
+    /// Clock step of the ramp that moves the offset from what it is to what this segment starts with.
     pub(crate) settle_step: i64,
     pub(crate) start_offset_nm: [i32; 3],
     pub(crate) end_offset_nm: [i32; 3],

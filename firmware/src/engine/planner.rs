@@ -338,10 +338,8 @@ impl Planner {
     }
 
     fn blank(&self) -> Planned {
-        let settle_ticks = self.config.engage_ticks();
         Planned {
-            settle_ticks,
-            settle_step: clock_step(settle_ticks),
+            settle_step: clock_step(self.config.engage_ticks()),
             offset_nm: to_fixed(self.config.offset_m * 1e9, 0),
             slew_nm: to_fixed(self.config.slew_m_s * self.config.tick_s() * 1e9, 0),
             start_nm: self.position_nm,

@@ -1,8 +1,9 @@
 //! The degree-9 feed ramp in fixed point, one evaluation a tick.
 //!
 //! With x = 2u − 1 and w = 1 − x² (so q = w/4, r = −x) the smoothstep and its derivatives are
-//! S = ½ + x·P(x²), S′ = (315/128) w⁴, S″ = −(315/8) x w³, S‴ = (945/2) w² (1 − 7w/6).
-//! Falling ramps are rising ones run backwards: S and S″ keep their sign, S′ and S‴ change it.
+//! S = ½ + ½x·(1 + w/2 + 3w²/8 + 5w³/16 + 35w⁴/128), S′ = (315/128) w⁴, S″ = −(315/8) x w³,
+//! S‴ = (945/2) w² (1 − 7w/6). Falling ramps are rising ones run backwards: S and S″ keep their sign, S′ and S‴
+//! change it.
 use giotto_shared::fixed::{mulh, mulh_add, to_fixed};
 
 /// S′ = `FIRST`·w⁴.
@@ -12,21 +13,15 @@ pub(crate) const SECOND: f64 = 315.0 / 8.0;
 /// S‴ = `THIRD`·w²(1 − 7w/6).
 pub(crate) const THIRD: f64 = 945.0 / 2.0;
 
-/// P(y) = 315/256·(1 − 4y/3 + 6y²/5 − 4y³/7 + y⁴/9), from S′ integrated. Each coefficient is one bit finer than the
-/// one before it, as Horner's scheme with [`mulh_add`] wants it, and positive because its argument is −y. Kept in
-/// memory for the reason given at [`SinCos`](giotto_shared::angle::SinCos).
-pub(crate) const POLYNOMIAL: [i32; 5] = [
-    to_fixed(315.0 / 256.0, 28),
-    to_fixed(315.0 / 256.0 * 4.0 / 3.0, 29),
-    to_fixed(315.0 / 256.0 * 6.0 / 5.0, 30),
-    to_fixed(315.0 / 256.0 * 4.0 / 7.0, 31),
-    to_fixed(315.0 / 256.0 / 9.0, 32),
-];
+/// Coefficients of w², w³ and w⁴ in (S − ½)/x: 3/16 (Q31), 5/32 (Q32), 35/256 (Q31). Kept in memory for the reason
+/// given at [`SinCos`](giotto_shared::angle::SinCos).
+pub(crate) const POLYNOMIAL: [i32; 3] =
+    [to_fixed(3.0 / 16.0, 31), to_fixed(5.0 / 32.0, 32), to_fixed(35.0 / 256.0, 31)];
 
 /// The ramp at one tick. S‴ is `THIRD`·(w² − 7w³/6).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub(crate) struct Shapes {
-    /// S, Q32. Error 2e-8.
+    /// S, Q32. Error 6e-9.
     pub(crate) s_q32: u32,
     /// w², Q31.
     pub(crate) w2_q31: i32,
@@ -53,26 +48,27 @@ impl Shapes {
 
 /// Evaluates the ramp at x = 2u − 1, Q31.
 #[inline(always)]
-pub(crate) fn shapes(p: &[i32; 5], x: i32) -> Shapes {
-    // −x² in Q31: unlike +1, −1 is a number there.
-    let y = mulh(x, x).wrapping_mul(-2);
-    let w = i32::MAX.wrapping_add(y);
-    let [p0, p1, p2, p3, p4] = *p;
-    let slope = mulh_add(p0, mulh_add(p1, mulh_add(p2, mulh_add(p3, p4, y), y), y), y);
-    // ±½ in Q27; at the very end rounding may pass ½, and S must not wrap.
-    let half = mulh(x, slope).clamp(-(1 << 26), (1 << 26) - 1);
+pub(crate) fn shapes(p: &[i32; 3], x: i32) -> Shapes {
+    // 1 − x² in Q31; at x = −1 it comes out as −2⁻³¹, which is as good as 0.
+    let w = mulh(x, x).wrapping_mul(2) ^ i32::MAX;
     let w2_q31 = mulh(w, w).wrapping_mul(2);
     let w3_q30 = mulh(w2_q31, w);
+    let w4_q31 = mulh(w2_q31, w2_q31).wrapping_mul(2);
+    let [p2, p3, p4] = *p;
+    let straight = (1i32 << 29).wrapping_add(w >> 3);
+    let slope_q30 = mulh_add(mulh_add(mulh_add(straight, p2, w2_q31), p3, w3_q30), p4, w4_q31);
+    // ±½ in Q29; at the very end rounding may pass ½, and S must not wrap.
+    let half = mulh(x, slope_q30).clamp(-(1 << 28), (1 << 28) - 1);
     Shapes {
-        s_q32: (half.wrapping_mul(32) as u32) ^ (1 << 31),
+        s_q32: (half.wrapping_mul(8) as u32) ^ (1 << 31),
         w2_q31,
         w3_q30,
-        w4_q31: mulh(w2_q31, w2_q31).wrapping_mul(2),
+        w4_q31,
         xw3_q29: mulh(x, w3_q30),
     }
 }
 
-/// Where a ramp stands: x as Q63, so that whole ramps of any length end where they should.
+/// Where a ramp stands: x as Q63. It overflows in the very tick in which the ramp ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub(crate) struct Clock {
     x: i64,
@@ -80,7 +76,7 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// At the start of a rising ramp of so many ticks.
+    /// At the start of a rising ramp.
     pub(crate) const fn rising(step_q63: i64) -> Self {
         Self { x: i64::MIN, dx: step_q63 }
     }
@@ -92,7 +88,16 @@ impl Clock {
 
     /// The falling ramp that goes through the same values of 1 − S as this rising one goes on to.
     pub(crate) const fn mirrored(self) -> Self {
-        Self { x: self.x.wrapping_neg(), dx: self.dx.wrapping_neg() }
+        Self { x: !self.x, dx: self.dx.wrapping_neg() }
+    }
+
+    /// Ticks since the start of a rising ramp. Not for the tick: it divides.
+    pub(crate) const fn elapsed(self) -> u32 {
+        let way = self.x.wrapping_sub(i64::MIN) as u64;
+        match way.checked_div(self.dx as u64) {
+            Some(ticks) => ticks as u32,
+            None => 0,
+        }
     }
 
     /// x now, Q31.
@@ -100,18 +105,19 @@ impl Clock {
         (self.x >> 32) as i32
     }
 
-    /// x after one more tick, Q31.
+    /// x after one more tick, Q31, and whether that is the end of the ramp.
     #[inline(always)]
-    pub(crate) fn advance(&mut self) -> i32 {
-        self.x = self.x.wrapping_add(self.dx);
-        (self.x >> 32) as i32
+    pub(crate) fn advance(&mut self) -> (i32, bool) {
+        let (x, end) = self.x.overflowing_add(self.dx);
+        self.x = x;
+        ((x >> 32) as i32, end)
     }
 }
 
-/// Q63 step of x per tick for a ramp of so many ticks (at least 2).
+/// Q63 step of x per tick for a ramp of so many ticks (at least 2): 2⁶⁴/ticks, rounded up.
 pub(crate) const fn clock_step(ticks: u32) -> i64 {
-    let ticks = if ticks < 2 { 2 } else { ticks };
-    (u64::MAX / ticks as u64) as i64
+    let ticks = if ticks < 3 { 3 } else { ticks };
+    (u64::MAX / ticks as u64 + 1) as i64
 }
 
 #[cfg(test)]
@@ -139,6 +145,21 @@ mod tests {
             }
         }
         std::println!("errors of S, S', S'', S''': {worst:?}");
-        assert!(worst[0] < 2e-8 && worst[1] < 3e-8 && worst[2] < 6e-7 && worst[3] < 4e-6, "{worst:?}");
+        assert!(worst[0] < 6e-9 && worst[1] < 3e-8 && worst[2] < 6e-7 && worst[3] < 4e-6, "{worst:?}");
+    }
+
+    #[test]
+    fn a_ramp_ends_in_its_last_tick() {
+        for ticks in [3, 4, 5, 32, 33, 1000, 4096, 65_535, 1_000_003] {
+            for mut clock in [Clock::rising(clock_step(ticks)), Clock::falling(clock_step(ticks))] {
+                let rising = clock.dx > 0;
+                for n in 1..=ticks {
+                    assert_eq!(clock.advance().1, n == ticks, "tick {n} of {ticks}");
+                    if rising && n < ticks {
+                        assert_eq!(clock.elapsed(), n);
+                    }
+                }
+            }
+        }
     }
 }
