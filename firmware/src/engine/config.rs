@@ -27,6 +27,8 @@ pub struct Config {
     pub slew_m_s: f64,
     /// Time over which a correction is engaged or disengaged, s.
     pub engage_s: f64,
+    /// Time in which the play of an axis is taken up at its reversal, s.
+    pub take_up_s: f64,
 }
 
 impl Config {
@@ -39,6 +41,7 @@ impl Config {
             offset_m: 0.02,
             slew_m_s: 0.2,
             engage_s: 0.25,
+            take_up_s: 0.008,
         }
     }
 
@@ -55,6 +58,7 @@ impl Config {
             (self.offset_m, 0.05, "offset_m"),
             (self.slew_m_s, 1.0, "slew_m_s"),
             (self.engage_s, 10.0, "engage_s"),
+            (self.take_up_s, 1.0, "take_up_s"),
         ];
         for (value, most, name) in upper_bounds {
             // NaN fails the comparison too.

@@ -5,6 +5,7 @@
 //! in instructions by `giotto-hil ticks`. What it runs was prepared by the planner in the background and comes
 //! through an [`Inbox`] by value, so that a new table never acts inside a segment.
 use super::engage::Engage;
+use super::extra::Sides;
 use super::guard::Guard;
 use super::planned::{Kind, Planned};
 use super::ramp::{Clock, POLYNOMIAL, Shapes, shapes};
@@ -38,17 +39,17 @@ enum Mode {
     Settle,
     /// Stands still for a time.
     Dwell,
-    /// Arc at constant rate.
+    /// Arc without profile terms at constant rate.
     ArcCruise,
-    /// Arc in a rising ramp.
+    /// Arc without profile terms in a rising ramp.
     ArcRise,
-    /// Arc in a falling ramp.
+    /// Arc without profile terms in a falling ramp.
     ArcFall,
-    /// Line or helix at constant rate.
+    /// Any segment at constant rate.
     Cruise,
-    /// Line or helix in a rising ramp.
+    /// Any segment in a rising ramp.
     Rise,
-    /// Line or helix in a falling ramp.
+    /// Any segment in a falling ramp.
     Fall,
     /// Stopped while rising: the rising ramp runs on, a falling one is laid over it. Each has four continuous
     /// derivatives, so their sum has; it never runs backwards because the second is never ahead of the first.
@@ -76,10 +77,14 @@ pub struct Executor {
     second: Clock,
     /// Programmed position where it stands or last stood.
     rest_nm: [i32; 3],
-    /// Offset wanted there, before engagement.
+    /// Offset wanted there, before engagement, and what the next segment wants there.
     rest_offset_nm: [i32; 3],
+    target_nm: [i32; 3],
+    sides: Sides,
     /// Segments planned before the last stop carry an older epoch and are thrown away.
     epoch: u8,
+    /// On the way to a standstill that was asked for.
+    halting: bool,
     fault: Option<Fault>,
 }
 
@@ -103,7 +108,10 @@ impl Executor {
             second: Clock::default(),
             rest_nm: position_nm,
             rest_offset_nm: [0; 3],
+            target_nm: [0; 3],
+            sides: Sides::default(),
             epoch: 0,
+            halting: false,
             fault: None,
         }
     }
@@ -161,7 +169,7 @@ impl Executor {
 
     /// A stop was asked for and the machine still moves.
     pub fn stopping(&self) -> bool {
-        !self.idle() && self.segment.epoch != self.epoch
+        self.halting && !self.idle()
     }
 
     /// Accepts segments again after a fault; `false` while still moving.
@@ -177,6 +185,7 @@ impl Executor {
         if self.stopping() {
             return;
         }
+        self.halting = true;
         self.epoch = self.epoch.wrapping_add(1);
         self.counters.stops = self.counters.stops.wrapping_add(1);
         let timing = &self.segment.timing;
@@ -304,13 +313,47 @@ impl Executor {
     #[inline(never)]
     fn cruise(&mut self) -> Output {
         self.advance(self.segment.timing.step);
-        let phase = self.phase;
-        let (nominal, offset) = self.steady_at(phase);
+        let phase_q32 = (self.phase >> 32) as u32;
+        let (c, s) = self.weights(phase_q32);
+        let nominal = self.place(c, s, phase_q32);
+        let [x, y, z] = &self.segment.axes;
+        let mut wanted = match self.segment.kind {
+            Kind::Arc | Kind::Helix => [x.steady(c, s), y.steady(c, s), z.steady(c, s)],
+            Kind::Line | Kind::Dwell => [0; 3],
+        };
+        if self.segment.extended {
+            if self.segment.kind == Kind::Line {
+                let [x, y, _] = &self.segment.extra.linear;
+                wanted[0] = wanted[0].wrapping_add(x.on_line(c, i32::MAX, 0));
+                wanted[1] = wanted[1].wrapping_add(y.on_line(c, i32::MAX, 0));
+            }
+            wanted = self.with_terms(c, s, nominal, wanted);
+        }
         self.left = self.left.wrapping_sub(1);
         if self.left == 0 {
             self.begin_fall();
         }
-        self.finish(nominal, offset, flag::MOVING | flag::CRUISE)
+        self.out(nominal, wanted, flag::MOVING | flag::CRUISE)
+    }
+
+    /// Adds the profile terms that are not linear.
+    #[inline(always)]
+    fn with_terms(&mut self, c: i32, s: i32, nominal: [i32; 3], wanted: [i32; 3]) -> [i32; 3] {
+        let arm = self.arm(c, s);
+        let tables = (&self.sincos, &self.ramp);
+        let [ex, ey] = self.segment.extra.unsteady_at(&mut self.sides, tables, (c, s), nominal, arm);
+        let [x, y, z] = wanted;
+        [x.wrapping_add(ex), y.wrapping_add(ey), z]
+    }
+
+    /// Distance from the centre of an arc, nm, X and Y.
+    #[inline(always)]
+    fn arm(&self, c: i32, s: i32) -> [i32; 2] {
+        let [x, y, _] = &self.segment.axes;
+        match self.segment.kind {
+            Kind::Arc | Kind::Helix => [x.turned(c, s), y.turned(c, s)],
+            Kind::Line | Kind::Dwell => [0; 2],
+        }
     }
 
     #[inline(never)]
@@ -329,7 +372,7 @@ impl Executor {
         if end {
             // The rising ramp is over: what remains is the falling one alone.
             self.clock = self.second.mirrored();
-            self.mode = if self.segment.kind == Kind::Arc { Mode::ArcFall } else { Mode::Fall };
+            self.mode = Mode::Fall;
             let shape = shapes(&self.ramp, self.clock.here());
             return self.ramp_at(shape, true);
         }
@@ -337,63 +380,97 @@ impl Executor {
     }
 
     /// One tick of a ramp on any curve.
+    #[inline(always)]
     fn ramp_at(&mut self, shape: Shapes, falling: bool) -> Output {
         let step = scaled(self.segment.timing.step, shape.s_q32);
         self.advance(step);
         let law = if falling { &self.segment.fall } else { &self.segment.rise };
-        let phase = ramp_phase(self.phase, step, law.end_term(&shape));
-        let nominal = self.place(phase);
-        let axes = &self.segment.axes;
-        let offset = if self.segment.kind == Kind::Line {
+        let phase_q32 = ramp_phase(self.phase, step, law.end_term(&shape));
+        let (c, s) = self.weights(phase_q32);
+        let nominal = self.place(c, s, phase_q32);
+        let [x, y, z] = &self.segment.axes;
+        let mut wanted = if self.segment.kind == Kind::Line {
             let along = law.along(&shape);
-            [mulh(axes[0].v, along), mulh(axes[1].v, along), mulh(axes[2].v, along)]
+            [mulh(x.v, along), mulh(y.v, along), mulh(z.v, along)]
         } else {
-            let (c, s) = sincos_with(&self.sincos, phase);
             let (re, im) = law.gain(&shape, c, s);
-            axes.map(|a| a.turned(re, im))
+            [x.turned(re, im), y.turned(re, im), z.turned(re, im)]
         };
-        self.finish(nominal, offset, flag::MOVING)
+        if self.segment.extended {
+            let turning = if falling { shape.w4_q31.wrapping_neg() } else { shape.w4_q31 };
+            wanted = self.with_linear(c, s, (shape.s_q32 >> 1) as i32, turning, wanted);
+            wanted = self.with_terms(c, s, nominal, wanted);
+        }
+        self.out(nominal, wanted, flag::MOVING)
     }
 
+    /// Adds the linear profile terms.
+    #[inline(always)]
+    fn with_linear(&self, c: i32, s: i32, rate: i32, turning: i32, wanted: [i32; 3]) -> [i32; 3] {
+        let [x, y, z] = &self.segment.extra.linear;
+        let [wx, wy, wz] = wanted;
+        if self.segment.kind == Kind::Line {
+            let (ex, ey) = (x.on_line(c, rate, turning), y.on_line(c, rate, turning));
+            return [wx.wrapping_add(ex), wy.wrapping_add(ey), wz];
+        }
+        let (ex, ey) = (x.on_arc(rate, turning, c, s), y.on_arc(rate, turning, c, s));
+        let ez = mulh(z.a[0], c).wrapping_add(mulh(z.b[0], s));
+        [wx.wrapping_add(ex), wy.wrapping_add(ey), wz.wrapping_add(ez)]
+    }
+
+    /// Offset wanted, nm, standing at these weights.
+    fn standing_offset(&self, c: i32, s: i32) -> [i32; 3] {
+        if !self.segment.extended {
+            return [0; 3];
+        }
+        let tables = (&self.sincos, &self.ramp);
+        let (arm, extra) = (self.arm(c, s), &self.segment.extra);
+        let [ex, ey] = extra.standing_at(&self.sides, tables, (c, s), self.rest_nm, arm);
+        self.with_linear(c, s, 0, 0, [ex, ey, 0])
+    }
+
+    /// Top of a rising ramp: the phase is set to its exact value, one step early for [`Self::cruise`] to make.
     #[inline(never)]
     fn top(&mut self) -> Output {
         let timing = self.segment.timing;
         self.set_phase(timing.up);
-        let (nominal, offset) = self.steady_at(timing.up);
-        self.left = timing.cruise_ticks;
+        let (turns, phase) = (self.turns, self.phase);
+        (self.phase, self.turns) = {
+            let (before, wrapped) = phase.overflowing_sub(timing.step);
+            (before, turns.wrapping_sub(i32::from(wrapped)))
+        };
+        self.left = timing.cruise_ticks.wrapping_add(1);
         self.mode = Mode::Cruise;
-        if self.left == 0 {
-            self.begin_fall();
-        }
-        self.finish(nominal, offset, flag::MOVING)
+        self.cruise()
     }
 
     #[inline(never)]
     fn standstill(&mut self) -> Output {
         self.set_phase(self.end);
         self.mode = Mode::Rest;
+        let phase_q32 = (self.phase >> 32) as u32;
+        let (c, s) = self.weights(phase_q32);
+        self.rest_nm = self.place(c, s, phase_q32);
         if self.end == self.segment.timing.end {
-            (self.rest_nm, self.rest_offset_nm) = (self.segment.end_nm, self.segment.end_offset_nm);
-        } else {
-            self.rest_nm = self.place((self.phase >> 32) as u32);
-            self.rest_offset_nm = [0; 3];
+            self.rest_nm = self.segment.end_nm;
         }
+        self.rest_offset_nm = self.standing_offset(c, s);
         self.counters.segments = self.counters.segments.wrapping_add(1);
         self.finish(self.rest_nm, self.rest_offset_nm, flag::MOVING)
     }
 
     fn begin_fall(&mut self) {
-        if self.segment.kind == Kind::Arc {
+        if self.mode == Mode::ArcCruise {
             return self.begin_arc_fall();
         }
-        let timing = self.segment.timing;
         self.mode = Mode::Fall;
-        self.clock = Clock::falling(timing.clock_step);
-        self.advance(timing.step >> 1);
+        self.clock = Clock::falling(self.segment.timing.clock_step);
+        self.advance(self.segment.timing.step >> 1);
     }
 
     #[inline(never)]
     fn rest(&mut self, inbox: &mut impl Inbox) -> Output {
+        self.halting = false;
         if let Some(next) = inbox.take() {
             if next.epoch != self.epoch || self.fault.is_some() {
                 self.counters.dropped = self.counters.dropped.wrapping_add(1);
@@ -402,22 +479,32 @@ impl Executor {
                 self.fault = Some(Fault::Discontinuity);
             } else {
                 self.segment = next;
-                self.guard.set(next.offset_nm, next.slew_nm);
-                self.guard.watch(!self.engage.full());
-                let uncorrected = u32::from(!next.corrected);
-                self.counters.uncorrected = self.counters.uncorrected.wrapping_add(uncorrected);
-                self.mode = Mode::Settle;
-                self.clock = Clock::rising(next.settle_step);
+                self.begin_settle();
                 return self.finish(self.rest_nm, self.rest_offset_nm, flag::SETTLING);
             }
         }
         self.finish(self.rest_nm, self.rest_offset_nm, 0)
     }
 
+    fn begin_settle(&mut self) {
+        self.guard.set(self.segment.offset_nm, self.segment.slew_nm);
+        self.guard.watch(!self.engage.full());
+        let uncorrected = u32::from(!self.segment.corrected);
+        self.counters.uncorrected = self.counters.uncorrected.wrapping_add(uncorrected);
+        self.mode = Mode::Settle;
+        self.clock = Clock::rising(self.segment.settle_step);
+        self.target_nm = self.rest_offset_nm;
+        if self.segment.kind != Kind::Dwell {
+            let (c, s) = self.weights((self.segment.timing.start >> 32) as u32);
+            self.sides.seed(&self.segment.extra, c, s);
+            self.target_nm = self.standing_offset(c, s);
+        }
+    }
+
     /// Moves the offset from what it is to what the segment starts with, then lets the segment begin.
     #[inline(never)]
     fn settle(&mut self) -> Output {
-        let target = self.segment.start_offset_nm;
+        let target = self.target_nm;
         let (x, end) = self.clock.advance();
         let share = shapes(&self.ramp, x).s_q32;
         if end || self.rest_offset_nm == target {
@@ -439,8 +526,8 @@ impl Executor {
         self.mode = match self.segment.kind {
             _ if self.segment.epoch != self.epoch => Mode::Rest,
             Kind::Dwell => Mode::Dwell,
-            Kind::Arc => Mode::ArcRise,
-            Kind::Line | Kind::Helix => Mode::Rise,
+            Kind::Arc if !self.segment.extended => Mode::ArcRise,
+            Kind::Arc | Kind::Line | Kind::Helix => Mode::Rise,
         };
         self.clock = Clock::rising(timing.clock_step);
         self.phase = timing.start;
@@ -472,38 +559,51 @@ impl Executor {
         self.turns = self.turns.wrapping_add(wrapped);
     }
 
-    /// Position, nm, at a phase.
-    fn place(&self, phase_q32: u32) -> [i32; 3] {
-        let axes = &self.segment.axes;
+    /// Weights of a curve's two vectors, Q31: cosine and sine, or the share of a line.
+    #[inline(always)]
+    fn weights(&self, phase_q32: u32) -> (i32, i32) {
         if self.segment.kind == Kind::Line {
-            return [axes[0].on_line(phase_q32), axes[1].on_line(phase_q32), axes[2].on_line(phase_q32)];
+            ((phase_q32 >> 1) as i32, 0)
+        } else {
+            sincos_with(&self.sincos, phase_q32)
         }
-        let (c, s) = sincos_with(&self.sincos, phase_q32);
-        let mut at = [axes[0].on_arc(c, s), axes[1].on_arc(c, s), axes[2].on_arc(c, s)];
-        if self.segment.kind == Kind::Helix {
-            // A ramp's sum of steps runs ahead of the phase and may have passed a whole turn before it.
-            let sum_q32 = (self.phase >> 32) as u32;
-            let early = sum_q32 < phase_q32 && phase_q32.wrapping_sub(sum_q32) > 1 << 31;
-            let turns = self.turns.wrapping_sub(i32::from(early));
-            let start = self.segment.risen(0, (self.segment.timing.start >> 32) as u32);
-            for ((p, r), b) in at.iter_mut().zip(self.segment.risen(turns, phase_q32)).zip(start) {
-                *p = p.wrapping_add(r).wrapping_sub(b);
-            }
-        }
-        at
     }
 
-    /// Position and offset, nm, at constant rate.
-    fn steady_at(&self, phase: u64) -> ([i32; 3], [i32; 3]) {
-        let phase_q32 = (phase >> 32) as u32;
-        let nominal = self.place(phase_q32);
-        if self.segment.kind == Kind::Line {
-            return (nominal, [0; 3]);
+    /// Position, nm.
+    #[inline(always)]
+    fn place(&self, c: i32, s: i32, phase_q32: u32) -> [i32; 3] {
+        let [x, y, z] = &self.segment.axes;
+        match self.segment.kind {
+            Kind::Dwell => self.rest_nm,
+            Kind::Line => [x.on_line(phase_q32), y.on_line(phase_q32), z.on_line(phase_q32)],
+            Kind::Arc => [x.on_arc(c, s), y.on_arc(c, s), z.on_arc(c, s)],
+            Kind::Helix => self.on_helix([x.on_arc(c, s), y.on_arc(c, s), z.on_arc(c, s)], phase_q32),
         }
-        let (c, s) = sincos_with(&self.sincos, phase_q32);
-        (nominal, self.segment.axes.map(|a| a.steady(c, s)))
     }
 
+    #[inline(never)]
+    fn on_helix(&self, flat: [i32; 3], phase_q32: u32) -> [i32; 3] {
+        // A ramp's sum of steps runs ahead of the phase and may have passed a whole turn before it.
+        let sum_q32 = (self.phase >> 32) as u32;
+        let early = sum_q32 < phase_q32 && phase_q32.wrapping_sub(sum_q32) > 1 << 31;
+        let turns = self.turns.wrapping_sub(i32::from(early));
+        let [x, y, z] = self.segment.risen(turns, phase_q32);
+        let [bx, by, bz] = self.segment.risen(0, (self.segment.timing.start >> 32) as u32);
+        let [fx, fy, fz] = flat;
+        let add = |f: i32, r: i32, b: i32| f.wrapping_add(r).wrapping_sub(b);
+        [add(fx, x, bx), add(fy, y, by), add(fz, z, bz)]
+    }
+
+    /// Engagement, bounds, and out: the quick way if it will do.
+    #[inline(always)]
+    fn out(&mut self, nominal: [i32; 3], wanted: [i32; 3], flags: u16) -> Output {
+        if self.guard.pass_easily(wanted) {
+            return Output::new(nominal, wanted, flags);
+        }
+        self.finish(nominal, wanted, flags)
+    }
+
+    /// Engagement, bounds, and out.
     #[inline(never)]
     fn finish(&mut self, nominal: [i32; 3], wanted: [i32; 3], flags: u16) -> Output {
         let wanted = self.engage.apply(wanted);

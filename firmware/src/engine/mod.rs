@@ -11,16 +11,19 @@
 mod config;
 mod engage;
 mod executor;
+mod extra;
 mod guard;
 mod planned;
 mod planner;
 mod ramp;
+mod zones;
 
 pub use config::{Config, ConfigError, MAX_POSITION_M, MAX_RADIUS_M, MIN_RAMP_TICKS, RATE_HZ};
 pub use executor::{Executor, Inbox};
 pub use giotto_shared::path::{CircleRun, MotionLimits, Segment};
 pub use planned::Planned;
 pub use planner::{Planner, Refused};
+pub use zones::TableError;
 
 use giotto_shared::table::Table;
 
@@ -105,9 +108,10 @@ impl Engine {
         })
     }
 
-    /// The table for segments accepted from now on; `None`: no correction. Acts between segments.
-    pub fn load(&mut self, table: Option<&Table>) {
-        self.planner.set_table(table);
+    /// The table for segments accepted from now on; `None`: no correction. Acts between segments. On an
+    /// error the old one stays.
+    pub fn load(&mut self, table: Option<&Table>) -> Result<(), TableError> {
+        self.planner.set_table(table)
     }
 
     /// Engages or disengages the correction, at any time, without a step.

@@ -1,4 +1,5 @@
 //! A segment in the form that the tick runs: integers only, everything that could fail already done.
+use super::extra::Extra;
 use super::ramp::Shapes;
 use giotto_shared::fixed::{mulh, mulh_add, mulh_sub};
 
@@ -158,6 +159,8 @@ pub struct Planned {
     pub(crate) kind: Kind,
     /// A zone of the table applies.
     pub(crate) corrected: bool,
+    /// The zone has profile terms.
+    pub(crate) extended: bool,
     /// Segments planned before a stop carry an older one.
     pub(crate) epoch: u8,
     /// Helix: nm per turn.
@@ -167,10 +170,9 @@ pub struct Planned {
     pub(crate) slew_nm: i32,
     /// Clock step of the ramp that moves the offset from what it is to what this segment starts with.
     pub(crate) settle_step: i64,
-    pub(crate) start_offset_nm: [i32; 3],
-    pub(crate) end_offset_nm: [i32; 3],
     pub(crate) start_nm: [i32; 3],
     pub(crate) end_nm: [i32; 3],
+    pub(crate) extra: Extra,
 }
 
 impl Planned {

@@ -1,14 +1,15 @@
 //! From what a program asks for to integers that the tick runs. Runs in the background, in `f64`.
 use super::config::{Config, MAX_POSITION_M, MAX_RADIUS_M, MAX_RAMP_TICKS, ticks};
+use super::extra::{Extra, Motion};
 use super::planned::{Axis, Kind, Law, Planned, Timing, base};
 use super::ramp::{FIRST, SECOND, THIRD, clock_step};
+use super::zones::{Asked, TableError, Zones};
 use core::f64::consts::TAU;
 use giotto_shared::angle::{phase_from_rad, sincos};
 use giotto_shared::fixed::to_fixed;
 use giotto_shared::law::{AngularMotion, Operator};
-use giotto_shared::model::Cumulants;
 use giotto_shared::path::{CircleRun, FeedRamp, Segment};
-use giotto_shared::table::{Table, Travel, Zone};
+use giotto_shared::table::Table;
 
 /// Why a segment was not accepted. Nothing has moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,7 +31,7 @@ const MAX_GAIN: f64 = 0.12;
 #[derive(Clone, Debug)]
 pub struct Planner {
     config: Config,
-    table: Option<Table>,
+    zones: Zones,
     position_nm: [i32; 3],
     epoch: u8,
 }
@@ -50,12 +51,16 @@ struct Round {
 impl Planner {
     /// Plans from a position on.
     pub fn new(config: &Config, position_nm: [i32; 3]) -> Self {
-        Self { config: *config, table: None, position_nm, epoch: 0 }
+        Self { config: *config, zones: Zones::default(), position_nm, epoch: 0 }
     }
 
-    /// The table used for segments planned from now on; `None`: no correction.
-    pub fn set_table(&mut self, table: Option<&Table>) {
-        self.table = table.cloned();
+    /// The table used for segments planned from now on; `None`: no correction. On an error the old one stays.
+    pub fn set_table(&mut self, table: Option<&Table>) -> Result<(), TableError> {
+        self.zones = match table {
+            Some(table) => Zones::build(table)?,
+            None => Zones::default(),
+        };
+        Ok(())
     }
 
     /// After a stop or a declared position: plans on from where the executor stands.
@@ -212,15 +217,27 @@ impl Planner {
         }
         segment.timing = timing;
         segment.rise.end_term_q1 = end_term(&timing);
-        if let Some((operator, limits)) = self.zone(None, feed, None) {
+        let middle = [0, 1, 2].map(|i| f64::from(from[i]) * 1e-9 + 0.5 * span[i]);
+        if let Some(zone) =
+            self.zones.choose(&Asked { place_m: middle, radius_m: None, feed_m_s: feed, ccw: None })
+        {
             let t = f64::from(ramp_ticks) * self.config.tick_s();
             let speed = timing.step as f64 / TURN * length / self.config.tick_s();
-            let snap = operator.fourth_s4 * speed * THIRD / (t * t * t) * 1e9;
-            segment.rise.k5 = to_fixed(operator.second_s2 * speed * FIRST / t * 1e9, 2);
+            let snap = zone.operator.fourth_s4 * speed * THIRD / (t * t * t) * 1e9;
+            segment.rise.k5 = to_fixed(zone.operator.second_s2 * speed * FIRST / t * 1e9, 2);
             segment.rise.k7 = to_fixed(snap, 2);
             segment.rise.k8 = to_fixed(-7.0 / 6.0 * snap, 3);
-            segment.corrected = true;
-            (segment.offset_nm, segment.slew_nm) = limits;
+            self.bound(&mut segment);
+            if let Some(profile) = &zone.profile {
+                // Without a place there is no point that position errors could be counted from.
+                let mut profile = *profile;
+                if zone.reference_m.is_none() {
+                    profile.position = [[0.0; 2]; 2];
+                }
+                let start = seen_from(metres(from), zone.reference_m.unwrap_or_default());
+                segment.extra = Extra::on_line(&profile, &self.motion(&timing, 1.0), span, start);
+                segment.extended = true;
+            }
         }
         segment.fall = segment.rise.turned_round();
         segment.end_nm = to;
@@ -249,18 +266,34 @@ impl Planner {
             let arm = |a: f64| to_fixed(a * round.radius * 1e9, 1);
             *axis = Axis { base: base(centre_nm[i]), u: arm(round.u[i]), v: arm(round.v[i]), a: 0, b: 0 };
         }
-        let zone = self.zone(Some((round.centre, round.radius)), round.feed, Some(round.ccw));
         segment.timing = timing(ramp_ticks);
-        if let Some((operator, limits)) = zone {
+        let asked = Asked {
+            place_m: round.centre,
+            radius_m: Some(round.radius),
+            feed_m_s: round.feed,
+            ccw: Some(round.ccw),
+        };
+        if let Some(zone) = self.zones.choose(&asked) {
             let mut ramp = ramp_ticks;
             for _ in 0..6 {
                 let slower = timing(ramp);
-                if let Some((law, radial)) = self.law_on_arc(&operator, &slower) {
-                    (segment.rise, segment.timing, segment.corrected) = (law, slower, true);
-                    (segment.offset_nm, segment.slew_nm) = limits;
+                if let Some((law, radial)) = self.law_on_arc(&zone.operator, &slower) {
+                    (segment.rise, segment.timing) = (law, slower);
+                    self.bound(&mut segment);
                     for axis in &mut segment.axes {
                         axis.a = to_fixed(radial * f64::from(axis.u), 0);
                         axis.b = to_fixed(radial * f64::from(axis.v), 0);
+                    }
+                    if let Some(profile) = &zone.profile {
+                        let centre = seen_from(round.centre, zone.reference_m.unwrap_or(round.centre));
+                        let arm = |a: [f64; 3]| a.map(|x| x * round.radius);
+                        let motion = self.motion(&slower, TAU);
+                        let extra = Extra::on_arc(profile, &motion, arm(round.u), arm(round.v), centre);
+                        for (i, axis) in segment.axes.iter_mut().enumerate() {
+                            let (a, b) = extra.steady(i);
+                            (axis.a, axis.b) = (axis.a.saturating_add(a), axis.b.saturating_add(b));
+                        }
+                        (segment.extra, segment.extended) = (extra, true);
                     }
                     break;
                 }
@@ -349,51 +382,31 @@ impl Planner {
         }
     }
 
-    fn check_feed(&self, feed: f64) -> Result<(), Refused> {
-        if feed > self.config.motion.feed_m_s { Err(Refused::OutOfBounds("feed")) } else { Ok(()) }
+    /// A zone applies: its bounds, or the image's if they are tighter.
+    fn bound(&self, segment: &mut Planned) {
+        let limits = self.zones.limits();
+        let offset = f64::from(limits.offset_m).min(self.config.offset_m);
+        let slew = f64::from(limits.slew_m_s).min(self.config.slew_m_s) * self.config.tick_s();
+        (segment.offset_nm, segment.slew_nm) = (to_fixed(offset * 1e9, 0), to_fixed(slew * 1e9, 0));
+        segment.corrected = true;
     }
 
-    /// The first zone that fits, its operator and bounds (the tighter of table and image).
-    fn zone(
-        &self,
-        circle: Option<([f64; 3], f64)>,
-        feed: f64,
-        ccw: Option<bool>,
-    ) -> Option<(Operator<f64>, (i32, i32))> {
-        let table = self.table.as_ref()?;
-        let zone = table.zones.iter().find(|zone| fits(zone, circle, feed, ccw))?;
-        let cumulants = Cumulants {
-            kappa2_s2: f64::from(zone.cumulants.kappa2_s2),
-            kappa4_s4: f64::from(zone.cumulants.kappa4_s4),
-        };
-        let offset = f64::from(table.limits.offset_m).min(self.config.offset_m);
-        let slew = f64::from(table.limits.slew_m_s).min(self.config.slew_m_s) * self.config.tick_s();
-        Some((Operator::new(&cumulants), (to_fixed(offset * 1e9, 0), to_fixed(slew * 1e9, 0))))
+    fn motion(&self, timing: &Timing, whole: f64) -> Motion {
+        let tick_s = self.config.tick_s();
+        Motion {
+            rate: timing.step as f64 / TURN * whole / tick_s,
+            ramp_s: f64::from(timing.ramp_ticks) * tick_s,
+            tick_s,
+            take_up_s: self.config.take_up_s,
+        }
+    }
+
+    fn check_feed(&self, feed: f64) -> Result<(), Refused> {
+        if feed > self.config.motion.feed_m_s { Err(Refused::OutOfBounds("feed")) } else { Ok(()) }
     }
 }
 
 const TURN: f64 = 18_446_744_073_709_551_616.0;
-
-fn fits(zone: &Zone, circle: Option<([f64; 3], f64)>, feed: f64, ccw: Option<bool>) -> bool {
-    // Programmed values are decimal, bounds are f32: a bound that was meant to be met is met.
-    let inside = |value: f64, [low, high]: [f32; 2]| {
-        let slack = 1e-6 * libm::fabs(value);
-        value >= f64::from(low) - slack && value <= f64::from(high) + slack
-    };
-    let travel = match (zone.travel, ccw) {
-        (Travel::Both, _) | (_, None) => true,
-        (Travel::Ccw, Some(ccw)) => ccw,
-        (Travel::Cw, Some(ccw)) => !ccw,
-    };
-    let place = match (circle, zone.place_m) {
-        (Some((centre, _)), Some([low, high])) => {
-            centre.iter().zip(low).zip(high).all(|((&c, low), high)| inside(c, [low, high]))
-        }
-        _ => true,
-    };
-    let radius = circle.is_none_or(|(_, radius)| inside(radius, zone.radius_m));
-    travel && place && radius && inside(feed, zone.feed_m_s)
-}
 
 /// ∫ of a ramp's rate exceeds its sum by T²/12 of the rate's derivative: step/N·S′/12, in units of 2⁻³² turn, Q1.
 fn end_term(timing: &Timing) -> i32 {
@@ -445,6 +458,11 @@ fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// X and Y of a point seen from another.
+fn seen_from(point: [f64; 3], reference: [f64; 3]) -> [f64; 2] {
+    [point[0] - reference[0], point[1] - reference[1]]
 }
 
 fn unit(a: [f64; 3]) -> Option<[f64; 3]> {

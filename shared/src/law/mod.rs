@@ -2,7 +2,9 @@
 //!
 //! It undoes, to fourth order, a linear chain whose impulse response has the cumulants κ2 and κ4. On a circle it is
 //! the radius correction R/(1 + β1 ω² + β2 ω⁴) to that order, on curves the curvature correction, in entry and exit
-//! the ramp.
+//! the ramp. Beside it, [`Profile`] gathers the profile terms of a zone.
 mod operator;
+mod profile;
 
 pub use operator::{AngularMotion, Gain, Operator};
+pub use profile::{CyclicError, MAX_CYCLIC, Profile, ProfileError, Spike};

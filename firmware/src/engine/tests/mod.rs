@@ -1,5 +1,7 @@
 //! Set-points against an independent `f64` statement of the law.
 extern crate std;
+mod terms;
+
 use super::*;
 use giotto_shared::Direction;
 use giotto_shared::model::Cumulants;
@@ -44,7 +46,7 @@ fn deviation_from_law(
     let mut config = Config::robot(1000);
     (config.offset_m, config.slew_m_s) = (0.05, 1.0);
     let mut engine = Engine::new(config).unwrap();
-    engine.load(Some(&table(kappa[0], kappa[1])));
+    engine.load(Some(&table(kappa[0], kappa[1]))).unwrap();
     let run =
         CircleRun { centre_m: [0.01, -0.02, 0.5], radius_m, feed_m_s, direction, laps: 2, start_rad: 0.3 };
     engine.run_circle(&run).unwrap();
@@ -137,4 +139,14 @@ fn set_points_are_the_law_to_a_tenth_of_a_micrometre() {
         }
     }
     assert!(worst <= 0.1, "{worst} µm");
+}
+
+/// No axis of a set-point moves further in one tick than this, m.
+fn no_jump(out: &[Output], most_m: f64) {
+    for pair in out.windows(2) {
+        for axis in 0..3 {
+            let jump = f64::from(pair[1].corrected_nm[axis] - pair[0].corrected_nm[axis]).abs() * 1e-9;
+            assert!(jump <= most_m, "{jump} m in one tick: {pair:?}");
+        }
+    }
 }

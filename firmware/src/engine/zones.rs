@@ -1,0 +1,110 @@
+//! The table as the planner uses it: each zone's operator and merged terms, checked once.
+use giotto_shared::law::{Operator, Profile, ProfileError};
+use giotto_shared::model::Cumulants;
+use giotto_shared::table::{Limits, MAX_TERMS, MAX_ZONES, Table, Travel, Zone};
+use giotto_shared::term::Term;
+
+/// Why a table cannot be used. Zones count from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TableError {
+    /// A number of this zone, or of the limits (`None`), is not finite, or a limit is not positive.
+    Value(Option<usize>),
+    /// A term of this zone.
+    Term(usize, ProfileError),
+}
+
+/// What a segment asks the table.
+pub(crate) struct Asked {
+    /// Centre of an arc, middle of a line.
+    pub(crate) place_m: [f64; 3],
+    pub(crate) radius_m: Option<f64>,
+    pub(crate) feed_m_s: f64,
+    pub(crate) ccw: Option<bool>,
+}
+
+/// A zone ready for use.
+#[derive(Clone, Debug)]
+pub(crate) struct Built {
+    pub(crate) operator: Operator<f64>,
+    /// `None`: no profile terms.
+    pub(crate) profile: Option<Profile<f64>>,
+    /// Where position errors are counted from: the middle of the zone's place.
+    pub(crate) reference_m: Option<[f64; 3]>,
+    zone: Zone,
+}
+
+/// All zones, and the table's limits.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Zones {
+    built: heapless::Vec<Built, MAX_ZONES>,
+    limits: Option<Limits>,
+}
+
+impl Zones {
+    /// Checks and merges a table.
+    pub(crate) fn build(table: &Table) -> Result<Self, TableError> {
+        let limit = |v: f32| v.is_finite() && v > 0.0;
+        if !(limit(table.limits.offset_m) && limit(table.limits.slew_m_s)) {
+            return Err(TableError::Value(None));
+        }
+        let mut built = heapless::Vec::new();
+        for (index, zone) in table.zones.iter().enumerate() {
+            let cumulants = Cumulants {
+                kappa2_s2: f64::from(zone.cumulants.kappa2_s2),
+                kappa4_s4: f64::from(zone.cumulants.kappa4_s4),
+            };
+            let bounds = [zone.radius_m, zone.feed_m_s];
+            let numbers = bounds.iter().flatten();
+            if !(numbers.copied().all(f32::is_finite)
+                && cumulants.kappa2_s2.is_finite()
+                && cumulants.kappa4_s4.is_finite()
+                && zone.place_m.iter().flatten().flatten().all(|v| v.is_finite()))
+            {
+                return Err(TableError::Value(Some(index)));
+            }
+            let terms: heapless::Vec<Term<f64>, MAX_TERMS> = zone.terms.iter().map(|term| term.map(f64::from)).collect();
+            let profile = Profile::new(&terms).map_err(|e| TableError::Term(index, e))?;
+            let reference_m = zone.place_m.map(|[low, high]| {
+                let middle = |i: usize| 0.5 * (f64::from(low[i]) + f64::from(high[i]));
+                [middle(0), middle(1), middle(2)]
+            });
+            let profile = (!terms.is_empty()).then_some(profile);
+            // As many as the table can hold.
+            let _ = built.push(Built {
+                operator: Operator::new(&cumulants),
+                profile,
+                reference_m,
+                zone: zone.clone(),
+            });
+        }
+        Ok(Self { built, limits: Some(table.limits) })
+    }
+
+    /// The first zone that fits.
+    pub(crate) fn choose(&self, asked: &Asked) -> Option<&Built> {
+        self.built.iter().find(|built| fits(&built.zone, asked))
+    }
+
+    /// The table's limits; 0 without a table.
+    pub(crate) fn limits(&self) -> Limits {
+        self.limits.unwrap_or(Limits { offset_m: 0.0, slew_m_s: 0.0 })
+    }
+}
+
+fn fits(zone: &Zone, asked: &Asked) -> bool {
+    // Programmed values are decimal, bounds are f32: a bound that was meant to be met is met.
+    let inside = |value: f64, [low, high]: [f32; 2]| {
+        let slack = 1e-6 * libm::fabs(value);
+        value >= f64::from(low) - slack && value <= f64::from(high) + slack
+    };
+    let travel = match (zone.travel, asked.ccw) {
+        (Travel::Both, _) | (_, None) => true,
+        (Travel::Ccw, Some(ccw)) => ccw,
+        (Travel::Cw, Some(ccw)) => !ccw,
+    };
+    let place = zone.place_m.is_none_or(|[low, high]| {
+        asked.place_m.iter().zip(low).zip(high).all(|((&c, low), high)| inside(c, [low, high]))
+    });
+    let radius = asked.radius_m.is_none_or(|radius| inside(radius, zone.radius_m));
+    travel && place && radius && inside(asked.feed_m_s, zone.feed_m_s)
+}
