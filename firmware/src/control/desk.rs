@@ -59,8 +59,7 @@ where
         if matches!(self.snapshot().state, MotionState::Running | MotionState::Stopping) {
             return Err(MotionRefusal::Busy);
         }
-        self.planner.set_table(table);
-        Ok(())
+        self.planner.set_table(table).map_err(|_| MotionRefusal::Terms)
     }
 
     fn bypass(&mut self, on: bool) {

@@ -23,7 +23,7 @@ pub use executor::{Executor, Inbox};
 pub use giotto_shared::path::{CircleRun, MotionLimits, Segment};
 pub use planned::Planned;
 pub use planner::{Planner, Refused};
-pub use zones::TableError;
+pub use zones::ZoneError;
 
 use giotto_shared::table::Table;
 
@@ -110,7 +110,7 @@ impl Engine {
 
     /// The table for segments accepted from now on; `None`: no correction. Acts between segments. On an
     /// error the old one stays.
-    pub fn load(&mut self, table: Option<&Table>) -> Result<(), TableError> {
+    pub fn load(&mut self, table: Option<&Table>) -> Result<(), ZoneError> {
         self.planner.set_table(table)
     }
 

@@ -3,7 +3,7 @@ use super::config::{Config, MAX_POSITION_M, MAX_RADIUS_M, MAX_RAMP_TICKS, ticks}
 use super::extra::{Extra, Motion};
 use super::planned::{Axis, Kind, Law, Planned, Timing, base};
 use super::ramp::{FIRST, SECOND, THIRD, clock_step};
-use super::zones::{Asked, TableError, Zones};
+use super::zones::{Asked, ZoneError, Zones};
 use core::f64::consts::TAU;
 use giotto_shared::angle::{phase_from_rad, sincos};
 use giotto_shared::fixed::to_fixed;
@@ -55,7 +55,7 @@ impl Planner {
     }
 
     /// The table used for segments planned from now on; `None`: no correction. On an error the old one stays.
-    pub fn set_table(&mut self, table: Option<&Table>) -> Result<(), TableError> {
+    pub fn set_table(&mut self, table: Option<&Table>) -> Result<(), ZoneError> {
         self.zones = match table {
             Some(table) => Zones::build(table)?,
             None => Zones::default(),

@@ -6,7 +6,7 @@ use giotto_shared::term::Term;
 
 /// Why a table cannot be used. Zones count from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TableError {
+pub enum ZoneError {
     /// A number of this zone, or of the limits (`None`), is not finite, or a limit is not positive.
     Value(Option<usize>),
     /// A term of this zone.
@@ -42,10 +42,10 @@ pub(crate) struct Zones {
 
 impl Zones {
     /// Checks and merges a table.
-    pub(crate) fn build(table: &Table) -> Result<Self, TableError> {
+    pub(crate) fn build(table: &Table) -> Result<Self, ZoneError> {
         let limit = |v: f32| v.is_finite() && v > 0.0;
         if !(limit(table.limits.offset_m) && limit(table.limits.slew_m_s)) {
-            return Err(TableError::Value(None));
+            return Err(ZoneError::Value(None));
         }
         let mut built = heapless::Vec::new();
         for (index, zone) in table.zones.iter().enumerate() {
@@ -60,10 +60,11 @@ impl Zones {
                 && cumulants.kappa4_s4.is_finite()
                 && zone.place_m.iter().flatten().flatten().all(|v| v.is_finite()))
             {
-                return Err(TableError::Value(Some(index)));
+                return Err(ZoneError::Value(Some(index)));
             }
-            let terms: heapless::Vec<Term<f64>, MAX_TERMS> = zone.terms.iter().map(|term| term.map(f64::from)).collect();
-            let profile = Profile::new(&terms).map_err(|e| TableError::Term(index, e))?;
+            let terms: heapless::Vec<Term<f64>, MAX_TERMS> =
+                zone.terms.iter().map(|term| term.map(f64::from)).collect();
+            let profile = Profile::new(&terms).map_err(|e| ZoneError::Term(index, e))?;
             let reference_m = zone.place_m.map(|[low, high]| {
                 let middle = |i: usize| 0.5 * (f64::from(low[i]) + f64::from(high[i]));
                 [middle(0), middle(1), middle(2)]

@@ -135,4 +135,9 @@ pub enum MotionRefusal {
     /// Not possible in the present state.
     #[error("a run is in progress")]
     Busy,
+    /// Terms of one kind that cannot be undone at once: cyclic ones, or spikes of one axis with unlike decays.
+    #[error(
+        "a zone of the table has more cyclic terms, or more reversal spikes on one axis, than can be undone at once"
+    )]
+    Terms,
 }
