@@ -29,6 +29,10 @@ pub struct Config {
     pub engage_s: f64,
     /// Time in which the play of an axis is taken up at its reversal, s.
     pub take_up_s: f64,
+    /// Width of the means that streams are differentiated with, s; the latency is two and a half times that.
+    pub stream_window_s: f64,
+    /// Ticks that a missing set-point of a stream is bridged.
+    pub stream_hold_ticks: u32,
 }
 
 impl Config {
@@ -42,6 +46,8 @@ impl Config {
             slew_m_s: 0.2,
             engage_s: 0.25,
             take_up_s: 0.008,
+            stream_window_s: 0.015,
+            stream_hold_ticks: 5,
         }
     }
 
@@ -59,6 +65,7 @@ impl Config {
             (self.slew_m_s, 1.0, "slew_m_s"),
             (self.engage_s, 10.0, "engage_s"),
             (self.take_up_s, 1.0, "take_up_s"),
+            (self.stream_window_s, 1.0, "stream_window_s"),
         ];
         for (value, most, name) in upper_bounds {
             // NaN fails the comparison too.

@@ -16,6 +16,7 @@ mod guard;
 mod planned;
 mod planner;
 mod ramp;
+mod stream;
 mod zones;
 
 pub use config::{Config, ConfigError, MAX_POSITION_M, MAX_RADIUS_M, MIN_RAMP_TICKS, RATE_HZ};
@@ -23,6 +24,7 @@ pub use executor::{Executor, Inbox};
 pub use giotto_shared::path::{CircleRun, MotionLimits, Segment};
 pub use planned::Planned;
 pub use planner::{Planner, Refused};
+pub use stream::{MAX_STRIDE, Stream, StreamCounters, StreamPlan, StreamSample, StreamState};
 pub use zones::ZoneError;
 
 use giotto_shared::table::Table;

@@ -3,6 +3,7 @@ use super::config::{Config, MAX_POSITION_M, MAX_RADIUS_M, MAX_RAMP_TICKS, ticks}
 use super::extra::{Extra, Motion};
 use super::planned::{Axis, Kind, Law, Planned, Timing, base};
 use super::ramp::{FIRST, SECOND, THIRD, clock_step};
+use super::stream::{StreamNeeds, StreamPlan};
 use super::zones::{Asked, ZoneError, Zones};
 use core::f64::consts::TAU;
 use giotto_shared::angle::{phase_from_rad, sincos};
@@ -134,6 +135,30 @@ impl Planner {
             }
             Segment::Dwell { time_s } => self.dwell(time_s),
         }
+    }
+
+    /// A stream of set-points from where the last segment ends, at no more than a feed; its zone is chosen there.
+    pub fn stream(&self, feed_m_s: f64) -> Result<StreamPlan, Refused> {
+        positive(feed_m_s, "feed")?;
+        self.check_feed(feed_m_s)?;
+        let place_m = self.position_nm.map(|p| f64::from(p) * 1e-9);
+        let zone = self.zones.choose(&Asked { place_m, radius_m: None, feed_m_s, ccw: None });
+        let mut bounds = self.blank();
+        if zone.is_some() {
+            self.bound(&mut bounds);
+        }
+        let needs = StreamNeeds {
+            operator: zone.map(|z| z.operator),
+            tick_s: self.config.tick_s(),
+            window_s: self.config.stream_window_s,
+            feed_m_s,
+            acceleration_m_s2: self.config.motion.acceleration_m_s2,
+            hold_ticks: self.config.stream_hold_ticks,
+            engage_ticks: self.config.engage_ticks(),
+            offset_nm: bounds.offset_nm,
+            slew_nm: bounds.slew_nm,
+        };
+        StreamPlan::build(&needs).ok_or(Refused::OutOfBounds("stream window"))
     }
 
     fn arc(

@@ -1,0 +1,167 @@
+//! Streams: law, latency, bypass, gaps.
+extern crate std;
+use super::*;
+use giotto_shared::path::smoothstep;
+use std::vec::Vec;
+
+const DT: f64 = 1e-3;
+/// Lag 20 ms and moving average 40 ms.
+const KAPPA: [f64; 2] = [4e-4 + 1.6e-3 / 12.0, 6.0 * 1.6e-7 - 2.56e-6 / 120.0];
+
+fn plan() -> StreamPlan {
+    let operator =
+        Operator { second_s2: -KAPPA[0] / 2.0, fourth_s4: KAPPA[0] * KAPPA[0] / 8.0 - KAPPA[1] / 24.0 };
+    StreamPlan::build(&StreamNeeds {
+        operator: Some(operator),
+        tick_s: DT,
+        window_s: 0.015,
+        feed_m_s: 1.0,
+        acceleration_m_s2: 5.0,
+        hold_ticks: 5,
+        engage_ticks: 100,
+        offset_nm: 20_000_000,
+        slew_nm: 200_000,
+    })
+    .unwrap()
+}
+
+/// An ellipse, started smoothly over half a second, then at constant angular rate.
+fn ellipse(n: i32) -> [i32; 3] {
+    let (t, rate, start) = ((f64::from(n) * DT).max(0.0), 6.0, 0.5);
+    let theta = rate * (start * smoothstep(t / start).integral + (t - start).max(0.0));
+    [(0.05 * theta.cos() * 1e9).round() as i32, (0.03 * theta.sin() * 1e9).round() as i32, 7]
+}
+
+fn sample(n: i32) -> StreamSample {
+    StreamSample { sequence: n as u16, position_nm: ellipse(n) }
+}
+
+#[test]
+fn nominal_is_the_input_late_and_so_is_bypass_bit_for_bit() {
+    let plan = plan();
+    let latency = plan.latency() as i32;
+    assert_eq!(latency, 2 * 15 + 7);
+    let mut active = Stream::new(&plan, ellipse(0), 0, false);
+    let mut bypass = Stream::new(&plan, ellipse(0), 0, true);
+    let mut moved = 0;
+    for n in 0..3000 {
+        let (a, b) = (active.tick(Some(sample(n))), bypass.tick(Some(sample(n))));
+        assert_eq!(a.nominal_nm, ellipse(n - latency));
+        assert_eq!((b.nominal_nm, b.corrected_nm), (ellipse(n - latency), ellipse(n - latency)));
+        moved += i32::from(a.corrected_nm != a.nominal_nm);
+    }
+    assert!(moved > 2000);
+}
+
+#[test]
+fn the_correction_is_the_operator() {
+    let plan = plan();
+    let mut stream = Stream::new(&plan, ellipse(0), 0, false);
+    let mut worst = 0.0f64;
+    for n in 0..4000 {
+        let out = stream.tick(Some(sample(n)));
+        if n > 700 {
+            // Constant rate 6 rad/s: p″ = −36 p, p⁗ = 1296 p.
+            let gain = KAPPA[0] / 2.0 * 36.0 + (KAPPA[0] * KAPPA[0] / 8.0 - KAPPA[1] / 24.0) * 1296.0;
+            for axis in 0..2 {
+                let offset = f64::from(out.corrected_nm[axis] - out.nominal_nm[axis]);
+                worst = worst.max((offset - gain * f64::from(out.nominal_nm[axis])).abs());
+            }
+        }
+    }
+    std::println!(
+        "largest error of the streamed correction {worst:.1} nm of {:.0} nm",
+        0.05e9 * 36.0 * KAPPA[0] / 2.0
+    );
+    // The set-points' own rounding, seen through the differentiator, and the (hs)⁶ that it leaves.
+    assert!(worst < 10.0, "{worst} nm");
+}
+
+fn largest_steps(out: &[Output]) -> (f64, f64) {
+    let mut speed = 0.0f64;
+    let mut acceleration = 0.0f64;
+    for w in out.windows(3) {
+        for axis in 0..3 {
+            let p = |i: usize| f64::from(w[i].corrected_nm[axis]) * 1e-9;
+            speed = speed.max((p(2) - p(1)).abs() / DT);
+            acceleration = acceleration.max((p(2) - 2.0 * p(1) + p(0)).abs() / (DT * DT));
+        }
+    }
+    (speed, acceleration)
+}
+
+#[test]
+fn a_short_gap_is_bridged_and_joined_without_a_jump() {
+    let plan = plan();
+    let run = |lost: &dyn Fn(i32) -> bool| {
+        let mut stream = Stream::new(&plan, ellipse(0), 0, false);
+        let out: Vec<Output> = (0..3000).map(|n| stream.tick((!lost(n)).then(|| sample(n)))).collect();
+        (out, *stream.counters(), stream.state())
+    };
+    let (whole, _, _) = run(&|_| false);
+    let (gapped, counters, state) = run(&|n| (1500..1504).contains(&n) || n == 2000);
+    assert_eq!((counters.missing, state), (5, StreamState::Running));
+    let (v0, a0) = largest_steps(&whole);
+    let (v1, a1) = largest_steps(&gapped);
+    std::println!("whole {v0:.4} m/s {a0:.3} m/s²; gapped {v1:.4} m/s {a1:.3} m/s²");
+    assert!(v1 < v0 + 0.02 && a1 < a0 + 5.0);
+    assert_eq!(whole[2900..], gapped[2900..]);
+    assert_ne!(whole[1540], gapped[1540]);
+}
+
+#[test]
+fn late_doubled_and_wild_set_points_are_counted_and_do_no_harm() {
+    let plan = plan();
+    let mut stream = Stream::new(&plan, ellipse(0), 0, false);
+    let mut out = Vec::new();
+    for n in 0..3000 {
+        let given = match n {
+            1500 => sample(1499),
+            1600 => StreamSample { position_nm: [900_000_000, 0, 0], ..sample(n) },
+            1700 => StreamSample { position_nm: [i32::MIN; 3], ..sample(n) },
+            _ => sample(n),
+        };
+        out.push(stream.tick(Some(given)));
+    }
+    let c = stream.counters();
+    assert_eq!((c.late, c.rejected, c.missing), (1, 2, 3));
+    let (v, a) = largest_steps(&out);
+    assert!(v < 0.5 && a < 10.0, "{v} {a}");
+}
+
+#[test]
+fn a_lost_stream_comes_to_rest_ramps_out_and_faults() {
+    let plan = plan();
+    let mut stream = Stream::new(&plan, ellipse(0), 0, false);
+    let mut out = Vec::new();
+    for n in 0..1500 {
+        out.push(stream.tick(Some(sample(n))));
+    }
+    let mut n = 0;
+    while stream.state() != StreamState::Fault {
+        out.push(stream.tick(None));
+        n += 1;
+        assert!(n < 20_000);
+    }
+    let (v, a) = largest_steps(&out);
+    std::println!("rest after {n} ticks; {v:.3} m/s, {a:.2} m/s²");
+    assert!(v < 0.5 && a < 10.0, "{v} {a}");
+    let end = *out.last().unwrap();
+    assert_eq!(end.nominal_nm, end.corrected_nm);
+    // Nothing moves any more, whatever comes.
+    for n in 0..100 {
+        assert_eq!(stream.tick(Some(sample(n))).corrected_nm, end.corrected_nm);
+    }
+}
+
+#[test]
+fn finishing_keeps_the_machine_where_it_was_going() {
+    let plan = plan();
+    let mut stream = Stream::new(&plan, [5, 6, 7], 9, false);
+    for n in 0..50 {
+        stream.tick(Some(StreamSample { sequence: 9 + n, position_nm: [5, 6, 7] }));
+    }
+    stream.finish();
+    assert_eq!(stream.tick(None).corrected_nm, [5, 6, 7]);
+    assert_eq!(stream.state(), StreamState::Ended);
+}
