@@ -12,7 +12,7 @@ const LARGEST_DEVIATION: f64 = 0.1;
 /// A sample that far from both neighbours is no motion of a machine: the larger of 1 mm and 1 % of the radius.
 const SPIKE_M: f64 = 1e-3;
 /// Readings this far out that do not move any more stand at the end of a ballbar's range (±1 mm).
-const INSTRUMENT_LIMIT_M: f64 = 0.99e-3;
+pub(super) const INSTRUMENT_LIMIT_M: f64 = 0.99e-3;
 const ROWS_AT_LIMIT: usize = 5;
 /// A turn shorter than this share of the programmed one is not whole: feed overrides end at 125 %.
 const SHORTEST_TURN: f64 = 0.79;

@@ -175,6 +175,24 @@ pub enum Problem {
     )]
     DuplicateData { other: String },
 
+    // Foreign files.
+    #[error("first line \"{found}\" belongs to no known layout (asked for: {wanted}); expected a giotto CSV, a header naming x and y or deviation with units, Leica, SpatialAnalyzer, RTDE or KFLOP")]
+    UnknownFormat { found: String, wanted: String },
+    #[error("{reason}")]
+    Columns { reason: String },
+    #[error("not the XML of a Ballbar 20 file: {reason}")]
+    Xml { reason: String },
+    #[error("a Ballbar 20 file holds results, its samples cannot be read; expected samples")]
+    ResultsOnly,
+    #[error("\"{text}\" is not a date and time; expected one such as 08.11.2022 16:17:28.353")]
+    NotAStamp { text: String },
+    #[error("the samples cover {covered_deg:.1}° of the circle; expected at least 180°")]
+    ShortArc { covered_deg: f64 },
+    #[error("only {found} of {rows} points lie on the circle of {radius_mm} mm; expected a circular test")]
+    OffCircle { found: usize, rows: usize, radius_mm: f64 },
+    #[error("the direction of travel cannot be seen in deviations over time; expected --direction ccw or cw")]
+    DirectionUnknown,
+
     // Writing.
     #[error("run {index} of the campaign has file name \"{file}\" already used; expected each name once")]
     DuplicateName { index: usize, file: String },
@@ -244,6 +262,14 @@ impl CampaignError {
             P::OutOfInstrumentRange { .. } => {
                 "set the instrument up again; the readings beyond its range are lost"
             }
+            P::UnknownFormat { .. } => "name the columns: --columns time_s,x_mm,y_mm (- skips one)",
+            P::Columns { .. } => "for example --columns time_s,-,x_mm,y_mm",
+            P::Xml { .. } => "export the results from Ballbar 20 again",
+            P::ResultsOnly => "set its results beside giotto's: giotto analyze CAMPAIGN --ballbar FILE.b5r",
+            P::NotAStamp { .. } => "name the columns: --columns x_mm,y_mm,z_mm leaves the stamps out",
+            P::ShortArc { .. } => "measure a full turn, or an arc of 180° and more",
+            P::OffCircle { .. } => "check --radius, its unit, and which file this is",
+            P::DirectionUnknown => "add --direction",
             P::DuplicateData { .. } => {
                 "measure the run again, or remove one of the two: a copy is not a repetition"
             }

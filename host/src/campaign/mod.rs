@@ -7,9 +7,11 @@
 //! | `samples` | columns → one turn of polar samples |
 //! | `check` | whether numbers can be what the campaign says they are |
 //! | `read`, `write` | whole campaigns; run by run where memory counts |
+//! | `import` | foreign files |
 //! | `error` | everything a campaign is refused for, with its place |
 mod check;
 mod error;
+pub mod import;
 mod manifest;
 mod read;
 mod samples;
@@ -25,6 +27,7 @@ pub use manifest::{Entry, Manifest, SHORTEST_ARC_DEG};
 pub use read::{Together, read, read_with_notes};
 pub use samples::{Frame, Loaded, Tilt};
 pub(crate) use write::replace;
+pub(crate) use table::is_contract_header;
 pub use write::write;
 
 use std::f64::consts::TAU;

@@ -209,6 +209,11 @@ fn parse_header(path: &Path, line: &[u8]) -> Result<Vec<Column>, CampaignError> 
     Ok(header)
 }
 
+/// Whether a first line is a header of the contract.
+pub(crate) fn is_contract_header(line: &str) -> bool {
+    parse_header(Path::new(""), line.as_bytes()).is_ok()
+}
+
 pub(crate) fn shorten(text: &str) -> String {
     let text = text.trim();
     if text.chars().count() <= 60 {

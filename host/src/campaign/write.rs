@@ -61,18 +61,25 @@ pub(crate) fn replace(path: &Path, text: &str) -> Result<(), CampaignError> {
     let dir = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut file = tempfile::NamedTempFile::new_in(dir).map_err(io)?;
     file.write_all(text.as_bytes()).map_err(io)?;
-    // A temporary file is private by default; this one is to be shared like any other.
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt as _;
-        file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644)).map_err(io)?;
-    }
+    make_public(file.as_file()).map_err(io)?;
     file.persist(path).map_err(|e| io(e.error))?;
     Ok(())
 }
 
+/// A temporary file is private by default; a campaign is to be shared like any other file.
+pub(crate) fn make_public(file: &std::fs::File) -> std::io::Result<()> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        file.set_permissions(std::fs::Permissions::from_mode(0o644))?;
+    }
+    #[cfg(not(unix))]
+    let _ = file;
+    Ok(())
+}
+
 /// The `[[run]]` table of a run.
-pub(crate) fn entry(run: &Run) -> Table {
+fn entry(run: &Run) -> Table {
     let mut table = Table::new();
     table["file"] = value(&run.file);
     table["radius_mm"] = value(plain(run.radius_m * 1e3));
@@ -102,7 +109,7 @@ fn plain(v: f64) -> f64 {
     (v * 1e9).round() / 1e9
 }
 
-pub(crate) fn write_samples(run: &Run, path: &Path) -> Result<(), CampaignError> {
+fn write_samples(run: &Run, path: &Path) -> Result<(), CampaignError> {
     let io = |e: std::io::Error| CampaignError::io(path, "written", "a place for a file", &e);
     let mut out = BufWriter::new(std::fs::File::create(path).map_err(io)?);
     let samples = &run.samples;
@@ -140,7 +147,7 @@ pub(crate) fn write_samples(run: &Run, path: &Path) -> Result<(), CampaignError>
 }
 
 /// A decimal without trailing zeros (one is kept), and what follows it.
-fn number(line: &mut String, v: f64, places: usize, end: u8) {
+pub(crate) fn number(line: &mut String, v: f64, places: usize, end: u8) {
     let start = line.len();
     let _ = write!(line, "{v:.places$}"); // writing to a String cannot fail
     while line.ends_with('0') && !line.ends_with(".0") {

@@ -1,0 +1,73 @@
+//! Which layout a file has.
+use super::layout::{Head, Layout};
+use super::{columns, kflop, leica, named, rtde, spatial_analyzer};
+use std::fmt;
+
+/// Layouts that are read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Format {
+    /// By the first lines of the file.
+    Auto,
+    /// CSV of a giotto campaign.
+    Contract,
+    /// Columns by the words of the header, `;` between them, decimal comma.
+    German,
+    /// Columns by the words of the header.
+    Named,
+    /// Leica tracker CSV.
+    Leica,
+    /// SpatialAnalyzer text.
+    SpatialAnalyzer,
+    /// Universal Robots RTDE recording.
+    Rtde,
+    /// KFLOP log.
+    Kflop,
+    /// As `--columns` says.
+    Columns,
+    /// Ballbar 20 `.b5r`: results without samples.
+    B5r,
+}
+
+impl fmt::Display for Format {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Auto => "unknown",
+            Self::Contract => "giotto CSV",
+            Self::German => "CSV with decimal commas",
+            Self::Named => "text with named columns",
+            Self::Leica => "Leica tracker CSV",
+            Self::SpatialAnalyzer => "SpatialAnalyzer text",
+            Self::Rtde => "UR RTDE recording",
+            Self::Kflop => "KFLOP log",
+            Self::Columns => "columns as given",
+            Self::B5r => "Ballbar 20 results",
+        })
+    }
+}
+
+/// What detection says in the end.
+#[derive(Debug)]
+pub(super) enum Detected {
+    Table(Layout),
+    /// Results, no samples.
+    Results,
+    Unknown,
+}
+
+/// Looks at the first lines. `wanted` other than `Auto` tries that layout alone.
+pub(super) fn detect(head: &Head, wanted: Format, given: Option<&str>) -> Result<Detected, String> {
+    if let Some(given) = given {
+        return columns::recognise(head, given).map(Detected::Table);
+    }
+    let first = head.line(0);
+    let xml = first.trim_start().starts_with('<') || first.trim_start().starts_with("\u{ff}\u{fe}");
+    if wanted == Format::B5r || (wanted == Format::Auto && xml) {
+        return Ok(Detected::Results);
+    }
+    type Recogniser = fn(&Head) -> Option<Layout>;
+    let known: [Recogniser; 5] =
+        [spatial_analyzer::recognise, rtde::recognise, kflop::recognise, leica::recognise, named::recognise];
+    let mut found = known.iter().filter_map(|recognise| recognise(head));
+    let layout = found.find(|l| wanted == Format::Auto || l.format == wanted);
+    Ok(layout.map_or(Detected::Unknown, Detected::Table))
+}
