@@ -1,5 +1,6 @@
 //! The contract's JSON of `analyze`. Units end the names; what a run does not have is `null`.
-use super::{Iso230, Report, RunAnalysis};
+use super::{Iso230, Report, RunAnalysis, counterparts};
+use crate::campaign::import::ballbar20::{Ballbar20, Feature};
 use crate::campaign::{Direction, Frame};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -9,6 +10,26 @@ use std::collections::BTreeMap;
 pub struct Document {
     runs: Vec<RunEntry>,
     iso230_4: Vec<IsoEntry>,
+    /// Only with `--ballbar`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ballbar20: Option<BallbarEntry>,
+}
+
+#[derive(Debug, Serialize)]
+struct BallbarEntry {
+    machine: Option<String>,
+    plane: Option<String>,
+    started: Option<String>,
+    results: Vec<ResultEntry>,
+}
+
+#[derive(Debug, Serialize)]
+struct ResultEntry {
+    name: String,
+    unit: String,
+    value: f64,
+    /// The same by giotto for each pair of runs, in their order.
+    giotto: Vec<Option<f64>>,
 }
 
 #[derive(Debug, Serialize)]
@@ -69,11 +90,24 @@ fn um(si: f64) -> f64 {
 }
 
 impl Document {
-    /// The document of a report.
-    pub fn of(report: &Report) -> Self {
+    /// The document of a report, with the results of Ballbar 20 if there are any.
+    pub fn of(report: &Report, ballbar: Option<&Ballbar20>) -> Self {
+        let pairs = counterparts(report);
+        let result = |f: &Feature| ResultEntry {
+            name: f.name.clone(),
+            unit: f.unit.clone(),
+            value: f.value,
+            giotto: pairs.iter().map(|p| p.get(&f.name, &f.unit)).collect(),
+        };
         Self {
             runs: report.runs.iter().zip(&report.frames).map(|(r, f)| run(r, f.as_ref())).collect(),
             iso230_4: report.iso230_4.iter().map(iso).collect(),
+            ballbar20: ballbar.map(|b| BallbarEntry {
+                machine: b.machine.clone(),
+                plane: b.plane.clone(),
+                started: b.started.clone(),
+                results: b.features.iter().map(result).collect(),
+            }),
         }
     }
 }

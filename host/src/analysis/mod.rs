@@ -8,7 +8,9 @@
 //! | `iso230` | G, G(b), F, D of a pair of runs |
 //! | `parity` | even and odd part of a pair |
 //! | `report` | whole campaigns, in memory or from files |
+//! | `counterparts` | figures in the terms of ballbar software |
 //! | `json` | the contract's document |
+mod counterparts;
 mod harmonics;
 mod iso230;
 mod json;
@@ -19,6 +21,7 @@ mod run;
 #[cfg(test)]
 mod tests;
 
+pub use counterparts::{Counterparts, counterparts};
 pub use harmonics::{HIGHEST_ORDER, Harmonic};
 pub use iso230::{Iso230, pairs};
 pub use json::Document;

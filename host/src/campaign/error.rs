@@ -176,7 +176,9 @@ pub enum Problem {
     DuplicateData { other: String },
 
     // Foreign files.
-    #[error("first line \"{found}\" belongs to no known layout (asked for: {wanted}); expected a giotto CSV, a header naming x and y or deviation with units, Leica, SpatialAnalyzer, RTDE or KFLOP")]
+    #[error(
+        "first line \"{found}\" belongs to no known layout (asked for: {wanted}); expected a giotto CSV, a header naming x and y or deviation with units, Leica, SpatialAnalyzer, RTDE or KFLOP"
+    )]
     UnknownFormat { found: String, wanted: String },
     #[error("{reason}")]
     Columns { reason: String },

@@ -1,33 +1,43 @@
 //! `giotto analyze`: least-squares circle, radius size error, out-of-roundness, harmonics, ISO 230-4 of each run.
+use super::source::Source;
 use super::{Failure, Output};
 use crate::analysis::{self, Document, Harmonic, Report};
-use crate::campaign::{CampaignError, Direction, Manifest};
+use crate::campaign::import::ballbar20::{self, Ballbar20};
+use crate::campaign::{CampaignError, Direction};
 use comfy_table::{CellAlignment, Table, presets};
 use std::path::PathBuf;
 
 /// Arguments of `giotto analyze`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// Directory of the campaign.
-    campaign: PathBuf,
+    #[command(flatten)]
+    source: Source,
+    /// Results of Ballbar 20 to set beside giotto's own.
+    #[arg(long, value_name = "FILE.b5r")]
+    ballbar: Option<PathBuf>,
 }
 
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
-    let manifest = Manifest::open(&args.campaign)?;
+    let ballbar = args.ballbar.as_deref().map(ballbar20::read).transpose()?;
+    let opened = args.source.open(out)?;
+    let manifest = &opened.manifest;
     let bar = if out.draws() {
         indicatif::ProgressBar::new(manifest.runs.len() as u64).with_message("runs")
     } else {
         indicatif::ProgressBar::hidden()
     };
-    let report = analysis::of_files(&manifest, || bar.inc(1));
+    let report = analysis::of_files(manifest, || bar.inc(1));
     bar.finish_and_clear();
     let report = report?;
     report.notes.iter().for_each(|note| out.note(note));
     if out.json {
-        return out.document(&Document::of(&report));
+        return out.document(&Document::of(&report, ballbar.as_ref()));
     }
     show(&report, out);
+    if let Some(ballbar) = ballbar {
+        beside(&report, &ballbar, out);
+    }
     Ok(())
 }
 
@@ -116,4 +126,30 @@ fn show(report: &Report, out: Output) {
         ]);
     }
     out.say(iso);
+}
+
+/// Ballbar 20's figures with giotto's for the same, where a pair of runs gives them.
+fn beside(report: &Report, ballbar: &Ballbar20, out: Output) {
+    let of = |v: &Option<String>| v.clone().unwrap_or_else(|| "?".to_owned());
+    out.say("");
+    let (machine, plane, date) = (of(&ballbar.machine), of(&ballbar.plane), of(&ballbar.started));
+    out.say(format_args!(
+        "Ballbar 20: {machine}, plane {plane}, {date} (its results; its samples are not read)"
+    ));
+    let pairs = analysis::counterparts(report);
+    let mut header = vec!["result".to_owned(), "unit".to_owned(), "Ballbar 20".to_owned()];
+    header.extend(
+        pairs
+            .iter()
+            .map(|p| format!("R{} f{}", (p.radius_m * 1e6).round() / 1e3, (p.feed_m_s * 1e6).round() / 1e3)),
+    );
+    let mut rows = table(&header.iter().map(String::as_str).collect::<Vec<_>>());
+    for feature in &ballbar.features {
+        let mut row = vec![feature.name.clone(), feature.unit.clone(), format!("{}", feature.value)];
+        row.extend(pairs.iter().map(|p| {
+            p.get(&feature.name, &feature.unit).map_or_else(|| "–".to_owned(), |v| format!("{v:.3}"))
+        }));
+        rows.add_row(row);
+    }
+    out.say(rows);
 }

@@ -20,6 +20,7 @@ mod verify;
 
 pub mod failure;
 pub mod output;
+pub mod source;
 
 pub use failure::Failure;
 pub use output::Output;

@@ -92,7 +92,8 @@ pub fn add(
     let io = |e: std::io::Error| CampaignError::io(dir, "made", "a place for a directory", &e);
     let fresh = !dir.exists();
     std::fs::create_dir_all(dir).map_err(io)?;
-    let staged = stage(files, dir, options, progress).and_then(|staged| commit(dir, old.as_ref(), options, staged));
+    let staged =
+        stage(files, dir, options, progress).and_then(|staged| commit(dir, old.as_ref(), options, staged));
     if staged.is_err() && fresh {
         let _ = std::fs::remove_dir(dir); // only if still empty
     }
@@ -159,7 +160,11 @@ fn stage(
                     frame: loaded.frame,
                     turn_s: loaded.turn_s,
                     target_radius_m: target_radius(&recording, rows),
-                    notes: loaded.notes.into_iter().map(|n| Note { at: moved(&n.at, path, first), ..n }).collect(),
+                    notes: loaded
+                        .notes
+                        .into_iter()
+                        .map(|n| Note { at: moved(&n.at, path, first), ..n })
+                        .collect(),
                 },
             });
         }
@@ -289,7 +294,8 @@ fn commit(
     let mut document = match old {
         None => {
             let mut document = DocumentMut::new();
-            let name = dir.canonicalize().ok().and_then(|d| Some(d.file_name()?.to_string_lossy().into_owned()));
+            let name =
+                dir.canonicalize().ok().and_then(|d| Some(d.file_name()?.to_string_lossy().into_owned()));
             let mut head = Table::new();
             head["name"] = value(name.unwrap_or_else(|| "campaign".to_owned()));
             head["machine"] = value(options.machine.as_deref().unwrap_or("unknown"));
@@ -306,7 +312,8 @@ fn commit(
     };
     let list = document.entry("run").or_insert(Item::ArrayOfTables(ArrayOfTables::new()));
     let Some(list) = list.as_array_of_tables_mut() else {
-        let reason = "`run` is an inline list, to which no table can be added; write [[run]] tables".to_owned();
+        let reason =
+            "`run` is an inline list, to which no table can be added; write [[run]] tables".to_owned();
         return Err(CampaignError::new(Place::file(&path), Problem::Toml { reason }));
     };
     let mut number = old.map_or(0, |m| m.runs.len());
@@ -342,7 +349,8 @@ fn commit(
             table["temperature_c"] = value(temperature);
         }
         if let Some(centre) = options.centre_m {
-            table["centre_mm"] = value(centre.map(|c| (c * 1e12).round() / 1e9).into_iter().collect::<toml_edit::Array>());
+            table["centre_mm"] =
+                value(centre.map(|c| (c * 1e12).round() / 1e9).into_iter().collect::<toml_edit::Array>());
         }
         if let Some(arc) = added.arc_rad {
             table["arc_deg"] = value((arc.to_degrees() * 1e3).round() / 1e3);

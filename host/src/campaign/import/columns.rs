@@ -18,7 +18,8 @@ pub(super) fn recognise(head: &Head, given: &str) -> Result<Layout, String> {
         fields.push((index, quantity, factor));
     }
     let has = |q| fields.iter().any(|f| f.1 == q);
-    let polar = (has(Quantity::Deviation) || has(Quantity::Radius)) && (has(Quantity::Time) || has(Quantity::Angle));
+    let polar =
+        (has(Quantity::Deviation) || has(Quantity::Radius)) && (has(Quantity::Time) || has(Quantity::Angle));
     if !polar && !(has(Quantity::Position(0)) && has(Quantity::Position(1))) {
         return Err("--columns: expected x and y, or deviation (or radius) with time or angle".to_owned());
     }
@@ -28,7 +29,8 @@ pub(super) fn recognise(head: &Head, given: &str) -> Result<Layout, String> {
         for separator in [b';', b'\t', b',', b' '] {
             let parts = split(line, separator);
             let comma = separator != b',' && line.contains(',');
-            let number = |f: &&str| if comma { f.replace(',', ".").parse::<f64>() } else { f.parse() }.is_ok();
+            let number =
+                |f: &&str| if comma { f.replace(',', ".").parse::<f64>() } else { f.parse() }.is_ok();
             if parts.len() >= wanted && fields.iter().all(|(at, ..)| parts.get(*at).is_some_and(number)) {
                 return Ok(Layout { format: Format::Columns, separator, decimal_comma: comma, skip, fields });
             }

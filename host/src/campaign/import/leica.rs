@@ -9,7 +9,8 @@ pub(super) fn recognise(head: &Head) -> Option<Layout> {
     let mut fields = Vec::new();
     let mut tracker = false;
     for (index, name) in split(header, separator).into_iter().enumerate() {
-        let (word, bracket) = name.split_once('[').map_or((name, None), |(w, b)| (w.trim(), b.split(']').next()));
+        let (word, bracket) =
+            name.split_once('[').map_or((name, None), |(w, b)| (w.trim(), b.split(']').next()));
         let axis = ["X", "Y", "Z"].iter().position(|a| *a == word);
         match (axis, bracket) {
             (Some(axis), Some(bracket)) => fields.push((index, Quantity::Position(axis), unit(bracket)?)),
@@ -23,5 +24,11 @@ pub(super) fn recognise(head: &Head) -> Option<Layout> {
     }
     let positions = fields.iter().filter(|f| matches!(f.1, Quantity::Position(_))).count();
     let decimal_comma = separator == b';';
-    (tracker && positions >= 2).then_some(Layout { format: Format::Leica, separator, decimal_comma, skip: 1, fields })
+    (tracker && positions >= 2).then_some(Layout {
+        format: Format::Leica,
+        separator,
+        decimal_comma,
+        skip: 1,
+        fields,
+    })
 }

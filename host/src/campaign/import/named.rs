@@ -20,7 +20,13 @@ pub(super) fn recognise(head: &Head) -> Option<Layout> {
         return None;
     }
     let own = crate::campaign::is_contract_header(header);
-    let format = if own { Format::Contract } else if decimal_comma { Format::German } else { Format::Named };
+    let format = if own {
+        Format::Contract
+    } else if decimal_comma {
+        Format::German
+    } else {
+        Format::Named
+    };
     Some(Layout { format, separator, decimal_comma, skip: 1, fields })
 }
 
@@ -28,7 +34,9 @@ pub(super) fn recognise(head: &Head) -> Option<Layout> {
 pub(super) fn column(name: &str) -> Option<(Quantity, f64)> {
     let lower = name.trim().to_lowercase();
     let (word, given) = match lower.find(['[', '(']) {
-        Some(at) => (lower[..at].trim(), Some(lower[at + 1..].trim_end_matches([']', ')']).trim().to_owned())),
+        Some(at) => {
+            (lower[..at].trim(), Some(lower[at + 1..].trim_end_matches([']', ')']).trim().to_owned()))
+        }
         None => match lower.rsplit_once(['_', ' ']) {
             Some((word, tail)) if unit(tail).is_some() => (word, Some(tail.to_owned())),
             _ => (lower.as_str(), None),

@@ -88,9 +88,9 @@ impl Recording {
             if let Some(blank) = blank {
                 return Err(CampaignError::new(Place::at(path, blank, 1), Problem::EmptyLine));
             }
-            recording.row(layout, needed, &line).map_err(|(column, problem)| {
-                CampaignError::new(Place::at(path, number, column), problem)
-            })?;
+            recording
+                .row(layout, needed, &line)
+                .map_err(|(column, problem)| CampaignError::new(Place::at(path, number, column), problem))?;
             if recording.rows.is_multiple_of(1 << 16) {
                 progress(bytes);
             }
@@ -111,14 +111,18 @@ impl Recording {
         let line = line.trim_end_matches(['\n', '\r']);
         let parts = split(line, layout.separator);
         if parts.len() < needed {
-            return Err((line.chars().count().max(1), Problem::Ragged { found: parts.len(), expected: needed }));
+            return Err((
+                line.chars().count().max(1),
+                Problem::Ragged { found: parts.len(), expected: needed },
+            ));
         }
         for &(at, quantity, factor) in &layout.fields {
             let field = parts[at];
             let column = || line[..field.as_ptr() as usize - line.as_ptr() as usize].chars().count() + 1;
             let name = || format!("{quantity:?}").to_lowercase();
             let value = if let Quantity::Stamp(order) = quantity {
-                seconds(field, order).ok_or_else(|| (column(), Problem::NotAStamp { text: field.to_owned() }))?
+                seconds(field, order)
+                    .ok_or_else(|| (column(), Problem::NotAStamp { text: field.to_owned() }))?
             } else {
                 let parsed = if layout.decimal_comma && field.contains(',') {
                     fast_float2::parse::<f64, _>(field.replace(',', "."))
@@ -127,8 +131,15 @@ impl Recording {
                 };
                 match parsed {
                     Ok(v) if v.is_finite() => v * factor,
-                    Ok(_) => return Err((column(), Problem::NotFinite { text: field.to_owned(), column: name() })),
-                    Err(_) if field.is_empty() => return Err((column(), Problem::EmptyField { column: name() })),
+                    Ok(_) => {
+                        return Err((
+                            column(),
+                            Problem::NotFinite { text: field.to_owned(), column: name() },
+                        ));
+                    }
+                    Err(_) if field.is_empty() => {
+                        return Err((column(), Problem::EmptyField { column: name() }));
+                    }
                     Err(_) => {
                         let text = crate::campaign::table::shorten(field);
                         return Err((column(), Problem::NotANumber { text, column: name() }));
@@ -164,7 +175,10 @@ pub(super) fn seconds(text: &str, order: DateOrder) -> Option<f64> {
     let mut clock = clock.trim().split(':');
     let (hour, minute) = (clock.next()?.parse::<f64>().ok()?, clock.next()?.parse::<f64>().ok()?);
     let second = clock.next()?.replace(',', ".").parse::<f64>().ok()?;
-    if clock.next().is_some() || !(1..=12).contains(&month) || !(1..=31).contains(&day) || !(1970..=9999).contains(&year)
+    if clock.next().is_some()
+        || !(1..=12).contains(&month)
+        || !(1..=31).contains(&day)
+        || !(1970..=9999).contains(&year)
     {
         return None;
     }

@@ -21,5 +21,11 @@ pub(super) fn recognise(head: &Head) -> Option<Layout> {
         }
     }
     let positions = fields.iter().filter(|f| matches!(f.1, Quantity::Position(_))).count();
-    (positions == 3).then_some(Layout { format: Format::Rtde, separator, decimal_comma: false, skip: 1, fields })
+    (positions == 3).then_some(Layout {
+        format: Format::Rtde,
+        separator,
+        decimal_comma: false,
+        skip: 1,
+        fields,
+    })
 }

@@ -41,7 +41,8 @@ fn robust_circle(x: &[f64], y: &[f64], rows: &[usize], radius_m: f64) -> Option<
     let n = rows.len();
     let starts = [0..n, n / 4..n - n / 4, n / 2..n, 0..n / 2, n / 3..2 * n / 3];
     let spread = |c: &Circle| {
-        let mut off: Vec<f64> = rows.iter().map(|&k| ((x[k] - c.centre[0]).hypot(y[k] - c.centre[1]) - c.radius).abs()).collect();
+        let mut off: Vec<f64> =
+            rows.iter().map(|&k| ((x[k] - c.centre[0]).hypot(y[k] - c.centre[1]) - c.radius).abs()).collect();
         off.sort_unstable_by(f64::total_cmp);
         off[off.len() / 2]
     };
@@ -56,10 +57,13 @@ fn robust_circle(x: &[f64], y: &[f64], rows: &[usize], radius_m: f64) -> Option<
     let mut limit = 0.0;
     for _ in 0..10 {
         limit = (6.0 * 1.4826 * spread(&best)).max(OFF_CIRCLE * best.radius);
-        let on = |k: &&usize| ((x[**k] - best.centre[0]).hypot(y[**k] - best.centre[1]) - best.radius).abs() <= limit;
+        let on = |k: &&usize| {
+            ((x[**k] - best.centre[0]).hypot(y[**k] - best.centre[1]) - best.radius).abs() <= limit
+        };
         let kept: Vec<usize> = rows.iter().filter(on).copied().collect();
         let Some(next) = fit(&kept) else { break };
-        let moved = (next.radius - best.radius).abs() + (next.centre[0] - best.centre[0]).hypot(next.centre[1] - best.centre[1]);
+        let moved = (next.radius - best.radius).abs()
+            + (next.centre[0] - best.centre[0]).hypot(next.centre[1] - best.centre[1]);
         best = next;
         if moved < 1e-9 * best.radius {
             break;
@@ -79,11 +83,14 @@ pub(super) fn of_points(position: &[Vec<f64>; 3], time_s: &[f64], radius_m: f64)
     let (mut circle, mut limit) = robust_circle(&x, &y, &used, radius_m).ok_or_else(|| off(0))?;
     if !position[2].is_empty() {
         // The plane of the circle alone: a lift before it has tilted the first one.
-        used.retain(|&k| ((x[k] - circle.centre[0]).hypot(y[k] - circle.centre[1]) - circle.radius).abs() <= limit);
+        used.retain(|&k| {
+            ((x[k] - circle.centre[0]).hypot(y[k] - circle.centre[1]) - circle.radius).abs() <= limit
+        });
         (x, y) = flatten(position, &used).ok_or_else(|| off(used.len()))?;
         (circle, limit) = robust_circle(&x, &y, &used, radius_m).ok_or_else(|| off(used.len()))?;
     }
-    let on = |k: usize| ((x[k] - circle.centre[0]).hypot(y[k] - circle.centre[1]) - circle.radius).abs() <= limit;
+    let on =
+        |k: usize| ((x[k] - circle.centre[0]).hypot(y[k] - circle.centre[1]) - circle.radius).abs() <= limit;
     let stretch = longest(rows, on);
     if stretch.len() * 4 < rows || stretch.len() < 8 {
         return Err(off(stretch.len()));
