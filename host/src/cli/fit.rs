@@ -1,8 +1,8 @@
 //! `giotto fit`: the radius model of the paper: stepwise partial F, intervals, prediction of other radii.
 use super::failure::cannot_write;
+use super::source::Source;
 use super::{Failure, Output};
 use crate::analysis;
-use crate::campaign::Manifest;
 use crate::fit::{self, Action, FitError, Observation, Offset, Options, PartialF, RadiusFit, Step, TERMS};
 use crate::model_file::{FORMAT, ModelFile, Servo, Valid};
 use clap::ValueEnum;
@@ -17,8 +17,8 @@ const FEED_DEPARTURE: f64 = 0.02;
 /// Arguments of `giotto fit`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// Directory of the campaign.
-    campaign: PathBuf,
+    #[command(flatten)]
+    source: Source,
     /// Fit on this radius alone and predict the others; else fit on all and predict each from the others.
     #[arg(long, value_name = "MM")]
     train_radius: Option<f64>,
@@ -73,13 +73,14 @@ impl From<FitError> for Failure {
 
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
-    let manifest = Manifest::open(&args.campaign)?;
+    let opened = args.source.open(out)?;
+    let manifest = &opened.manifest;
     let bar = if out.draws() {
         indicatif::ProgressBar::new(manifest.runs.len() as u64).with_message("runs")
     } else {
         indicatif::ProgressBar::hidden()
     };
-    let report = analysis::of_files(&manifest, || bar.inc(1));
+    let report = analysis::of_files(manifest, || bar.inc(1));
     bar.finish_and_clear();
     let report = report?;
     report.notes.iter().for_each(|note| out.note(note));

@@ -20,7 +20,8 @@ pub(super) fn recognise(head: &Head, given: &str) -> Result<Layout, String> {
     let has = |q| fields.iter().any(|f| f.1 == q);
     let polar =
         (has(Quantity::Deviation) || has(Quantity::Radius)) && (has(Quantity::Time) || has(Quantity::Angle));
-    if !polar && !(has(Quantity::Position(0)) && has(Quantity::Position(1))) {
+    let planar = has(Quantity::Position(0)) && has(Quantity::Position(1));
+    if !(polar || planar) {
         return Err("--columns: expected x and y, or deviation (or radius) with time or angle".to_owned());
     }
     let wanted = given.split(',').count();
