@@ -60,4 +60,16 @@ impl Points for Polar<'_> {
     fn sum<S: Merge>(&self, part: impl Fn(&[f64], &[f64]) -> S + Sync) -> S {
         self.fold(|angle, deviation| self.block(angle, deviation, &part))
     }
+
+    fn at(&self, index: usize) -> Option<[f64; 2]> {
+        let mut index = index;
+        for (angle, deviation) in &self.parts {
+            if let (Some(a), Some(v)) = (angle.get(index), deviation.get(index)) {
+                let ((sin, cos), r) = (a.sin_cos(), self.radius_m + v);
+                return Some([r * cos, r * sin]);
+            }
+            index -= angle.len();
+        }
+        None
+    }
 }

@@ -15,6 +15,10 @@ impl Points for Parallel<'_> {
         self.0.count()
     }
 
+    fn at(&self, index: usize) -> Option<[f64; 2]> {
+        self.0.at(index)
+    }
+
     fn sum<S: Merge>(&self, part: impl Fn(&[f64], &[f64]) -> S + Sync) -> S {
         let chunk = |(x, y): (&[f64], &[f64])| {
             let mut total = S::default();
@@ -48,6 +52,13 @@ pub fn fit_circle(x: &[f64], y: &[f64]) -> Result<CircleFit, CircleError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn threads_and_none_give_the_same_bits() {
+        let at = |i: usize| (i as f64 * 0.618).sin_cos();
+        let (x, y): (Vec<f64>, Vec<f64>) = (0..3000).map(|i| (at(i).0 + 1e-3 * at(7 * i).1, at(i).1)).unzip();
+        assert_eq!(fit_circle(&x, &y), circle::fit(&Xy::new(&x, &y).unwrap()));
+    }
 
     #[test]
     fn any_number_of_threads_gives_the_same_bits() {

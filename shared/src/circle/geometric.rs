@@ -6,15 +6,17 @@
 //!
 //! ∇f = −Σ e n,  ∇²f = N·1 − d̄ Σ(1/d)(1 − nnᵀ) − (Σn)(Σn)ᵀ/N.
 use super::algebraic::hyper;
-use super::moments::{Moments, lane_sums};
+use super::lanes::sums;
+use super::moments::Moments;
 use super::points::{Merge, Points};
 use super::{Circle, CircleError};
 use num_traits::Float;
+use wide::f64x4;
 
 /// Most passes over the points.
 const MAX_PASSES: usize = 100;
-/// Steps shorter than this share of the radius are below what the digits carry.
-const TINY_STEP: f64 = 1e-14;
+/// Steps shorter than this share of the radius are below what anything can measure.
+const TINY_STEP: f64 = 1e-13;
 /// A radius this many times the spread of the points is a line.
 const LINE: f64 = 1e8;
 
@@ -22,7 +24,7 @@ const LINE: f64 = 1e8;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Stop {
-    /// The last step, or the next one by the law of quadratic convergence, is below 1e-14 of the radius.
+    /// The last step, or the bound on the next one by the law of quadratic convergence, is below 1e-13 of the radius.
     Converged,
     /// No step lowers the sum of squares further: the limit of the digits (or a saddle of it).
     NoImprovement,
@@ -70,6 +72,14 @@ impl Merge for Sums {
     }
 }
 
+/// A step of the centre.
+struct Step {
+    by: [f64; 2],
+    length: f64,
+    /// Neither shortened nor bent: quadratic convergence holds.
+    newton: bool,
+}
+
 /// What one pass tells about f at a centre.
 #[derive(Clone, Copy)]
 struct Surface {
@@ -89,12 +99,15 @@ impl Surface {
     fn at(points: &(impl Points + ?Sized), origin: [f64; 2], centre: [f64; 2], radius: f64) -> Self {
         // A point on the centre has no direction; keep its 1/d finite.
         let nearest = 1e-9 * radius;
+        let [origin_x, origin_y] = origin.map(f64x4::splat);
+        let [centre_x, centre_y] = centre.map(f64x4::splat);
+        let (guess, nearest, one) = (f64x4::splat(radius), f64x4::splat(nearest), f64x4::splat(1.0));
         let Sums([e, ee, p, q, ep, eq, w, wpp, wpq]) = points.sum(|x, y| {
-            Sums(lane_sums(x, y, |x, y| {
-                let (u, v) = ((x - origin[0]) - centre[0], (y - origin[1]) - centre[1]);
-                let d = Float::sqrt(u * u + v * v);
-                let w = 1.0 / d.max(nearest);
-                let (p, q, e) = (u * w, v * w, d - radius);
+            Sums(sums(x, y, |x, y| {
+                let (u, v) = ((x - origin_x) - centre_x, (y - origin_y) - centre_y);
+                let d = (u * u + v * v).sqrt();
+                let w = one / d.fast_max(nearest);
+                let (p, q, e) = (u * w, v * w, d - guess);
                 let wp = w * p;
                 [e, e * e, p, q, e * p, e * q, w, wp * p, wp * q]
             }))
@@ -112,23 +125,39 @@ impl Surface {
         }
     }
 
-    /// Step that minimises the quadratic model, its Hessian raised by `shift`·N and by what makes it positive.
-    fn step(&self, shift: f64) -> ([f64; 2], bool) {
+    /// Eigenvalues of the Hessian, the smaller first.
+    fn curvatures(&self) -> [f64; 2] {
         let [xx, xy, yy] = self.hessian;
         let (half_sum, half_difference) = (0.5 * (xx + yy), 0.5 * (xx - yy));
         let spread = Float::sqrt(half_difference * half_difference + xy * xy);
-        let smallest = half_sum - spread;
+        [half_sum - spread, half_sum + spread]
+    }
+
+    /// Step that minimises the quadratic model, its Hessian raised by `shift`·N and by what makes it positive.
+    fn step(&self, shift: f64) -> Step {
+        let [smallest, largest] = self.curvatures();
         let floor = 1e-14 * self.n;
         let convex = smallest > floor;
-        let raise = shift * self.n
-            + if convex { 0.0 } else { Float::abs(smallest) + 0.1 * spread - smallest + floor };
+        let positive = Float::abs(smallest) + 0.05 * (largest - smallest) - smallest + floor;
+        let raise = shift * self.n + if convex { 0.0 } else { positive };
+        let [xx, xy, yy] = self.hessian;
         let (xx, yy) = (xx + raise, yy + raise);
         let determinant = xx * yy - xy * xy;
         let [gx, gy] = self.gradient;
-        let step = [(xy * gy - yy * gx) / determinant, (xy * gx - xx * gy) / determinant];
+        let by = [(xy * gy - yy * gx) / determinant, (xy * gx - xx * gy) / determinant];
+        let length = Float::hypot(by[0], by[1]);
         // A flat model reaches for the horizon; half a radius keeps to the valley that the start is in.
-        let cut = 0.5 * self.radius / Float::hypot(step[0], step[1]);
-        if cut < 1.0 { (step.map(|s| s * cut), false) } else { (step, convex && shift == 0.0) }
+        let cut = 0.5 * self.radius / length;
+        if cut < 1.0 {
+            return Step { by: by.map(|s| s * cut), length: length * cut, newton: false };
+        }
+        Step { by, length, newton: convex && shift == 0.0 }
+    }
+
+    /// Bound on the next Newton step after one of `length`: |f‴| ≤ 3N/d of each point, so the gradient left is below
+    /// 3N·length²/2r, here with room for points at half the radius and twice as much again.
+    fn next_step(&self, length: f64) -> f64 {
+        6.0 * self.n * length * length / (self.radius * self.curvatures()[0])
     }
 
     fn covariance(&self, rss: f64) -> Option<[[f64; 3]; 3]> {
@@ -151,8 +180,8 @@ impl Surface {
     }
 }
 
-/// Refines a circle to the least-squares one. `moments` are those of `points`; `start` is any circle near them,
-/// for instance [`hyper`]'s.
+/// Refines a circle to the least-squares one. `moments` are those of `points`, or of a fair sample of them: they give the
+/// origin, the scale, and whether the points are degenerate. `start` is any circle near them, for instance [`hyper`]'s.
 ///
 /// # Errors
 /// [`CircleError`] for fewer than three points, points that coincide or are not finite, and points for which
@@ -165,18 +194,18 @@ pub fn refine(
     // Tells degenerate sets by their own error, whatever the start.
     hyper(moments)?;
     let origin = moments.mean;
-    let n = moments.count as f64;
-    let spread = Float::sqrt((moments.xx + moments.yy) / n);
+    let n = points.count() as f64;
+    let spread = Float::sqrt((moments.xx + moments.yy) / moments.count as f64);
     let mut centre = [start.centre[0] - origin[0], start.centre[1] - origin[1]];
     let mut here = Surface::at(points, origin, centre, start.radius);
-    let (mut passes, mut shift, mut last_step) = (1, 0.0, f64::INFINITY);
+    let (mut passes, mut shift) = (1, 0.0);
     let report =
         |centre: [f64; 2], at: &Surface, radius: f64, rss: f64, passes: usize, stopped: Stop| CircleFit {
             circle: Circle { centre: [origin[0] + centre[0], origin[1] + centre[1]], radius },
             covariance: at.covariance(rss),
             rss,
             rms: Float::sqrt(rss / n),
-            points: moments.count,
+            points: points.count(),
             passes,
             stopped,
         };
@@ -187,13 +216,10 @@ pub fn refine(
         if here.radius >= LINE * spread {
             return Err(CircleError::Collinear);
         }
-        let (step, newton) = here.step(shift);
-        let length = Float::sqrt(step[0] * step[0] + step[1] * step[1]);
+        let Step { by: step, length, newton } = here.step(shift);
         let to = [centre[0] + step[0], centre[1] + step[1]];
-        // Quadratic convergence: the ratio of successive steps falls by its square each time.
-        let next =
-            if last_step.is_finite() { length * (length / last_step) * (length / last_step) } else { length };
-        if newton && length <= 1e-6 * here.radius && length.min(next) <= TINY_STEP * here.radius {
+        let next = length.min(here.next_step(length));
+        if newton && length <= 1e-6 * here.radius && next <= TINY_STEP * here.radius {
             // The quadratic model is exact here to the cube of the step, below the digits: no further pass.
             let radius = here.radius - (here.mean_normal[0] * step[0] + here.mean_normal[1] * step[1]);
             let rss = (here.rss + here.gradient[0] * step[0] + here.gradient[1] * step[1]).max(0.0);
@@ -206,7 +232,6 @@ pub fn refine(
         passes += 1;
         if there.rss <= here.rss {
             (centre, here) = (to, there);
-            last_step = if newton { length } else { f64::INFINITY };
             shift = if shift < 1e-6 { 0.0 } else { shift * 0.1 };
         } else if length <= 1e-7 * here.radius || shift > 1e12 {
             // Rounding of the sums, not shape, decides which is lower.

@@ -7,12 +7,14 @@
 //! | file | holds |
 //! |---|---|
 //! | `points` | [`Points`]: what can be walked again and again, in blocks |
+//! | `lanes` | sums over points, four at a time |
 //! | `moments` | [`Moments`]: centred, mergeable, one pass |
 //! | `algebraic` | [`kasa`] and [`hyper`]: closed circles from moments |
 //! | `geometric` | [`refine`]: least squares of the distances, with a report |
 //! | `plane` | [`Plane`] of 3-D points, projection, tilt, flatness |
 mod algebraic;
 mod geometric;
+mod lanes;
 mod moments;
 mod plane;
 mod points;
@@ -74,12 +76,40 @@ impl fmt::Display for CircleError {
 
 impl core::error::Error for CircleError {}
 
+/// Points that are enough for a start: at a noise of 1e-5 of the radius one Newton step from their circle is the end.
+const FEW: usize = 32768;
+/// The few are taken in runs of this length, for memory comes in lines and pages.
+const RUN: usize = 64;
+/// From this many points on a fit starts from [`FEW`] of them instead of the algebraic circle of all: two passes over
+/// all points are saved out of three.
+const MANY: usize = 16 * FEW;
+
 /// Least-squares circle: minimises the sum of squared distances between points and circle.
 ///
 /// # Errors
 /// [`CircleError`] for fewer than three points, coincident or collinear points, or a coordinate that is not finite.
 pub fn fit(points: &(impl Points + ?Sized)) -> Result<CircleFit, CircleError> {
+    if let Some(few) = thinned(points) {
+        let moments = Moments::of(&few);
+        // Whatever is odd about the few is left to all of them to show.
+        if let Ok(start) = hyper(&moments).and_then(|start| refine(&few, &moments, start))
+            && let Ok(fit) = refine(points, &moments, start.circle)
+        {
+            return Ok(fit);
+        }
+    }
     let moments = Moments::of(points);
     let start = hyper(&moments)?;
     refine(points, &moments, start)
+}
+
+/// [`FEW`] points out of many, in runs spread evenly over them.
+fn thinned(points: &(impl Points + ?Sized)) -> Option<Sampled<impl Fn(usize) -> [f64; 2]>> {
+    let count = points.count();
+    if count < MANY || points.at(0).is_none() {
+        return None;
+    }
+    let stride = count / (FEW / RUN);
+    let at = move |i: usize| points.at(i / RUN * stride + i % RUN).unwrap_or([f64::NAN; 2]);
+    Some(Sampled::new(FEW, at))
 }

@@ -4,7 +4,9 @@
 //! under a change of origin, so parts can be merged exactly (the pairwise update of Chan, Golub and
 //! LeVeque, doi 10.1080/00031305.1983.10483115, carried on to fourth order). Nothing is ever accumulated
 //! about a far origin.
+use super::lanes::sums;
 use super::points::{Merge, Points};
+use wide::f64x4;
 
 /// Count, mean and centred moment sums of a point set. One pass, mergeable.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -29,38 +31,6 @@ pub struct Moments {
     pub zz: f64,
 }
 
-/// Independent accumulators per sum: hides the latency of the adder and fills a SIMD register.
-const LANES: usize = 4;
-
-/// Sums over `x`, `y` of `N` quantities that `term` computes from one point, in [`LANES`] lanes.
-#[inline(always)]
-pub(super) fn lane_sums<const N: usize>(
-    x: &[f64],
-    y: &[f64],
-    term: impl Fn(f64, f64) -> [f64; N],
-) -> [f64; N] {
-    let mut lanes = [[0.0; LANES]; N];
-    let (xs, ys) = (x.chunks_exact(LANES), y.chunks_exact(LANES));
-    let mut sums = [0.0; N];
-    for (x, y) in xs.remainder().iter().zip(ys.remainder()) {
-        for (sum, term) in sums.iter_mut().zip(term(*x, *y)) {
-            *sum += term;
-        }
-    }
-    for (x, y) in xs.zip(ys) {
-        for lane in 0..LANES {
-            let terms = term(x[lane], y[lane]);
-            for (sum, term) in lanes.iter_mut().zip(terms) {
-                sum[lane] += term;
-            }
-        }
-    }
-    for (sum, lanes) in sums.iter_mut().zip(&lanes) {
-        *sum += lanes.iter().sum::<f64>();
-    }
-    sums
-}
-
 impl Moments {
     /// Moments of all points of a source, in one pass.
     pub fn of(points: &(impl Points + ?Sized)) -> Self {
@@ -68,6 +38,7 @@ impl Moments {
     }
 
     /// Moments of one block of points; `x` and `y` of equal length, short enough to stay in cache, for they are read twice.
+    #[inline]
     pub fn of_block(x: &[f64], y: &[f64]) -> Self {
         let count = x.len().min(y.len());
         if count == 0 {
@@ -75,10 +46,12 @@ impl Moments {
         }
         let n = count as f64;
         let (x0, y0) = (x[0], y[0]);
-        let [dx, dy] = lane_sums(x, y, |x, y| [x - x0, y - y0]).map(|sum| sum / n);
+        let first = [f64x4::splat(x0), f64x4::splat(y0)];
+        let [dx, dy] = sums(x, y, |x, y| [x - first[0], y - first[1]]).map(|sum| sum / n);
         let (mx, my) = (x0 + dx, y0 + dy);
-        let [sx, sy, xx, xy, yy, xz, yz, zz] = lane_sums(x, y, |x, y| {
-            let (x, y) = (x - mx, y - my);
+        let mean = [f64x4::splat(mx), f64x4::splat(my)];
+        let [sx, sy, xx, xy, yy, xz, yz, zz] = sums(x, y, |x, y| {
+            let (x, y) = (x - mean[0], y - mean[1]);
             let z = x * x + y * y;
             [x, y, x * x, x * y, y * y, x * z, y * z, z * z]
         });

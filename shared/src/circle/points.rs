@@ -18,6 +18,13 @@ pub trait Points {
 
     /// Calls `part` on consecutive blocks (x and y of equal length, at most [`BLOCK`]) and merges the results in order.
     fn sum<S: Merge>(&self, part: impl Fn(&[f64], &[f64]) -> S + Sync) -> S;
+
+    /// The point at `index` (< [`count`](Self::count)), where it can be had without walking; `None` otherwise. Lets a fit
+    /// of very many points start from a few of them.
+    fn at(&self, index: usize) -> Option<[f64; 2]> {
+        let _ = index;
+        None
+    }
 }
 
 /// Points as two slices of equal length. The fastest source.
@@ -63,6 +70,10 @@ impl Points for Xy<'_> {
         }
         total
     }
+
+    fn at(&self, index: usize) -> Option<[f64; 2]> {
+        Some([*self.x.get(index)?, *self.y.get(index)?])
+    }
 }
 
 impl Points for [[f64; 2]] {
@@ -105,5 +116,9 @@ impl<F: Fn(usize) -> [f64; 2]> Points for Sampled<F> {
             total.merge(&part(&x[..len], &y[..len]));
         }
         total
+    }
+
+    fn at(&self, index: usize) -> Option<[f64; 2]> {
+        Some((self.at)(index))
     }
 }

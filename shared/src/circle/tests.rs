@@ -134,6 +134,42 @@ fn any_scale_gives_the_same_circle() {
     }
 }
 
+/// Points that cannot be had one by one, so that a fit must walk over all of them from the beginning.
+struct WalkOnly<'a>(Xy<'a>);
+
+impl Points for WalkOnly<'_> {
+    fn count(&self) -> usize {
+        self.0.count()
+    }
+
+    fn sum<S: Merge>(&self, part: impl Fn(&[f64], &[f64]) -> S + Sync) -> S {
+        self.0.sum(part)
+    }
+}
+
+#[test]
+fn starting_from_a_few_of_many_points_ends_at_the_same_circle() {
+    let n = 600_000;
+    let (mut x, y): (Vec<f64>, Vec<f64>) = (0..n)
+        .map(|i| {
+            let (sin, cos) = (TAU * i as f64 / n as f64).sin_cos();
+            let radius = 0.1 + 1e-6 * noise(i) + 1e-5 * sin * cos;
+            (2.0 + radius * cos, radius * sin - 7.0)
+        })
+        .unzip();
+    let few = fit(&Xy::new(&x, &y).unwrap()).unwrap();
+    let all = fit(&WalkOnly(Xy::new(&x, &y).unwrap())).unwrap();
+    assert!((few.circle.radius - all.circle.radius).abs() < 1e-14);
+    assert!((0..2).all(|k| (few.circle.centre[k] - all.circle.centre[k]).abs() < 1e-14));
+    assert_relative(few.rss, all.rss, 1e-11);
+    assert!(few.passes <= 2, "{} passes", few.passes);
+    // Of many points on a line, or with a bad one that is not among the few, the few say nothing.
+    x[333_333] = f64::NAN;
+    assert_eq!(fit(&Xy::new(&x, &y).unwrap()).unwrap_err(), CircleError::NonFinite);
+    x.iter_mut().zip(&y).for_each(|(x, y)| *x = 2.0 * y);
+    assert_eq!(fit(&Xy::new(&x, &y).unwrap()).unwrap_err(), CircleError::Collinear);
+}
+
 #[test]
 fn three_points_are_met_exactly_and_have_no_covariance() {
     let fit = fit([[0.0, 1.0], [1.0, 0.0], [0.0, -1.0]].as_slice()).unwrap();
