@@ -7,6 +7,7 @@ pub mod causes;
 pub mod cli;
 pub mod controller;
 pub mod fit;
+pub mod diagnosis;
 pub mod model_file;
 pub mod simulation;
 pub mod table_from_model;

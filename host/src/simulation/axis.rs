@@ -20,6 +20,8 @@ pub(super) struct Grid {
 pub(super) struct AxisPoint {
     /// Where the drive is, m.
     pub(super) drive_m: f64,
+    /// Velocity of the drive, m/s.
+    pub(super) velocity_m_s: f64,
     /// What backlash and friction add, m.
     pub(super) error_m: f64,
     /// Sign of the travel.
@@ -67,14 +69,14 @@ pub(super) fn motion(
         while let Some(t) = times.next_if(|t| *t < t0 + h || last) {
             let s = ((t - t0) / h).clamp(0.0, 1.0);
             let [drive_m, velocity] = hermite(y, h, s);
-            let mut point = AxisPoint { drive_m, error_m: 0.0, sign: 0.0 };
+            let mut point = AxisPoint { drive_m, velocity_m_s: velocity, error_m: 0.0, sign: 0.0 };
             if let Some(memory) = &mut memory {
                 if let Some(turn_s) = turn.filter(|turn_s| *turn_s <= s) {
                     memory.visit(t0 + h * turn_s, hermite(y, h, turn_s)[0]);
                     turn = None;
                 }
                 memory.visit(t, drive_m);
-                point.error_m = memory.error_m(t, drive_m, velocity);
+                point.error_m = memory.error_m(drive_m, velocity);
                 point.sign = memory.sign;
             }
             points.push(point);
@@ -114,6 +116,11 @@ struct Memory {
     reversal: Option<[f64; 2]>,
     /// Where the play has left the load.
     load_m: f64,
+    /// Last place and time.
+    last: [f64; 2],
+    /// Friction, −1…1, and the answers of the loop to its changes.
+    slide: f64,
+    answers: [f64; 2],
 }
 
 impl Memory {
@@ -130,6 +137,9 @@ impl Memory {
             extreme: [position, f64::NEG_INFINITY],
             reversal: None,
             load_m: position - sign * half_backlash_m.abs(),
+            last: [position, f64::NEG_INFINITY],
+            slide: sign,
+            answers: [0.0; 2],
         })
     }
 
@@ -138,6 +148,7 @@ impl Memory {
         let gap = self.half_backlash_m.abs();
         // Not clamp(): it panics where x is NaN.
         self.load_m = self.load_m.max(x - gap).min(x + gap);
+        self.rub(t, x);
         let ahead = x - self.extreme[0];
         if self.sign == 0.0 {
             if ahead.abs() > REVERSAL_TRAVEL_M {
@@ -153,15 +164,38 @@ impl Memory {
         }
     }
 
+    /// Friction follows the travel, the loop follows the friction.
+    fn rub(&mut self, t: f64, x: f64) {
+        let Some(friction) = self.friction else { return };
+        let [last_x, last_t] = self.last;
+        self.last = [x, t];
+        let way = x - last_x;
+        let turned = if way == 0.0 { self.slide } else { way.signum() };
+        let stay = if friction.presliding_m > 0.0 { (-way.abs() / friction.presliding_m).exp() } else { 0.0 };
+        let before = self.slide;
+        self.slide = turned + (before - turned) * stay;
+        let step_s = t - last_t;
+        for (answer, tau) in self.answers.iter_mut().zip([friction.decay_s, friction.rise_s]) {
+            let ratio = step_s / tau;
+            // A change spread evenly over the step; a rise of zero answers nothing.
+            let [keep, take] = match ratio.is_finite() {
+                true if ratio > 1e-9 => [(-ratio).exp(), (1.0 - (-ratio).exp()) / ratio],
+                true => [1.0, 1.0],
+                false => [0.0, 0.0],
+            };
+            *answer = keep * *answer + take * (self.slide - before);
+        }
+    }
+
     /// Offset of the load from the drive.
-    fn error_m(&self, t: f64, x: f64, velocity: f64) -> f64 {
+    fn error_m(&self, x: f64, velocity: f64) -> f64 {
         // A negative step is an overcompensated play: the mirror image.
         let play = (self.load_m - x) * if self.half_backlash_m < 0.0 { -1.0 } else { 1.0 };
-        let Some((friction, [turn_m, turn_s])) = self.friction.zip(self.reversal) else { return play };
-        let pulse = friction.peak_m * (-(t - turn_s) / friction.decay_s).exp();
+        let Some((friction, [turn_m, _])) = self.friction.zip(self.reversal) else { return play };
+        let pulse = 0.5 * friction.peak_m * (self.answers[0] - self.answers[1]) / friction.highest();
         let slow = (-(velocity / friction.stick_speed_m_s).powi(2)).exp();
         let tooth = friction.stick_slip_m * slow * ((x - turn_m).abs() / friction.stick_travel_m).fract();
-        play - self.sign * (pulse + tooth)
+        play - pulse - self.sign * tooth
     }
 }
 
@@ -186,13 +220,10 @@ mod tests {
         let machine = Machine { backlash_m: [2e-5, 0.0], ..Machine::default() };
         let mut memory = Memory::new(&machine, 0, [0.0, 1.0]).unwrap();
         memory.visit(1.0, 1e-3);
-        assert!((memory.error_m(1.0, 1e-3, 1.0) + 1e-5).abs() < 1e-15);
+        assert!((memory.error_m(1e-3, 1.0) + 1e-5).abs() < 1e-15);
         memory.visit(2.0, 1e-3 - 5e-6);
-        assert!(
-            (memory.error_m(2.0, 1e-3 - 5e-6, -1.0) + 5e-6).abs() < 1e-15,
-            "inside the gap the load stands"
-        );
+        assert!((memory.error_m(1e-3 - 5e-6, -1.0) + 5e-6).abs() < 1e-15, "inside the gap the load stands");
         memory.visit(3.0, 0.0);
-        assert!((memory.error_m(3.0, 0.0, -1.0) - 1e-5).abs() < 1e-15);
+        assert!((memory.error_m(0.0, -1.0) - 1e-5).abs() < 1e-15);
     }
 }

@@ -15,18 +15,24 @@ pub(super) struct Place {
 pub(super) fn tool(machine: &Machine, place: Place, t: f64, axes: [AxisPoint; 2]) -> [f64; 2] {
     let [x, y] = axes.map(|a| a.drive_m);
     let half_shear = 0.5 * machine.squareness_rad;
-    let growth = machine.thermal_per_s * t;
+    let growth = match machine.thermal_settling_s {
+        settling if settling > 0.0 => machine.thermal_per_s * settling * (1.0 - (-t / settling).exp()),
+        _ => machine.thermal_per_s * t,
+    };
+    let half_cross = 0.5 * machine.cross_lag_s;
     let mut tool = [
         x + axes[0].error_m
             + x * (machine.scale[0] + growth)
             + y * half_shear
             + machine.straightness_per_m[1] * y * y
-            - 0.5 * machine.lateral_play_m[1] * axes[1].sign,
+            - 0.5 * machine.lateral_play_m[1] * axes[1].sign
+            - half_cross * axes[1].velocity_m_s,
         y + axes[1].error_m
             + y * (machine.scale[1] + growth)
             + x * half_shear
             + machine.straightness_per_m[0] * x * x
-            + 0.5 * machine.lateral_play_m[0] * axes[0].sign,
+            + 0.5 * machine.lateral_play_m[0] * axes[0].sign
+            + half_cross * axes[0].velocity_m_s,
     ];
     for axis in 0..2 {
         if let Some(c) = machine.cyclic[axis] {

@@ -31,8 +31,12 @@ pub struct Machine {
     pub cyclic: [Option<Cyclic>; 2],
     /// Structural vibration at a fixed frequency.
     pub vibration: Option<Vibration>,
-    /// Growth over campaign time, m/m per s.
+    /// Growth over campaign time, m/m per s at its start.
     pub thermal_per_s: f64,
+    /// Time constant with which the growth settles, s; 0: it does not.
+    pub thermal_settling_s: f64,
+    /// Lag of each axis behind the *other* one's velocity (serial arm, A12 = −A21 = half of it), s.
+    pub cross_lag_s: f64,
     /// Constant error of the radius (ball, bar), m.
     pub radius_offset_m: f64,
 }
@@ -78,10 +82,14 @@ pub struct SecondOrder {
 /// against the new direction of travel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Friction {
-    /// Height of the pulse, m: −sgn(v)·peak·exp(−t/decay), t since the reversal.
+    /// Height of the pulse, m: −sgn(v)·peak·p(t), p the answer of peak 1 to friction that turns at once.
     pub peak_m: f64,
     /// Decay of the pulse, s.
     pub decay_s: f64,
+    /// Rise of the pulse, s; 0: at once.
+    pub rise_s: f64,
+    /// Travel over which the friction turns its sign, 1 − 2e^{−x/x0}, m; 0: at once.
+    pub presliding_m: f64,
     /// Height of a stick–slip tooth, m: the axis falls behind by it and catches up at once.
     pub stick_slip_m: f64,
     /// Travel of the drive from tooth to tooth, m (equal to the height: full standstill between slips).
@@ -92,7 +100,27 @@ pub struct Friction {
 
 impl Default for Friction {
     fn default() -> Self {
-        Self { peak_m: 0.0, decay_s: 0.02, stick_slip_m: 0.0, stick_travel_m: 1e-3, stick_speed_m_s: 5e-3 }
+        Self {
+            peak_m: 0.0,
+            decay_s: 0.02,
+            rise_s: 0.0,
+            presliding_m: 0.0,
+            stick_slip_m: 0.0,
+            stick_travel_m: 1e-3,
+            stick_speed_m_s: 5e-3,
+        }
+    }
+}
+
+impl Friction {
+    /// Peak of e^{−t/decay} − e^{−t/rise}.
+    pub(super) fn highest(&self) -> f64 {
+        if self.rise_s <= 0.0 {
+            return 1.0;
+        }
+        let rise_s = self.rise_s.min(0.95 * self.decay_s);
+        let peak_s = (self.decay_s / rise_s).ln() * self.decay_s * rise_s / (self.decay_s - rise_s);
+        (-peak_s / self.decay_s).exp() - (-peak_s / rise_s).exp()
     }
 }
 
@@ -180,6 +208,8 @@ impl Machine {
             if let Some(f) = self.friction[axis] {
                 finite("friction.peak_m", f.peak_m)?;
                 positive("friction.decay_s", f.decay_s)?;
+                finite("friction.rise_s", f.rise_s)?;
+                finite("friction.presliding_m", f.presliding_m)?;
                 finite("friction.stick_slip_m", f.stick_slip_m)?;
                 positive("friction.stick_travel_m", f.stick_travel_m)?;
                 positive("friction.stick_speed_m_s", f.stick_speed_m_s)?;
@@ -201,6 +231,8 @@ impl Machine {
         }
         finite("squareness_rad", self.squareness_rad)?;
         finite("thermal_per_s", self.thermal_per_s)?;
+        finite("thermal_settling_s", self.thermal_settling_s)?;
+        finite("cross_lag_s", self.cross_lag_s)?;
         finite("radius_offset_m", self.radius_offset_m)
     }
 

@@ -15,6 +15,7 @@ mod chain;
 mod circle;
 mod command;
 mod drive;
+mod extend;
 mod from_model;
 mod geometry;
 mod instrument;

@@ -1,0 +1,69 @@
+//! Lost motion at a reversal: `r = d(B/2)·sgn(sinψ)·cosψ` for X, `−d(B/2)·sgn(cosψ)·sinψ` for Y.
+//!
+//! The play is crossed while the axis turns round, in an angle √(2B/R); the shape parameter `play_m` (|B|) gives
+//! the signature that ramp: after the reversal the output stands still until the input has come back by B.
+use super::view::axes_of;
+use super::{Cause, CauseModel, EACH_AXIS, Effect, RunView, Words};
+use crate::simulation::machine::Machine;
+use giotto_shared::Axis;
+use giotto_shared::term::Term;
+
+/// See the module.
+pub struct Backlash;
+
+const WORDS: Words = Words {
+    id: "backlash",
+    name: "backlash",
+    unit: "mm",
+    what: "a step where one axis turns round, outward in both directions: the axis loses motion",
+    usual: "play or wind-up of the screw, rack, gear or belt",
+    adjust: "take up the play mechanically, then set the backlash compensation of that axis",
+    never_told_from: &[],
+    next: "a back-and-forth line of a few steps of the axis with a dial gauge",
+    not_compensable: None,
+};
+
+impl CauseModel for Backlash {
+    fn cause(&self) -> Cause {
+        Cause::Backlash
+    }
+
+    fn words(&self) -> &'static Words {
+        &WORDS
+    }
+
+    fn axes(&self) -> &'static [Option<Axis>] {
+        EACH_AXIS
+    }
+
+    fn shape_names(&self) -> &'static [&'static str] {
+        &["play_m"]
+    }
+
+    fn shapes(&self, _views: &[RunView]) -> Vec<Vec<f64>> {
+        [0.0, 5e-6, 20e-6, 60e-6].map(|play| vec![play]).to_vec()
+    }
+
+    fn signature(&self, axis: Option<Axis>, shape: &[f64], _column: usize, view: &RunView, out: &mut [f64]) {
+        let play_m = shape.first().copied().unwrap_or(0.0);
+        // For Y turn the circle by −90°: its reversals lie where those of X would.
+        let quarter = if axis == Some(Axis::Y) { std::f64::consts::FRAC_PI_2 } else { 0.0 };
+        for (out, psi) in out.iter_mut().zip(&view.psi_rad) {
+            // u: angle since the reversal, in the direction of travel, 0…π.
+            let u = (view.sign * (psi - quarter)).rem_euclid(std::f64::consts::PI);
+            let back_m = view.radius_m * (1.0 - u.cos());
+            let crossed = if play_m > 0.0 { (back_m / play_m).min(1.0) } else { 1.0 };
+            *out = 0.5e-3 * u.cos() * (2.0 * crossed - 1.0);
+        }
+    }
+
+    fn apply(&self, effect: &Effect, machine: &mut Machine) {
+        for axis in axes_of(effect) {
+            machine.backlash_m[axis.index()] += effect.value * 1e-3;
+        }
+    }
+
+    fn term(&self, effect: &Effect) -> Option<Term<f64>> {
+        Some(Term::Backlash { axis: effect.axis?, step_m: effect.value * 1e-3 })
+    }
+}

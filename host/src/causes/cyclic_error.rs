@@ -1,0 +1,90 @@
+//! Periodic error of screw or gear: `r = A·cosψ·sin(2πR·cosψ/P + φ)` for X, with sin for Y: a chirp over the circle.
+use super::view::axes_of;
+use super::{Cause, CauseModel, EACH_AXIS, Effect, RunView, Words};
+use crate::simulation::machine::Cyclic;
+use crate::simulation::machine::Machine;
+use giotto_shared::Axis;
+use giotto_shared::term::Term;
+
+/// See the module.
+pub struct CyclicError;
+
+const WORDS: Words = Words {
+    id: "cyclic_error",
+    name: "cyclic error",
+    unit: "um",
+    what: "a ripple with a fixed period along one axis: dense where the axis is fast, stretched where it turns round",
+    usual: "pitch error of the screw, gear or resolver",
+    adjust: "map the axis over one pitch and enter it in the pitch compensation",
+    never_told_from: &[],
+    next: "a slow line along the axis over a few pitches",
+    not_compensable: None,
+};
+
+impl CauseModel for CyclicError {
+    fn cause(&self) -> Cause {
+        Cause::CyclicError
+    }
+
+    fn words(&self) -> &'static Words {
+        &WORDS
+    }
+
+    fn axes(&self) -> &'static [Option<Axis>] {
+        EACH_AXIS
+    }
+
+    fn shape_names(&self) -> &'static [&'static str] {
+        &["pitch_m"]
+    }
+
+    /// Pitches so close that neighbours stay in step over the diameter of the largest circle.
+    fn shapes(&self, views: &[RunView]) -> Vec<Vec<f64>> {
+        let travel = 2.0 * views.iter().map(|view| view.radius_m).fold(0.0, f64::max);
+        let shortest = (travel / 300.0).max(1e-3);
+        let mut shapes = Vec::new();
+        let mut wave_per_m = 1.0 / (0.5 * travel).max(1e-3);
+        while wave_per_m <= 1.0 / shortest && travel > 0.0 {
+            shapes.push(vec![1.0 / wave_per_m]);
+            wave_per_m += 0.35 / travel;
+        }
+        shapes
+    }
+
+    fn fixed_in_place(&self) -> bool {
+        true
+    }
+
+    fn columns(&self) -> usize {
+        2
+    }
+
+    fn signature(&self, axis: Option<Axis>, shape: &[f64], column: usize, view: &RunView, out: &mut [f64]) {
+        let Some(pitch_m) = shape.first() else { return };
+        let wave = std::f64::consts::TAU * view.radius_m / pitch_m;
+        let at = usize::from(axis == Some(Axis::Y));
+        for (out, direction) in out.iter_mut().zip(&view.direction) {
+            let along = direction[at];
+            *out = 1e-6 * along * if column == 0 { (wave * along).sin() } else { (wave * along).cos() };
+        }
+    }
+
+    fn apply(&self, effect: &Effect, machine: &mut Machine) {
+        for axis in axes_of(effect) {
+            machine.cyclic[axis.index()] = Some(Cyclic {
+                amplitude_m: effect.value * 1e-6,
+                pitch_m: effect.param("pitch_mm", 10.0) * 1e-3,
+                phase_rad: effect.param("phase_rad", 0.0),
+            });
+        }
+    }
+
+    fn term(&self, effect: &Effect) -> Option<Term<f64>> {
+        Some(Term::Cyclic {
+            axis: effect.axis?,
+            amplitude_m: effect.value * 1e-6,
+            pitch_m: effect.param("pitch_mm", 10.0) * 1e-3,
+            phase_rad: effect.param("phase_rad", 0.0),
+        })
+    }
+}

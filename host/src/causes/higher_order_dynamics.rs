@@ -1,0 +1,48 @@
+//! Response that one servo lag cannot give: the paper's f⁴/R³ (Eq. 15).
+//!
+//! (R/Rm)² = 1 + κ2 ω² + b ω⁴ is exact for a lag (b = 0) and for a second-order response (b = 1/ωn⁴), so the
+//! signature is taken there; the value is β2 beyond the lag's own 3κ2²/8: −b/2.
+use super::{Cause, CauseModel, Effect, RunView, Words};
+use crate::simulation::machine::Machine;
+use giotto_shared::Axis;
+
+/// See the module.
+pub struct HigherOrderDynamics;
+
+const WORDS: Words = Words {
+    id: "higher_order_dynamics",
+    name: "higher-order dynamics",
+    unit: "s^4",
+    what: "the radius shrinks faster than the square of the speed: the chain behind the command is not one servo lag",
+    usual: "flexible joints or drives, a loop tuned with little damping, filters in series",
+    adjust: "use the extended model; if the gain may be changed, raise the damping or lower the acceleration of small fast circles",
+    never_told_from: &[],
+    next: "smaller radii at the highest safe speed, and a step or line test with an accelerometer",
+    not_compensable: None,
+};
+
+impl CauseModel for HigherOrderDynamics {
+    fn cause(&self) -> Cause {
+        Cause::HigherOrderDynamics
+    }
+
+    fn words(&self) -> &'static Words {
+        &WORDS
+    }
+
+    fn signature(
+        &self,
+        _axis: Option<Axis>,
+        _shape: &[f64],
+        _column: usize,
+        view: &RunView,
+        out: &mut [f64],
+    ) {
+        let (r, w) = (view.radius_m, view.omega_rad_s);
+        out.fill(r * w.powi(4) * view.gain.powi(3));
+    }
+
+    fn apply(&self, effect: &Effect, machine: &mut Machine) {
+        machine.add_beta2(effect.value);
+    }
+}

@@ -1,0 +1,50 @@
+//! A constant error of the radius: `r = offset`.
+use super::{Cause, CauseModel, Effect, RunView, Words};
+use crate::simulation::machine::Machine;
+use giotto_shared::Axis;
+use giotto_shared::term::Term;
+
+/// See the module.
+pub struct RadiusOffset;
+
+const WORDS: Words = Words {
+    id: "radius_offset",
+    name: "radius offset",
+    unit: "mm",
+    what: "every circle is wrong by the same length, whatever its radius, speed and direction",
+    usual: "calibration of the ball, the bar or the tool",
+    adjust: "calibrate the length of the bar and the tool centre point",
+    never_told_from: &[],
+    next: "a wide range of radii: a scale error grows with R, an offset does not",
+    not_compensable: None,
+};
+
+impl CauseModel for RadiusOffset {
+    fn cause(&self) -> Cause {
+        Cause::RadiusOffset
+    }
+
+    fn words(&self) -> &'static Words {
+        &WORDS
+    }
+
+    fn signature(
+        &self,
+        _axis: Option<Axis>,
+        _shape: &[f64],
+        _column: usize,
+        view: &RunView,
+        out: &mut [f64],
+    ) {
+        debug_assert_eq!(view.psi_rad.len(), out.len());
+        out.fill(1e-3);
+    }
+
+    fn apply(&self, effect: &Effect, machine: &mut Machine) {
+        machine.radius_offset_m += effect.value * 1e-3;
+    }
+
+    fn term(&self, effect: &Effect) -> Option<Term<f64>> {
+        Some(Term::RadiusOffset { offset_m: effect.value * 1e-3 })
+    }
+}

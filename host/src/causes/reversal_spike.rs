@@ -1,0 +1,153 @@
+//! Friction turns its sign where an axis reverses, and the loop needs time to follow: an outward pulse after
+//! the reversal, `r = A·p(t)·|cosψ|` for X, `|sinψ|` for Y.
+//!
+//! The friction does not jump: over a presliding travel x0 it goes as 1 − 2e^{−x/x0} (Dahl; LuGre without a
+//! Stribeck dip, doi 10.1109/9.376053). The loop answers a step of it with e^{−t/decay} − e^{−t/rise}, scaled
+//! to peak 1. At high acceleration the pulse keeps its height and duration; at very low speed it is smeared.
+use super::view::axes_of;
+use super::{Cause, CauseModel, EACH_AXIS, Effect, RunView, Words};
+use crate::simulation::machine::Machine;
+use giotto_shared::Axis;
+use giotto_shared::term::Term;
+
+/// See the module.
+pub struct ReversalSpike;
+
+const WORDS: Words = Words {
+    id: "reversal_spike",
+    name: "reversal spike",
+    unit: "um",
+    what: "a short outward spike just after an axis turns round, of the same height at every speed",
+    usual: "friction of guides and drives against a loop that integrates slowly",
+    adjust: "lubricate; raise the integral gain; set the friction (quadrant) compensation of that axis",
+    never_told_from: &[],
+    next: "the same circle slower and faster: the spike keeps its height and its duration in time",
+    not_compensable: None,
+};
+
+impl CauseModel for ReversalSpike {
+    fn cause(&self) -> Cause {
+        Cause::ReversalSpike
+    }
+
+    fn words(&self) -> &'static Words {
+        &WORDS
+    }
+
+    fn axes(&self) -> &'static [Option<Axis>] {
+        EACH_AXIS
+    }
+
+    fn shape_names(&self) -> &'static [&'static str] {
+        &["decay_s", "rise_s", "presliding_m"]
+    }
+
+    fn shapes(&self, _views: &[RunView]) -> Vec<Vec<f64>> {
+        let mut shapes = Vec::new();
+        for decay in [0.006, 0.015, 0.04, 0.1] {
+            for rise in [0.15, 0.6] {
+                for presliding in [2e-6, 3e-5] {
+                    shapes.push(vec![decay, rise * decay, presliding]);
+                }
+            }
+        }
+        shapes
+    }
+
+    fn signature(&self, axis: Option<Axis>, shape: &[f64], _column: usize, view: &RunView, out: &mut [f64]) {
+        let &[decay_s, rise_s, presliding_m] = shape else { return };
+        let pulse = Pulse::new(decay_s, rise_s, presliding_m, view);
+        let at = usize::from(axis == Some(Axis::Y));
+        let quarter = if at == 1 { std::f64::consts::FRAC_PI_2 } else { 0.0 };
+        for ((out, psi), direction) in out.iter_mut().zip(&view.psi_rad).zip(&view.direction) {
+            let since = view.since_reversal_s(*psi, quarter);
+            // Against the new direction of travel, seen along the radius.
+            let along = view.sign * (psi - quarter);
+            let side =
+                if along.rem_euclid(std::f64::consts::TAU) < std::f64::consts::PI { 1.0 } else { -1.0 };
+            let facing = side * direction[at];
+            *out = 1e-6 * facing * pulse.at(since);
+        }
+    }
+
+    fn apply(&self, effect: &Effect, machine: &mut Machine) {
+        for axis in axes_of(effect) {
+            let mut friction = machine.friction[axis.index()].unwrap_or_default();
+            friction.peak_m += effect.value * 1e-6;
+            friction.decay_s = effect.param("decay_s", 0.03);
+            friction.rise_s = effect.param("rise_s", 0.002);
+            friction.presliding_m = effect.param("presliding_m", 0.0);
+            machine.friction[axis.index()] = Some(friction);
+        }
+    }
+
+    fn term(&self, effect: &Effect) -> Option<Term<f64>> {
+        Some(Term::ReversalSpike {
+            axis: effect.axis?,
+            peak_m: effect.value * 1e-6,
+            decay_s: effect.param("decay_s", 0.03),
+        })
+    }
+}
+
+/// Steps of the tabulated pulse.
+const STEPS: usize = 300;
+
+/// The pulse after a reversal of one run, tabulated; it changes sign from one reversal to the next.
+struct Pulse {
+    step_s: f64,
+    values: [f64; STEPS + 1],
+}
+
+impl Pulse {
+    fn new(decay_s: f64, rise_s: f64, presliding_m: f64, view: &RunView) -> Self {
+        let decay_s = decay_s.abs().max(1e-4);
+        let rise_s = rise_s.abs().clamp(1e-5, 0.95 * decay_s);
+        let presliding_m = presliding_m.abs().max(1e-8);
+        let half_turn_s = std::f64::consts::PI / view.omega_rad_s;
+        // Time to slide five presliding lengths: x = ½(f²/R)t².
+        let slide_s = (10.0 * presliding_m * view.radius_m).sqrt() / view.feed_m_s;
+        let end_s = (14.0 * decay_s + slide_s).min(half_turn_s);
+        let step_s = end_s / STEPS as f64;
+        let peak_s = (decay_s / rise_s).ln() * decay_s * rise_s / (decay_s - rise_s);
+        let peak = (-peak_s / decay_s).exp() - (-peak_s / rise_s).exp();
+        let keep = [decay_s, rise_s].map(|tau| (-step_s / tau).exp());
+        // A change of friction spread evenly over a step.
+        let take = [decay_s, rise_s].map(|tau| tau / step_s * (1.0 - (-step_s / tau).exp()));
+        let mut friction_steps = [0.0; STEPS];
+        let mut before = -1.0;
+        for (k, slot) in friction_steps.iter_mut().enumerate() {
+            let t = step_s * (k + 1) as f64;
+            let travel = view.radius_m * (1.0 - (view.omega_rad_s * t).cos());
+            let friction = 1.0 - 2.0 * (-travel / presliding_m).exp();
+            *slot = friction - before;
+            before = friction;
+        }
+        let mut values = [0.0; STEPS + 1];
+        let mut state = [0.0; 2];
+        // Where pulses overlap, the one before is still dying away with the other sign.
+        let passes = if end_s < half_turn_s { 1 } else { 3 };
+        for _ in 0..passes {
+            state = state.map(|x: f64| -x);
+            values[0] = 0.5 * (state[0] - state[1]) / peak;
+            for (k, change) in friction_steps.iter().enumerate() {
+                for i in 0..2 {
+                    state[i] = keep[i] * state[i] + take[i] * change;
+                }
+                values[k + 1] = 0.5 * (state[0] - state[1]) / peak;
+            }
+        }
+        Self { step_s, values }
+    }
+
+    /// Value `t` s after the reversal, linear in between; the error is below 1 % of the peak.
+    fn at(&self, t: f64) -> f64 {
+        let place = t / self.step_s;
+        let k = place as usize;
+        if k >= STEPS {
+            return 0.0;
+        }
+        let share = place - k as f64;
+        self.values[k] + share * (self.values[k + 1] - self.values[k])
+    }
+}

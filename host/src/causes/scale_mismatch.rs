@@ -1,0 +1,52 @@
+//! X longer than Y: `r = ½R(sx − sy)cos2ψ`, the same both ways.
+use super::{Cause, CauseModel, Effect, RunView, Words};
+use crate::simulation::machine::Machine;
+use giotto_shared::Axis;
+use giotto_shared::term::Term;
+
+/// See the module.
+pub struct ScaleMismatch;
+
+const WORDS: Words = Words {
+    id: "scale_mismatch",
+    name: "scale mismatch",
+    unit: "um/m",
+    what: "an oval along the axes that grows with the radius and is the same in both directions: X and Y differ in scale",
+    usual: "encoder or screw calibration of one axis, unequal warming of the axes",
+    adjust: "set the scale of one axis",
+    never_told_from: &[],
+    next: "a line test along each axis with a laser or a scale",
+    not_compensable: None,
+};
+
+impl CauseModel for ScaleMismatch {
+    fn cause(&self) -> Cause {
+        Cause::ScaleMismatch
+    }
+
+    fn words(&self) -> &'static Words {
+        &WORDS
+    }
+
+    fn signature(
+        &self,
+        _axis: Option<Axis>,
+        _shape: &[f64],
+        _column: usize,
+        view: &RunView,
+        out: &mut [f64],
+    ) {
+        for (out, psi) in out.iter_mut().zip(&view.psi_rad) {
+            *out = 0.5e-6 * view.radius_m * (2.0 * psi).cos();
+        }
+    }
+
+    fn apply(&self, effect: &Effect, machine: &mut Machine) {
+        machine.scale[0] += 0.5e-6 * effect.value;
+        machine.scale[1] -= 0.5e-6 * effect.value;
+    }
+
+    fn term(&self, effect: &Effect) -> Option<Term<f64>> {
+        Some(Term::ScaleMismatch { relative: effect.value * 1e-6 })
+    }
+}

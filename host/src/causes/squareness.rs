@@ -1,0 +1,51 @@
+//! Axes not square: `r = ½εR·sin2ψ`, the same both ways.
+use super::{Cause, CauseModel, Effect, RunView, Words};
+use crate::simulation::machine::Machine;
+use giotto_shared::Axis;
+use giotto_shared::term::Term;
+
+/// See the module.
+pub struct Squareness;
+
+const WORDS: Words = Words {
+    id: "squareness",
+    name: "squareness",
+    unit: "um/m",
+    what: "an oval at 45° that grows with the radius and is the same in both directions: the axes are not square to each other",
+    usual: "alignment of the guides, a crash, a foundation that has settled; on a serial arm, link parameters",
+    adjust: "align the axes or enter the squareness correction in the controller",
+    never_told_from: &[],
+    next: "the same circle in the other quadrants of the work space, or a square",
+    not_compensable: None,
+};
+
+impl CauseModel for Squareness {
+    fn cause(&self) -> Cause {
+        Cause::Squareness
+    }
+
+    fn words(&self) -> &'static Words {
+        &WORDS
+    }
+
+    fn signature(
+        &self,
+        _axis: Option<Axis>,
+        _shape: &[f64],
+        _column: usize,
+        view: &RunView,
+        out: &mut [f64],
+    ) {
+        for (out, psi) in out.iter_mut().zip(&view.psi_rad) {
+            *out = 0.5e-6 * view.radius_m * (2.0 * psi).sin();
+        }
+    }
+
+    fn apply(&self, effect: &Effect, machine: &mut Machine) {
+        machine.squareness_rad += effect.value * 1e-6;
+    }
+
+    fn term(&self, effect: &Effect) -> Option<Term<f64>> {
+        Some(Term::Squareness { shear_rad: effect.value * 1e-6 })
+    }
+}

@@ -1,0 +1,49 @@
+//! What a signature may know of a run: where the machine was at each sample, not what was measured.
+use super::Effect;
+use giotto_shared::Axis;
+
+/// The motion of one run, sample by sample.
+#[derive(Clone, Debug)]
+pub struct RunView {
+    /// Programmed radius R, m.
+    pub radius_m: f64,
+    /// Feed f, m/s: as measured by the duration of the turn, else as programmed.
+    pub feed_m_s: f64,
+    /// ω = f/R, rad/s.
+    pub omega_rad_s: f64,
+    /// d: +1 CCW, −1 CW.
+    pub sign: f64,
+    /// Start of the run as a share (0…1) of the campaign's duration.
+    pub elapsed: f64,
+    /// Largest radius of the campaign, m.
+    pub largest_radius_m: f64,
+    /// Polar angle of the machine ψ = θ − d·φ(ω) at each sample, rad: the lag of the servo removed.
+    pub psi_rad: Vec<f64>,
+    /// cosψ and sinψ at each sample.
+    pub direction: Vec<[f64; 2]>,
+    /// Time since the first sample, s.
+    pub time_s: Vec<f64>,
+    /// Gain |G(jω)| of the baseline.
+    pub gain: f64,
+    /// Phase lag φ(ω) of the servo, rad, ≥ 0.
+    pub lag_rad: f64,
+}
+
+impl RunView {
+    /// Sets the machine angle and what follows from it.
+    pub fn place(&mut self, psi_rad: Vec<f64>) {
+        self.direction = psi_rad.iter().map(|psi| [psi.cos(), psi.sin()]).collect();
+        self.psi_rad = psi_rad;
+    }
+
+    /// Time since the last reversal of the axis whose reversals lie at `first_rad` + kπ, s, for a machine
+    /// angle ψ: always in [0, π/ω).
+    pub fn since_reversal_s(&self, psi_rad: f64, first_rad: f64) -> f64 {
+        (self.sign * (psi_rad - first_rad)).rem_euclid(std::f64::consts::PI) / self.omega_rad_s
+    }
+}
+
+/// The axes an effect sits on: the named one, or both.
+pub(super) fn axes_of(effect: &Effect) -> impl Iterator<Item = Axis> {
+    [Axis::X, Axis::Y].into_iter().filter(move |axis| effect.axis.is_none_or(|named| named == *axis))
+}

@@ -1,0 +1,73 @@
+//! What is reported of a cause.
+use crate::causes::{Cause, Effect};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// An estimate with its 95 % interval.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Value in the contract's unit.
+    pub value: f64,
+    /// 95 % interval.
+    pub ci95: [f64; 2],
+    /// The contract's unit.
+    pub unit: &'static str,
+}
+
+/// One cause, found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// Name in the closed list.
+    pub cause: Cause,
+    /// `x`, `y` or nothing.
+    pub axis: Option<giotto_shared::Axis>,
+    /// Probability that it is there rather than the best explanation without it.
+    pub probability: f64,
+    /// How large.
+    pub estimate: Estimate,
+    /// Share of the baseline's explainable misfit, %.
+    pub share_percent: f64,
+    /// Root mean square over all samples of what it does to the circles, µm.
+    pub rms_um: f64,
+    /// What these data, or circles at all, cannot tell from it.
+    pub indistinguishable_from: Vec<String>,
+    /// Whether the controller can correct it.
+    pub compensable: bool,
+    /// The measurement that would make sure.
+    pub next_measurement: String,
+    /// Further parameters (pitch, time constants), units in the names.
+    pub params: BTreeMap<String, f64>,
+    /// The same as entries of a model.
+    #[serde(skip)]
+    pub effects: Vec<Effect>,
+}
+
+/// What is left that matches nothing in the list.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Unexplained {
+    /// Whether there is anything.
+    pub present: bool,
+    /// Its root mean square over all samples, µm.
+    pub rms_um: f64,
+    /// What it looks like.
+    pub signature: Signature,
+}
+
+/// Description of an effect without a name.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Signature {
+    /// Waves a turn, if it is a harmonic (0: the size).
+    pub harmonic: Option<usize>,
+    /// `even`, `odd` (flips with the direction).
+    pub direction_parity: Option<&'static str>,
+    /// Exponent of the feed.
+    pub feed_exponent: Option<f64>,
+    /// Exponent of the radius.
+    pub radius_exponent: Option<f64>,
+    /// Polar angle, if it sits at one place, degrees.
+    pub angle_deg: Option<f64>,
+    /// When in the campaign, if it depends on that.
+    pub when: Option<String>,
+    /// In words.
+    pub words: Vec<String>,
+}

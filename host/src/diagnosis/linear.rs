@@ -1,0 +1,67 @@
+//! Small least-squares problems of the search, on normal equations that the ledger has summed.
+use nalgebra::{DMatrix, DVector};
+
+/// Solution of the normal equations for a set of columns.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// Coefficients in the order of the set.
+    pub coefficients: Vec<f64>,
+    /// Inverse of the normal matrix.
+    pub covariance: DMatrix<f64>,
+    /// What the set takes off the sum of squares.
+    pub gain: f64,
+}
+
+/// Solves for the columns `set` of the summed products (column 0 is the data). `None`: they are not
+/// independent in these runs (scaled pivot below 1e-9).
+pub fn solve(products: &DMatrix<f64>, set: &[usize]) -> Option<Solution> {
+    let n = set.len();
+    if n == 0 {
+        return Some(Solution { coefficients: Vec::new(), covariance: DMatrix::zeros(0, 0), gain: 0.0 });
+    }
+    let scale: Vec<f64> = set.iter().map(|&i| products[(i, i)].sqrt()).collect();
+    if scale.iter().any(|s| !s.is_finite() || *s <= 0.0) {
+        return None;
+    }
+    let matrix = DMatrix::from_fn(n, n, |i, j| products[(set[i], set[j])] / (scale[i] * scale[j]));
+    let right = DVector::from_fn(n, |i, _| products[(set[i], 0)] / scale[i]);
+    let factor = matrix.cholesky()?;
+    if factor.l_dirty().diagonal().iter().any(|pivot| pivot * pivot < 1e-9) {
+        return None;
+    }
+    let solution = factor.solve(&right);
+    let inverse = factor.inverse();
+    Some(Solution {
+        gain: solution.dot(&right),
+        coefficients: solution.iter().zip(&scale).map(|(x, s)| x / s).collect(),
+        covariance: DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] / (scale[i] * scale[j])),
+    })
+}
+
+/// Residual variance of `values` on the columns (those that add nothing are skipped), by Gram–Schmidt.
+pub fn residual_variance(columns: &[Vec<f64>], values: &[f64]) -> f64 {
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    let mut left = values.to_vec();
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let project = |vector: &mut Vec<f64>, basis: &[Vec<f64>]| {
+        for _ in 0..2 {
+            for q in basis {
+                let along = dot(vector, q);
+                vector.iter_mut().zip(q).for_each(|(v, q)| *v -= along * q);
+            }
+        }
+    };
+    for column in columns {
+        let mut next = column.clone();
+        let length = dot(&next, &next).sqrt();
+        project(&mut next, &basis);
+        let rest = dot(&next, &next).sqrt();
+        if rest > 1e-8 * length && rest > 0.0 {
+            next.iter_mut().for_each(|v| *v /= rest);
+            basis.push(next);
+        }
+    }
+    project(&mut left, &basis);
+    let degrees = values.len().saturating_sub(basis.len());
+    if degrees == 0 { 0.0 } else { dot(&left, &left) / degrees as f64 }
+}

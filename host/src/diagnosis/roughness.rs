@@ -1,0 +1,141 @@
+//! Stick–slip: teeth where an axis is slow, whatever the radius and the feed, and nowhere else.
+//!
+//! Teeth have no fixed place, so power is looked at: second differences of neighbouring samples, over bins of
+//! the speed of one axis. The first quarter second after a reversal is left out, since a friction spike is
+//! steep there too. Where teeth are found, the other explanations do not look.
+use super::ledger::Samples;
+use super::spread::Spread;
+use super::survey::Prepared;
+use giotto_shared::Axis;
+use rayon::prelude::*;
+
+/// Teeth on one axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Teeth {
+    /// Axis that sticks.
+    pub axis: Axis,
+    /// Speed of the axis below which it does, m/s.
+    pub below_m_s: f64,
+    /// Height of a tooth, m: √3 times its root mean square (a ramp from nothing to the height).
+    pub height_m: f64,
+    /// Standard error of the height between runs, m.
+    pub se_m: f64,
+    /// Standard errors by which the roughness exceeds the noise.
+    pub significance: f64,
+}
+
+/// Bins of axis speed: edges 0.25 mm/s · 2^(k/2).
+const BINS: usize = 18;
+const FIRST_EDGE_M_S: f64 = 2.5e-4;
+/// Left out after a reversal, s.
+const SPIKE_S: f64 = 0.25;
+/// Variance ratio above which a bin is rough, and the significance it needs.
+const ROUGH: f64 = 1.6;
+const SIGNIFICANT: f64 = 8.0;
+
+/// Looks for teeth on both axes.
+pub fn find(runs: &[Prepared], residual: &Samples, spread: &Spread) -> Vec<Teeth> {
+    [Axis::X, Axis::Y].into_iter().filter_map(|axis| find_on(axis, runs, residual, spread)).collect()
+}
+
+/// Speed of the axis at a sample, m/s.
+fn axis_speed(run: &Prepared, axis: Axis, sample: usize) -> f64 {
+    let [cos, sin] = run.view.direction[sample];
+    run.view.feed_m_s * if axis == Axis::X { sin } else { cos }.abs()
+}
+
+fn bin_of(speed: f64) -> Option<usize> {
+    let bin = (2.0 * (speed / FIRST_EDGE_M_S).log2()).floor().max(0.0) as usize;
+    (bin < BINS).then_some(bin)
+}
+
+fn find_on(axis: Axis, runs: &[Prepared], residual: &Samples, spread: &Spread) -> Option<Teeth> {
+    let quarter = if axis == Axis::Y { std::f64::consts::FRAC_PI_2 } else { 0.0 };
+    let (sums, counts) = runs
+        .par_iter()
+        .zip(residual)
+        .map(|(run, left)| {
+            let (mut sums, mut counts) = ([0.0; BINS], [0.0; BINS]);
+            for i in 1..left.len().saturating_sub(1) {
+                let near = run.view.since_reversal_s(run.view.psi_rad[i], quarter);
+                let facing = run.view.direction[i][axis.index()].abs();
+                if near < SPIKE_S || facing < 0.3 {
+                    continue;
+                }
+                if let Some(bin) = bin_of(axis_speed(run, axis, i)) {
+                    // Clipped: a few wild samples are not roughness.
+                    sums[bin] += ((left[i - 1] - 2.0 * left[i] + left[i + 1]).powi(2) / 6.0)
+                        .min(400.0 * spread.noise_m2);
+                    counts[bin] += 1.0;
+                }
+            }
+            (sums, counts)
+        })
+        .reduce(
+            || ([0.0; BINS], [0.0; BINS]),
+            |a, b| (std::array::from_fn(|k| a.0[k] + b.0[k]), std::array::from_fn(|k| a.1[k] + b.1[k])),
+        );
+    // Second differences are correlated: about a third of the samples count.
+    let excess = |bin: usize| -> (f64, f64) {
+        let ratio = sums[bin] / (counts[bin] * spread.noise_m2).max(f64::MIN_POSITIVE);
+        (ratio, (ratio - 1.0) * (counts[bin] / 6.0).sqrt())
+    };
+    let rough: Vec<usize> = (0..BINS)
+        .filter(|&bin| counts[bin] >= 20.0)
+        .filter(|&bin| {
+            let (ratio, sigmas) = excess(bin);
+            ratio > ROUGH && sigmas > SIGNIFICANT
+        })
+        .collect();
+    let (&highest, &lowest) = (rough.last()?, rough.first()?);
+    // Rough up to a speed and smooth above it; else it is something else.
+    let above: Vec<usize> = (highest + 1..BINS).filter(|&bin| counts[bin] >= 50.0).collect();
+    if above.is_empty()
+        || highest - lowest + 1 > rough.len() + 2
+        || above.iter().any(|&bin| excess(bin).0 > 1.3)
+    {
+        return None;
+    }
+    let significance = rough.iter().map(|&bin| excess(bin).1).fold(0.0, f64::max);
+    let below_m_s = FIRST_EDGE_M_S * 2f64.powf(0.5 * (highest + 1) as f64);
+    // Height from each run with enough of the zone.
+    let heights: Vec<(f64, f64)> = runs
+        .iter()
+        .zip(residual)
+        .filter_map(|(run, left)| {
+            let clean = {
+                let mut clean = left.clone();
+                for (k, amount) in run.basis.coordinates(left).iter().enumerate().take(3) {
+                    run.basis.add(k, -amount, &mut clean);
+                }
+                clean
+            };
+            let zone: Vec<f64> = (0..left.len())
+                .filter(|&i| {
+                    axis_speed(run, axis, i) < 0.8 * below_m_s
+                        && run.view.direction[i][axis.index()].abs() > 0.3
+                })
+                .map(|i| (clean[i] / run.view.direction[i][axis.index()]).powi(2))
+                .collect();
+            (zone.len() >= 30).then(|| {
+                let mean = zone.iter().sum::<f64>() / zone.len() as f64 - spread.noise_m2;
+                ((3.0 * mean.max(0.0)).sqrt(), zone.len() as f64)
+            })
+        })
+        .collect();
+    let weight: f64 = heights.iter().map(|h| h.1).sum();
+    if heights.len() < 2 || weight <= 0.0 {
+        return None;
+    }
+    let height_m = heights.iter().map(|h| h.0 * h.1).sum::<f64>() / weight;
+    let variance = heights.iter().map(|h| h.1 * (h.0 - height_m).powi(2)).sum::<f64>() / weight;
+    let se_m = (variance / (heights.len() - 1) as f64).sqrt().max(0.02 * height_m);
+    Some(Teeth { axis, below_m_s, height_m, se_m, significance })
+}
+
+impl Teeth {
+    /// Samples of a run in which the axis may stick: a little more than the zone itself.
+    pub fn covers(&self, run: &Prepared, sample: usize) -> bool {
+        axis_speed(run, self.axis, sample) < 1.2 * self.below_m_s
+    }
+}

@@ -1,0 +1,120 @@
+//! The search for the set of explanations, on evidence at the level of runs.
+//!
+//! Evidence of a set is what it takes off χ² (noise and scatter between runs in the metric) less a price for
+//! each member. The price grows with the number of competitors and of shapes tried (extended BIC, Chen &
+//! Chen 2008, doi 10.1093/biomet/asn034), so that pure noise is left alone. Members enter one by one, leave
+//! when others make them needless, and are exchanged for better ones until nothing improves.
+use super::linear::solve;
+use super::pattern::Pattern;
+use crate::causes::Cause;
+use giotto_shared::Axis;
+use nalgebra::DMatrix;
+
+/// An explanation the search may choose.
+#[derive(Clone, Debug)]
+pub struct Item {
+    /// What it is.
+    pub kind: Kind,
+    /// Its columns in the ledger.
+    pub columns: Vec<usize>,
+    /// What it has to take off χ² to be worth while.
+    pub price: f64,
+    /// Beside which other columns its shape was fitted last.
+    pub fitted_beside: Option<Vec<usize>>,
+}
+
+/// Cause or pattern.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Kind {
+    /// A cause of the list.
+    Cause {
+        /// Which.
+        cause: Cause,
+        /// Where.
+        axis: Option<Axis>,
+        /// Its shape parameters, in the order of the cause's names.
+        shape: Vec<f64>,
+    },
+    /// Something without a name.
+    Pattern(Pattern),
+}
+
+impl Item {
+    /// Whether it is in the closed list.
+    pub fn listed(&self) -> bool {
+        matches!(self.kind, Kind::Cause { .. })
+    }
+}
+
+/// Price of one listed column: ln(78 runs) + 2·ln(25 competitors), about 11, and a margin for the scatter
+/// being estimated.
+pub const PRICE: f64 = 14.0;
+/// Further price of a second column.
+pub const PRICE_OF_PHASE: f64 = 5.0;
+/// Further price of a pattern: there are hundreds of them, and a name is worth more.
+pub const PRICE_OF_PATTERN: f64 = 14.0;
+/// Most members.
+const MOST: usize = 14;
+
+/// Evidence of a set: `None` where its columns are not independent in these runs.
+pub fn evidence(products: &DMatrix<f64>, nuisance: &[usize], items: &[Item], set: &[usize]) -> Option<f64> {
+    let columns = columns_of(nuisance, items, set);
+    let price: f64 = set.iter().map(|&i| items[i].price).sum();
+    solve(products, &columns).map(|solution| solution.gain - price)
+}
+
+/// Columns of nuisance and set.
+pub fn columns_of(nuisance: &[usize], items: &[Item], set: &[usize]) -> Vec<usize> {
+    nuisance.iter().copied().chain(set.iter().flat_map(|&i| items[i].columns.iter().copied())).collect()
+}
+
+/// The best set, starting from `start` and without the `barred`.
+pub fn select(
+    products: &DMatrix<f64>,
+    nuisance: &[usize],
+    items: &[Item],
+    start: &[usize],
+    barred: &[usize],
+) -> Vec<usize> {
+    let score = |set: &[usize]| evidence(products, nuisance, items, set).unwrap_or(f64::NEG_INFINITY);
+    let mut set = start.to_vec();
+    let mut best = score(&set);
+    if best == f64::NEG_INFINITY {
+        set.clear();
+        best = score(&set);
+    }
+    for _ in 0..4 * MOST {
+        let mut next: Option<(f64, Vec<usize>)> = None;
+        let consider = |candidate: Vec<usize>, next: &mut Option<(f64, Vec<usize>)>| {
+            let value = score(&candidate);
+            if value > best + 1e-6 && next.as_ref().is_none_or(|(other, _)| value > *other) {
+                *next = Some((value, candidate));
+            }
+        };
+        for at in 0..set.len() {
+            consider(without(&set, at), &mut next);
+        }
+        let outside: Vec<usize> =
+            (0..items.len()).filter(|i| !set.contains(i) && !barred.contains(i)).collect();
+        for &candidate in &outside {
+            if set.len() < MOST {
+                let mut grown = set.clone();
+                grown.push(candidate);
+                consider(grown, &mut next);
+            }
+            for at in 0..set.len() {
+                let mut exchanged = set.clone();
+                exchanged[at] = candidate;
+                consider(exchanged, &mut next);
+            }
+        }
+        let Some((value, candidate)) = next else { break };
+        best = value;
+        set = candidate;
+    }
+    set
+}
+
+fn without(set: &[usize], at: usize) -> Vec<usize> {
+    set.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, v)| *v).collect()
+}

@@ -1,0 +1,282 @@
+//! Fitting what bends a signature: pitch, time constants, play.
+//!
+//! A coarse scan on a stratified part of the runs, then a simplex on all of them; each trial costs one column,
+//! not one refit of everything.
+use super::explain::{Explained, column, residual, width};
+use super::ledger::Samples;
+use super::linear::solve;
+use super::search::{Kind, columns_of};
+use super::survey::Prepared;
+use crate::causes::{Cause, RunView};
+use giotto_shared::Axis;
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+/// Runs of the coarse scan.
+const SCAN_RUNS: usize = 16;
+/// A scan is worth refining above this share of its price.
+const PROMISING: f64 = 0.6;
+
+/// Number of starting shapes of an explanation: the more, the higher its price.
+pub fn count(kind: &Kind, runs: &[Prepared]) -> usize {
+    match kind {
+        Kind::Cause { cause, .. } => cause.model().shapes(&views(runs)).len(),
+        Kind::Pattern(_) => 1,
+    }
+}
+
+fn views(runs: &[Prepared]) -> Vec<RunView> {
+    runs.iter().map(|run| run.view.clone()).collect()
+}
+
+/// Gives every shaped cause its best shape beside the other chosen explanations.
+pub fn improve(found: &mut Explained, runs: &[Prepared]) {
+    let views = views(runs);
+    let sample = stratified(runs);
+    let all: Vec<usize> = (0..runs.len()).collect();
+    let whitened = whitened_residual(found, runs);
+    let digest = digest(runs, &whitened);
+    for item in 0..found.items.len() {
+        let Kind::Cause { cause, axis, shape } = found.items[item].kind.clone() else { continue };
+        let model = cause.model();
+        if model.shape_names().is_empty() {
+            continue;
+        }
+        let others: Vec<usize> = found.chosen.iter().copied().filter(|&i| i != item).collect();
+        let with = columns_of(&found.nuisance, &found.items, &others);
+        if found.items[item].fitted_beside.as_ref() == Some(&with) {
+            continue;
+        }
+        found.items[item].fitted_beside = Some(with.clone());
+        let score = |shape: &[f64], over: &[usize]| -> f64 {
+            let kind = Kind::Cause { cause, axis, shape: shape.to_vec() };
+            gain(found, runs, &kind, &with, over)
+        };
+        let best_of = |candidates: Vec<Vec<f64>>, over: &[usize]| {
+            candidates
+                .into_par_iter()
+                .map(|shape| (score(&shape, over), shape))
+                .max_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        let start = if found.chosen.contains(&item) {
+            shape.clone()
+        } else {
+            let candidates = model.shapes(&views);
+            // A scan of a part of the runs sees that part of the gain.
+            let share =
+                if model.fixed_in_place() { 1.0 } else { runs.len() as f64 / sample.len().max(1) as f64 };
+            let best = if model.fixed_in_place() {
+                candidates
+                    .into_par_iter()
+                    .map(|shape| (digest_gain(&digest, cause, axis, &shape, found.spread.noise_m2), shape))
+                    .max_by(|a, b| a.0.total_cmp(&b.0))
+            } else {
+                best_of(candidates, &sample)
+            };
+            match best {
+                Some((coarse, start)) if coarse * share > PROMISING * found.items[item].price => start,
+                _ => continue,
+            }
+        };
+        let polished = if discrete(&start) || model.shape_names() == ["turned"] {
+            best_of(model.shapes(&views), &all).map_or(start, |(_, shape)| shape)
+        } else {
+            let first_step = if model.fixed_in_place() {
+                // A pitch lives on a narrow peak: neighbours fall out of step over the diameter.
+                0.1 * start[0] / (2.0 * views.iter().map(|view| view.radius_m).fold(1e-3, f64::max))
+            } else {
+                0.15
+            };
+            let near = simplex(&start, first_step, 40, |shape| score(shape, &sample));
+            if found.chosen.contains(&item) {
+                simplex(&near, 0.2 * first_step, 20, |shape| score(shape, &all))
+            } else {
+                near
+            }
+        };
+        if polished != shape {
+            let kind = Kind::Cause { cause, axis, shape: polished };
+            for (index, &at) in found.items[item].columns.clone().iter().enumerate() {
+                found.ledger.replace(runs, at, column(&kind, index, runs));
+            }
+            found.items[item].kind = kind;
+        }
+    }
+}
+
+/// V⁻¹ times what the chosen explanations leave: its product with a column is that column's pull.
+fn whitened_residual(found: &Explained, runs: &[Prepared]) -> Samples {
+    let mut left = residual(found);
+    left.par_iter_mut().zip(runs).for_each(|(left, run)| {
+        let discounts = found.spread.discounts(left.len());
+        let coordinates = run.basis.coordinates(left);
+        for (k, (amount, discount)) in coordinates.iter().zip(discounts).enumerate() {
+            run.basis.add(k, -amount * discount, left);
+        }
+        left.iter_mut().for_each(|x| *x /= found.spread.noise_m2);
+    });
+    left
+}
+
+/// Runs of one radius folded into bins of the machine angle.
+struct Folded {
+    view: RunView,
+    pull: Vec<f64>,
+    count: Vec<f64>,
+}
+
+/// Bins of a fold: as fine as a ballbar samples.
+const FOLDS: usize = 1000;
+
+fn digest(runs: &[Prepared], whitened: &Samples) -> Vec<Folded> {
+    let mut folded: Vec<Folded> = Vec::new();
+    for (run, pull) in runs.iter().zip(whitened) {
+        let same = |other: &Folded| (other.view.radius_m / run.view.radius_m - 1.0).abs() < 1e-6;
+        let at = folded.iter().position(same).unwrap_or_else(|| {
+            let bin = std::f64::consts::TAU / FOLDS as f64;
+            let mut view = run.view.clone();
+            view.place((0..FOLDS).map(|i| bin * (i as f64 + 0.5)).collect());
+            folded.push(Folded { view, pull: vec![0.0; FOLDS], count: vec![0.0; FOLDS] });
+            folded.len() - 1
+        });
+        for (psi, pull) in run.view.psi_rad.iter().zip(pull) {
+            let bin = ((psi / std::f64::consts::TAU).rem_euclid(1.0) * FOLDS as f64) as usize % FOLDS;
+            folded[at].pull[bin] += pull;
+            folded[at].count[bin] += 1.0;
+        }
+    }
+    folded
+}
+
+/// Approximate gain of a place-fixed signature: pull²/own, columns taken as orthogonal.
+fn digest_gain(digest: &[Folded], cause: Cause, axis: Option<Axis>, shape: &[f64], noise_m2: f64) -> f64 {
+    let model = cause.model();
+    let mut out = vec![0.0; FOLDS];
+    let mut gain = 0.0;
+    for index in 0..model.columns() {
+        let (mut pull, mut own) = (0.0, 0.0);
+        for folded in digest {
+            model.signature(axis, shape, index, &folded.view, &mut out);
+            for ((value, p), n) in out.iter().zip(&folded.pull).zip(&folded.count) {
+                pull += value * p;
+                own += n * value * value;
+            }
+        }
+        gain += if own > 0.0 { pull * pull * noise_m2 / own } else { 0.0 };
+    }
+    gain
+}
+
+/// Shapes that are choices, not amounts.
+fn discrete(shape: &[f64]) -> bool {
+    shape.iter().any(|value| !value.is_finite())
+}
+
+/// Every so many runs in the order of radius and feed.
+fn stratified(runs: &[Prepared]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..runs.len()).collect();
+    order.sort_by(|&a, &b| {
+        let key = |i: usize| (runs[i].view.radius_m, runs[i].view.feed_m_s, runs[i].view.sign);
+        let (a, b) = (key(a), key(b));
+        a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.total_cmp(&b.2))
+    });
+    let step = (runs.len() as f64 / SCAN_RUNS as f64).max(1.0);
+    (0..SCAN_RUNS.min(runs.len())).map(|i| order[((i as f64 + 0.5) * step) as usize % order.len()]).collect()
+}
+
+/// What the explanation takes off χ² beside the columns `with`, over some runs.
+fn gain(found: &Explained, runs: &[Prepared], kind: &Kind, with: &[usize], over: &[usize]) -> f64 {
+    let mut weights = vec![0.0; runs.len()];
+    for &run in over {
+        weights[run] = 1.0;
+    }
+    let known = with.len() + 1;
+    let wide = width(kind);
+    let mut products = DMatrix::zeros(known + wide, known + wide);
+    let base: Vec<usize> = std::iter::once(0).chain(with.iter().copied()).collect();
+    for &run in over {
+        let white = found.ledger.white_of(run);
+        for (i, &a) in base.iter().enumerate() {
+            for (j, &b) in base.iter().enumerate() {
+                products[(i, j)] += white[(a, b)];
+            }
+        }
+    }
+    let mut columns: Vec<Samples> = Vec::with_capacity(wide);
+    for index in 0..wide {
+        let samples: Samples = over
+            .iter()
+            .map(|&run| {
+                let mut out = vec![0.0; runs[run].deviation_m.len()];
+                if let Kind::Cause { cause, axis, shape } = kind {
+                    cause.model().signature(*axis, shape, index, &runs[run].view, &mut out);
+                }
+                out
+            })
+            .collect();
+        let (cross, own) = found.ledger.probe(runs, &samples, &base, over);
+        for (i, value) in cross.iter().enumerate() {
+            products[(i, known + index)] = *value;
+            products[(known + index, i)] = *value;
+        }
+        products[(known + index, known + index)] = own;
+        for (earlier, other) in columns.iter().enumerate() {
+            let value = found.ledger.outside(runs, other, &samples, over);
+            products[(known + earlier, known + index)] = value;
+            products[(known + index, known + earlier)] = value;
+        }
+        columns.push(samples);
+    }
+    let without: Vec<usize> = (1..known).collect();
+    let whole: Vec<usize> = (1..known + wide).collect();
+    match (solve(&products, &whole), solve(&products, &without)) {
+        (Some(whole), Some(without)) => whole.gain - without.gain,
+        _ => 0.0,
+    }
+}
+
+/// Nelder–Mead upwards; each parameter first moves by a share of itself, or by 1 ms (or mm) from zero.
+fn simplex(start: &[f64], first_step: f64, most: usize, score: impl Fn(&[f64]) -> f64) -> Vec<f64> {
+    let n = start.len();
+    let mut points: Vec<(f64, Vec<f64>)> = vec![(score(start), start.to_vec())];
+    for axis in 0..n {
+        let mut moved = start.to_vec();
+        moved[axis] += if moved[axis].abs() > 1e-9 { first_step * moved[axis] } else { 1e-3 };
+        points.push((score(&moved), moved));
+    }
+    for _ in 0..most {
+        points.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let worst = points[n].clone();
+        let centre: Vec<f64> =
+            (0..n).map(|k| points[..n].iter().map(|(_, p)| p[k]).sum::<f64>() / n as f64).collect();
+        let towards = |factor: f64| -> (f64, Vec<f64>) {
+            let point: Vec<f64> = centre.iter().zip(&worst.1).map(|(c, w)| c + factor * (w - c)).collect();
+            (score(&point), point)
+        };
+        let reflected = towards(-1.0);
+        points[n] = if reflected.0 > points[0].0 {
+            let expanded = towards(-2.0);
+            if expanded.0 > reflected.0 { expanded } else { reflected }
+        } else if reflected.0 > points[n - 1].0 {
+            reflected
+        } else {
+            let drawn = towards(0.5);
+            if drawn.0 > worst.0 {
+                drawn
+            } else {
+                let best = points[0].1.clone();
+                for point in points.iter_mut().skip(1) {
+                    point.1 = point.1.iter().zip(&best).map(|(p, b)| 0.5 * (p + b)).collect();
+                    point.0 = score(&point.1);
+                }
+                points[n].clone()
+            }
+        };
+        let spread = points.iter().map(|p| p.0).fold(f64::NEG_INFINITY, f64::max)
+            - points.iter().map(|p| p.0).fold(f64::INFINITY, f64::min);
+        if spread.abs() < 0.3 {
+            break;
+        }
+    }
+    points.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).map_or_else(|| start.to_vec(), |(_, point)| point)
+}

@@ -1,0 +1,250 @@
+//! A campaign made ready for the search: each run's motion, its measured turn, the lag of the machine.
+//!
+//! A ballbar gives time, not angle: the recorded pattern is turned by the lag φ(ω) of the machine. The
+//! set-up offset does not move between runs, so the turn of the first harmonic with speed measures φ.
+use super::basis::Basis;
+use crate::campaign::{Campaign, Run};
+use crate::causes::RunView;
+use crate::model_file::Servo;
+
+/// One run, ready.
+#[derive(Clone, Debug)]
+pub struct Prepared {
+    /// Index in the campaign.
+    pub index: usize,
+    /// Where the machine was.
+    pub view: RunView,
+    /// Feed as programmed, m/s.
+    pub programmed_m_s: f64,
+    /// Deviation at each sample, m.
+    pub deviation_m: Vec<f64>,
+    /// Angle by which the recorded pattern runs ahead of the machine: θ − ψ = d·φ, rad; 0 for measured angles.
+    pub turned_rad: f64,
+    /// Samples that nothing is read from (empty: none).
+    pub hidden: Vec<bool>,
+    /// Low orders of the circle, orthonormal over the samples; orders about the inferred angle.
+    pub basis: Basis,
+}
+
+/// The part of the response that all runs share: (R/Rm)² = 1 + aω² + bω⁴.
+///
+/// Exact for one lag (a = 1/kv², b = 0) and for a second-order response (b = 1/ωn⁴).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Response {
+    /// a = κ2, s².
+    pub a_s2: f64,
+    /// b, s⁴.
+    pub b_s4: f64,
+}
+
+impl Response {
+    /// Of a model file.
+    pub fn of(servo: &Servo) -> Self {
+        match *servo {
+            Servo::Beta { beta1_s2, beta2_s4, .. } => {
+                let a_s2 = -2.0 * beta1_s2;
+                Self { a_s2, b_s4: 2.0 * (0.375 * a_s2 * a_s2 - beta2_s4) }
+            }
+            Servo::Lag { kv_per_s } => Self { a_s2: kv_per_s.powi(-2), b_s4: 0.0 },
+            Servo::SecondOrder { omega_n_rad_s, zeta } => Self {
+                a_s2: -2.0 * (1.0 - 2.0 * zeta * zeta) / omega_n_rad_s.powi(2),
+                b_s4: omega_n_rad_s.powi(-4),
+            },
+        }
+    }
+
+    /// |G(jω)|.
+    pub fn gain(&self, omega_rad_s: f64) -> f64 {
+        let w2 = omega_rad_s * omega_rad_s;
+        (1.0 + self.a_s2 * w2 + self.b_s4 * w2 * w2).max(1e-3).sqrt().recip()
+    }
+}
+
+impl Prepared {
+    /// Hides samples from every product.
+    pub fn hide(&mut self, hidden: Vec<bool>) {
+        let angle: Vec<f64> = self.view.psi_rad.iter().map(|psi| psi + self.turned_rad).collect();
+        self.basis = Basis::masked(&angle, &hidden);
+        self.hidden = hidden;
+        let mut deviation = std::mem::take(&mut self.deviation_m);
+        self.mask(&mut deviation);
+        self.deviation_m = deviation;
+    }
+
+    /// Zero where hidden.
+    pub fn mask(&self, samples: &mut [f64]) {
+        for (sample, hidden) in samples.iter_mut().zip(&self.hidden) {
+            if *hidden {
+                *sample = 0.0;
+            }
+        }
+    }
+}
+
+/// How the phase lag was found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lag {
+    /// φ = τω − τ3ω³: τ, s.
+    pub tau_s: f64,
+    /// τ3, s³.
+    pub tau3_s3: f64,
+    /// Whether the set-up offset was large enough to measure it (else it is that of the servo model).
+    pub measured: bool,
+}
+
+impl Lag {
+    /// φ(ω), rad.
+    pub fn phase(&self, omega_rad_s: f64) -> f64 {
+        omega_rad_s * (self.tau_s - self.tau3_s3 * omega_rad_s * omega_rad_s)
+    }
+}
+
+/// Ratio of measured to programmed feed below which a run counts as slowed.
+const SLOWED: f64 = 0.995;
+
+/// Feed of the run as its turn shows it; the programmed one without time stamps or where they agree to 0.5 %.
+pub fn believed_feed_m_s(run: &Run) -> f64 {
+    let turn_m = std::f64::consts::TAU * run.radius_m;
+    match run.turn_s() {
+        Some(turn_s) if turn_s > 0.0 => {
+            let measured = turn_m / turn_s;
+            if (SLOWED..=1.0 / SLOWED).contains(&(measured / run.feed_m_s)) { run.feed_m_s } else { measured }
+        }
+        _ => run.feed_m_s,
+    }
+}
+
+/// Makes the runs ready about a first guess of the response.
+pub fn prepare(campaign: &Campaign, response: &Response) -> (Vec<Prepared>, Lag) {
+    let starts: Vec<f64> =
+        campaign.runs.iter().enumerate().map(|(i, run)| run.started_s.unwrap_or(i as f64)).collect();
+    let first = starts.iter().copied().fold(f64::INFINITY, f64::min);
+    let span = starts.iter().copied().fold(f64::NEG_INFINITY, f64::max) - first;
+    let largest = campaign.runs.iter().map(|run| run.radius_m).fold(0.0, f64::max);
+    let mut runs: Vec<Prepared> = campaign
+        .runs
+        .iter()
+        .enumerate()
+        .map(|(index, run)| {
+            let feed = believed_feed_m_s(run);
+            let omega = feed / run.radius_m;
+            let theta = &run.samples.angle_rad;
+            let from = theta.first().copied().unwrap_or(0.0);
+            let time_s = run
+                .samples
+                .time_s
+                .clone()
+                .unwrap_or_else(|| theta.iter().map(|angle| (angle - from).abs() / omega).collect());
+            Prepared {
+                index,
+                programmed_m_s: run.feed_m_s,
+                turned_rad: 0.0,
+                deviation_m: run.samples.deviation_m.clone(),
+                hidden: Vec::new(),
+                basis: Basis::new(theta),
+                view: RunView {
+                    radius_m: run.radius_m,
+                    feed_m_s: feed,
+                    omega_rad_s: omega,
+                    sign: run.sign(),
+                    elapsed: if span > 0.0 { (starts[index] - first) / span } else { 0.0 },
+                    largest_radius_m: largest,
+                    psi_rad: theta.clone(),
+                    direction: Vec::new(),
+                    time_s,
+                    gain: response.gain(omega),
+                    lag_rad: 0.0,
+                },
+            }
+        })
+        .collect();
+    let inferred = campaign.runs.iter().any(|run| run.samples.angle_inferred);
+    let lag = if inferred {
+        measure_lag(&runs, response)
+    } else {
+        Lag { tau_s: 0.0, tau3_s3: 0.0, measured: true }
+    };
+    for run in &mut runs {
+        // An angle that was measured holds no lag, but the servo's own phase still turns its signatures.
+        run.view.lag_rad =
+            if inferred { lag.phase(run.view.omega_rad_s) } else { servo_phase(response, &run.view) };
+        if inferred {
+            let turn = run.view.sign * run.view.lag_rad;
+            run.turned_rad = turn;
+        }
+        let psi = run.view.psi_rad.iter().map(|theta| theta - run.turned_rad).collect();
+        run.view.place(psi);
+    }
+    (runs, lag)
+}
+
+/// Phase of a lag with this response.
+fn servo_phase(response: &Response, view: &RunView) -> f64 {
+    (response.a_s2.max(0.0).sqrt() * view.omega_rad_s).atan()
+}
+
+/// Least eccentricity that shows its turn clearly against a micrometre of noise, m.
+const SMALLEST_OFFSET_M: f64 = 3e-6;
+
+/// Fits z = E·e^{idφ(ω)} to the first harmonics z = c + is of all runs.
+fn measure_lag(runs: &[Prepared], response: &Response) -> Lag {
+    let points: Vec<(f64, f64, [f64; 2])> = runs
+        .iter()
+        .filter_map(|run| {
+            let first = run.basis.harmonics(&run.deviation_m).get(1).copied()?;
+            Some((run.view.sign, run.view.omega_rad_s, first))
+        })
+        .collect();
+    let guess = response.a_s2.max(0.0).sqrt();
+    let unmeasured = Lag { tau_s: guess, tau3_s3: 0.0, measured: false };
+    let cost = |tau: f64, tau3: f64| -> (f64, f64) {
+        let (mut re, mut im) = (0.0, 0.0);
+        for (sign, omega, [c, s]) in &points {
+            let phase = -sign * omega * (tau - tau3 * omega * omega);
+            let (sin, cos) = phase.sin_cos();
+            re += c * cos - s * sin;
+            im += c * sin + s * cos;
+        }
+        let n = points.len() as f64;
+        let (re, im) = (re / n, im / n);
+        let left = points.iter().map(|(_, _, [c, s])| c * c + s * s).sum::<f64>() / n - re * re - im * im;
+        (left.max(0.0), re.hypot(im))
+    };
+    let fastest = points.iter().map(|p| p.1).fold(0.0, f64::max);
+    let slowest = points.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
+    if points.len() < 3 || fastest <= 0.0 || (fastest - slowest) < 0.2 * fastest {
+        return unmeasured;
+    }
+    // A phase beyond ±π at the fastest run would be another branch.
+    let widest = (std::f64::consts::PI / fastest).min(0.2);
+    let mut tau = (0..=80)
+        .map(|i| -0.1 * widest + 1.1 * widest * f64::from(i) / 80.0)
+        .min_by(|l, r| cost(*l, 0.0).0.total_cmp(&cost(*r, 0.0).0))
+        .unwrap_or(guess);
+    let mut tau3 = 0.0;
+    let mut step = [widest / 80.0, 0.2 * tau.abs().max(1e-3) / (fastest * fastest)];
+    for _ in 0..60 {
+        for axis in 0..2 {
+            let at =
+                |delta: f64| if axis == 0 { cost(tau + delta, tau3).0 } else { cost(tau, tau3 + delta).0 };
+            let (low, mid, high) = (at(-step[axis]), at(0.0), at(step[axis]));
+            let bend = low - 2.0 * mid + high;
+            let delta = if bend > 0.0 {
+                (0.5 * step[axis] * (low - high) / bend).clamp(-step[axis], step[axis])
+            } else {
+                0.0
+            };
+            if at(delta) <= mid {
+                if axis == 0 { tau += delta } else { tau3 += delta }
+            }
+            step[axis] *= 0.85;
+        }
+    }
+    let (left, eccentricity) = cost(tau, tau3);
+    // Standard error of the phase at the fastest run, rad.
+    let se = (left / points.len() as f64).sqrt() / eccentricity.max(1e-12);
+    if eccentricity < SMALLEST_OFFSET_M || se > 0.02 {
+        return unmeasured;
+    }
+    Lag { tau_s: tau, tau3_s3: tau3, measured: true }
+}

@@ -1,0 +1,337 @@
+//! Ripples of a fixed frequency in time: vibration, or the polygon of a slow interpolator.
+//!
+//! Each run has a phase of its own, so power is added, not amplitude; a run counts for at most [`CAP`], so
+//! that the sharp harmonics of a few runs cannot pose as a tone that all share.
+use super::basis::{axpy, dot};
+use super::ledger::Samples;
+use super::spread::Spread;
+use super::survey::Prepared;
+use giotto_shared::Axis;
+use rayon::prelude::*;
+use rustfft::FftPlanner;
+use rustfft::num_complex::Complex;
+
+/// How the amplitude depends on the run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Amplitude {
+    /// The same in each run: a vibration.
+    Constant,
+    /// ∝ f²/R: the height of a chord's arc, an interpolator.
+    Centripetal,
+}
+
+/// A tone shared by the runs.
+#[derive(Clone, Debug)]
+pub struct Tone {
+    /// Frequency, Hz.
+    pub frequency_hz: f64,
+    /// Its standard error, Hz.
+    pub se_hz: f64,
+    /// Axis along which it swings; `None`: along the radius.
+    pub axis: Option<Axis>,
+    /// Law of the amplitude.
+    pub amplitude: Amplitude,
+    /// Root mean square amplitude over the runs that show it, m.
+    pub amplitude_m: f64,
+    /// Log-evidence for the chosen law of the amplitude against the other.
+    pub law_evidence: f64,
+    /// What it takes off χ².
+    pub gain: f64,
+    /// Energy that it takes off each run (sum of squares, m²).
+    pub energy_m2: Vec<f64>,
+}
+
+/// Largest power that one run may add, in units of χ²₂.
+const CAP: f64 = 40.0;
+/// Longest turn used, s: longer ones would need a grid too fine for what they add.
+const LONGEST_TURN_S: f64 = 12.0;
+/// Fewest waves in a turn: below, the tone hides among the low orders.
+const FEWEST_WAVES: f64 = 9.5;
+/// Padding of the transforms.
+const PAD: usize = 4;
+/// Standard errors above both noise and floor that make a tone.
+const SIGNIFICANT: f64 = 8.0;
+
+struct Spectrum {
+    turn_s: f64,
+    nyquist_hz: f64,
+    /// 2|X|²/(nσ²) at multiples of 1/(length·Δt).
+    power: Vec<f64>,
+    step_hz: f64,
+}
+
+/// Looks for a tone in what the other explanations leave.
+pub fn find(runs: &[Prepared], residual: &Samples, spread: &Spread) -> Option<Tone> {
+    let clean: Vec<(usize, Vec<f64>, f64)> = runs
+        .par_iter()
+        .enumerate()
+        .filter_map(|(index, run)| {
+            let turn_s = std::f64::consts::TAU / run.view.omega_rad_s;
+            (turn_s <= LONGEST_TURN_S && run.deviation_m.len() >= 64)
+                .then(|| (index, without_low_orders(run, &residual[index]), turn_s))
+        })
+        .collect();
+    let spectra: Vec<Spectrum> =
+        clean.par_iter().map(|(_, samples, turn_s)| spectrum(samples, *turn_s, spread.noise_m2)).collect();
+    let longest = spectra.iter().map(|s| s.turn_s).fold(0.0, f64::max);
+    let highest = spectra.iter().map(|s| s.nyquist_hz).fold(0.0, f64::max);
+    if spectra.len() < 4 || longest <= 0.0 {
+        return None;
+    }
+    let step = 0.25 / longest;
+    let points = ((highest / step) as usize).min(200_000);
+    let grid: Vec<(f64, f64, usize, usize)> = (1..points)
+        .into_par_iter()
+        .filter_map(|i| {
+            let frequency = i as f64 * step;
+            let (mut sum, mut count, mut loud) = (0.0, 0usize, 0usize);
+            for s in &spectra {
+                if frequency < 0.95 * s.nyquist_hz && frequency * s.turn_s > FEWEST_WAVES {
+                    let power = s.at(frequency);
+                    sum += power.min(CAP);
+                    count += 1;
+                    loud += usize::from(power > 14.0);
+                }
+            }
+            (count >= 4).then(|| (frequency, sum / count as f64, count, loud))
+        })
+        .collect();
+    let mut levels: Vec<f64> = grid.iter().map(|g| g.1).collect();
+    if levels.len() < 100 {
+        return None;
+    }
+    levels.sort_by(f64::total_cmp);
+    let floor = levels[levels.len() / 2];
+    let width = (levels[levels.len() * 84 / 100] - floor).max(1e-9);
+    let best = grid
+        .iter()
+        .filter(|(_, mean, count, loud)| {
+            let expected = 2.0 / (*count as f64).sqrt();
+            (mean - 2.0) / expected > SIGNIFICANT
+                && (mean - floor) / width > SIGNIFICANT
+                && *loud >= 4.max(count / 6)
+        })
+        .max_by(|a, b| (a.1 * (a.2 as f64).sqrt()).total_cmp(&(b.1 * (b.2 as f64).sqrt())))?;
+    refine(runs, &clean, spread, best.0, step, residual)
+}
+
+fn refine(
+    runs: &[Prepared],
+    clean: &[(usize, Vec<f64>, f64)],
+    spread: &Spread,
+    start_hz: f64,
+    step_hz: f64,
+    residual: &Samples,
+) -> Option<Tone> {
+    let usable: Vec<&(usize, Vec<f64>, f64)> = clean
+        .iter()
+        .filter(|(_, samples, turn_s)| {
+            start_hz < 0.47 * samples.len() as f64 / turn_s && start_hz * turn_s > FEWEST_WAVES
+        })
+        .collect();
+    let swung = |axis: Option<Axis>| -> Vec<Vec<f64>> {
+        usable.iter().map(|(index, samples, _)| swing(&runs[*index], samples, axis)).collect()
+    };
+    let sum_at = |swung: &[Vec<f64>], axis: Option<Axis>, hz: f64| -> f64 {
+        usable
+            .par_iter()
+            .zip(swung)
+            .map(|((_, _, turn_s), samples)| power(samples, *turn_s, hz, spread.noise_m2) * loudness(axis))
+            .sum()
+    };
+    // A swing along an axis shows on the circle as two sidebands, one turn below and above.
+    let (axis, start_hz) = [None, Some(Axis::X), Some(Axis::Y)]
+        .into_iter()
+        .flat_map(|axis| {
+            let swung = swung(axis);
+            let sums: Vec<(f64, Option<Axis>, f64)> = (-48..=48)
+                .map(|i| start_hz + 0.5 * step_hz * f64::from(i))
+                .map(|hz| (sum_at(&swung, axis, hz), axis, hz))
+                .collect();
+            sums
+        })
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, axis, hz)| (axis, hz))?;
+    let swung = swung(axis);
+    let total = |hz: f64| sum_at(&swung, axis, hz);
+    let mut centre = start_hz;
+    let mut half = step_hz;
+    for _ in 0..12 {
+        let values: Vec<(f64, f64)> = (-3..=3)
+            .map(|i| {
+                let hz = centre + half * f64::from(i) / 3.0;
+                (total(hz), hz)
+            })
+            .collect();
+        centre = values.iter().max_by(|a, b| a.0.total_cmp(&b.0))?.1;
+        half *= 0.5;
+    }
+    let h = 0.02 * step_hz;
+    let bend = (total(centre + h) - 2.0 * total(centre) + total(centre - h)) / (h * h);
+    let se_hz = if bend < 0.0 { (2.0 / -bend).sqrt() } else { step_hz };
+    let powers: Vec<(f64, f64, f64)> = usable
+        .iter()
+        .zip(&swung)
+        .map(|((index, samples, turn_s), swung)| {
+            let view = &runs[*index].view;
+            let power = power(swung, *turn_s, centre, spread.noise_m2) * loudness(axis);
+            // χ²₂ with non-centrality n·A²/(2σ²).
+            (
+                power,
+                samples.len() as f64 / (2.0 * spread.noise_m2 * loudness(axis)),
+                view.feed_m_s.powi(2) / view.radius_m,
+            )
+        })
+        .collect();
+    let law = |weight: &dyn Fn(f64) -> f64| -> (f64, f64) {
+        let misfit = |scale: f64| -> f64 {
+            powers
+                .iter()
+                .map(|(power, unit, x)| rice_deviance(*power, unit * (scale * weight(*x)).powi(2)))
+                .sum()
+        };
+        let start = (powers.iter().map(|p| (p.0 - 2.0).max(0.0)).sum::<f64>()
+            / powers.iter().map(|p| p.1 * weight(p.2).powi(2)).sum::<f64>())
+        .sqrt();
+        let mut best = (misfit(start), start);
+        for i in -40..=40 {
+            let scale = start * 1.05_f64.powi(i);
+            best = if misfit(scale) < best.0 { (misfit(scale), scale) } else { best };
+        }
+        best
+    };
+    let constant = law(&|_| 1.0);
+    let centripetal = law(&|x| x);
+    let amplitude = if constant.0 <= centripetal.0 { Amplitude::Constant } else { Amplitude::Centripetal };
+    let mean_square: f64 =
+        powers.iter().map(|(power, unit, _)| (power - 2.0) / unit).sum::<f64>() / powers.len() as f64;
+    let mut tone = Tone {
+        frequency_hz: centre,
+        se_hz,
+        axis,
+        amplitude,
+        amplitude_m: mean_square.max(0.0).sqrt(),
+        law_evidence: 0.5 * (constant.0 - centripetal.0).abs(),
+        gain: total(centre),
+        energy_m2: Vec::new(),
+    };
+    tone.energy_m2 = runs
+        .par_iter()
+        .zip(residual)
+        .map(|(run, left)| {
+            let mut without = left.clone();
+            tone.remove_from(run, &mut without);
+            dot(left, left) - dot(&without, &without)
+        })
+        .collect();
+    Some(tone)
+}
+
+/// −2·log-likelihood of a χ²₂ power with non-centrality λ, in the Gaussian approximation of its amplitude:
+/// √P has mean √(λ + 1) and variance 1. A floor keeps one odd run from deciding.
+fn rice_deviance(power: f64, lambda: f64) -> f64 {
+    let off = power.sqrt() - (lambda + 1.0).sqrt();
+    // Amplitudes of real tones vary by some percent from run to run.
+    let variance = 1.0 + 0.01 * lambda;
+    (off * off / variance).min(50.0) + variance.ln()
+}
+
+impl Tone {
+    /// Takes the tone out of the runs' deviations.
+    pub fn remove(&self, runs: &mut [Prepared]) {
+        runs.par_iter_mut().for_each(|run| {
+            let mut deviation = std::mem::take(&mut run.deviation_m);
+            self.remove_from(run, &mut deviation);
+            run.deviation_m = deviation;
+        });
+    }
+
+    fn remove_from(&self, run: &Prepared, samples: &mut [f64]) {
+        let n = samples.len();
+        let turn_s = std::f64::consts::TAU / run.view.omega_rad_s;
+        let overtones = if self.amplitude == Amplitude::Centripetal { 3 } else { 1 };
+        for overtone in 1..=overtones {
+            let hz = self.frequency_hz * f64::from(overtone);
+            let wave = std::f64::consts::TAU * hz * turn_s / n as f64;
+            let swing = |i: usize| self.axis.map_or(1.0, |axis| run.view.direction[i][axis.index()]);
+            let mut columns: [Vec<f64>; 2] = [
+                (0..n).map(|i| swing(i) * (wave * i as f64).cos()).collect(),
+                (0..n).map(|i| swing(i) * (wave * i as f64).sin()).collect(),
+            ];
+            for column in &mut columns {
+                let coordinates = run.basis.coordinates(column);
+                for (k, amount) in coordinates.iter().enumerate() {
+                    run.basis.add(k, -amount, column);
+                }
+            }
+            let [cos, sin] = &mut columns;
+            let length = dot(cos, cos);
+            if length < 0.05 * n as f64 {
+                continue;
+            }
+            let mix = dot(cos, sin) / length;
+            axpy(-mix, cos, sin);
+            for column in [&*cos, &*sin] {
+                let own = dot(column, column);
+                if own > 0.05 * n as f64 {
+                    axpy(-dot(column, samples) / own, column, samples);
+                }
+            }
+        }
+    }
+}
+
+fn without_low_orders(run: &Prepared, samples: &[f64]) -> Vec<f64> {
+    let mut out = samples.to_vec();
+    for (k, amount) in run.basis.coordinates(samples).iter().enumerate() {
+        run.basis.add(k, -amount, &mut out);
+    }
+    out
+}
+
+fn spectrum(samples: &[f64], turn_s: f64, noise_m2: f64) -> Spectrum {
+    let n = samples.len();
+    let length = (PAD * n).next_power_of_two();
+    let mut buffer: Vec<Complex<f64>> = samples.iter().map(|&x| Complex::new(x, 0.0)).collect();
+    buffer.resize(length, Complex::default());
+    FftPlanner::new().plan_fft_forward(length).process(&mut buffer);
+    let scale = 2.0 / (n as f64 * noise_m2);
+    Spectrum {
+        turn_s,
+        nyquist_hz: 0.5 * n as f64 / turn_s,
+        power: buffer[..length / 2].iter().map(|x| scale * x.norm_sqr()).collect(),
+        step_hz: n as f64 / (turn_s * length as f64),
+    }
+}
+
+impl Spectrum {
+    fn at(&self, hz: f64) -> f64 {
+        self.power.get((hz / self.step_hz).round() as usize).copied().unwrap_or(0.0)
+    }
+}
+
+/// Samples times the direction cosine of the axis.
+fn swing(run: &Prepared, samples: &[f64], axis: Option<Axis>) -> Vec<f64> {
+    match axis {
+        None => samples.to_vec(),
+        Some(axis) => samples.iter().zip(&run.view.direction).map(|(x, d)| x * d[axis.index()]).collect(),
+    }
+}
+
+/// Mean square of 1 over that of the direction cosine: 2 for a swing along an axis.
+fn loudness(axis: Option<Axis>) -> f64 {
+    if axis.is_some() { 2.0 } else { 1.0 }
+}
+
+/// Power at one frequency, in units of χ²₂.
+fn power(samples: &[f64], turn_s: f64, hz: f64, noise_m2: f64) -> f64 {
+    let wave = std::f64::consts::TAU * hz * turn_s / samples.len() as f64;
+    let turn = Complex::new(wave.cos(), wave.sin());
+    let mut phase = Complex::new(1.0, 0.0);
+    let mut sum = Complex::new(0.0, 0.0);
+    for &x in samples {
+        sum += phase * x;
+        phase *= turn;
+    }
+    2.0 * sum.norm_sqr() / (samples.len() as f64 * noise_m2)
+}

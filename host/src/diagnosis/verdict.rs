@@ -1,0 +1,284 @@
+//! From the chosen explanations to findings: estimate, interval, probability, share, look-alikes.
+use super::duration::Clamp;
+use super::explain::{Explained, energies};
+use super::finding::{Estimate, Finding};
+use super::search::{Kind, columns_of, evidence, select};
+use super::tone::{Amplitude, Tone};
+use crate::causes::{Cause, Effect};
+use giotto_shared::Axis;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+use std::collections::BTreeMap;
+
+/// No probability is certain: a statement about a machine from one campaign.
+const HIGHEST: f64 = 0.999;
+
+/// Findings, largest share first. `clamp_energy_m2` is what the clamp's slower feed explains.
+pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> {
+    let weights = vec![1.0; found.runs.len()];
+    let samples: f64 = found.runs.iter().map(|run| run.deviation_m.len() as f64).sum();
+    let (each, _) = energies(found, &weights);
+    let tone_energy: f64 = found.tone.iter().flat_map(|tone| &tone.energy_m2).sum::<f64>().max(0.0);
+    let teeth_energy: Vec<f64> = found.teeth.iter().map(|teeth| {
+        let hidden: usize = found.runs.iter().map(|run| (0..run.hidden.len()).filter(|&i| teeth.covers(run, i)).count()).sum();
+        hidden as f64 * teeth.height_m.powi(2) / 3.0 * 0.5
+    }).collect();
+    let total = each.iter().sum::<f64>()
+        + tone_energy
+        + teeth_energy.iter().sum::<f64>()
+        + clamp.map_or(0.0, |(_, energy)| energy);
+    let share = |energy: f64| if total > 0.0 { 100.0 * energy / total } else { 0.0 };
+    let rms = |energy: f64| (energy / samples).sqrt() * 1e6;
+    let mut out = Vec::new();
+    for (at, &item) in found.chosen.iter().enumerate() {
+        let Kind::Cause { cause, axis, shape } = &found.items[item].kind else { continue };
+        let words = cause.model().words();
+        let (value, half) = estimate(found, item);
+        let mut params: BTreeMap<String, f64> =
+            cause.model().shape_names().iter().map(|n| (*n).to_string()).zip(shape.iter().copied()).collect();
+        complete(*cause, found, item, &mut params);
+        let ci95 = [value - half, value + half];
+        let effect = Effect { cause: *cause, axis: *axis, value, ci95, params: params.clone() };
+        out.push(Finding {
+            cause: *cause,
+            axis: *axis,
+            probability: probability(found, &weights, at),
+            estimate: Estimate { value, ci95, unit: words.unit },
+            share_percent: share(each[at]),
+            rms_um: rms(each[at]),
+            indistinguishable_from: look_alikes(found, &weights, at),
+            compensable: words.not_compensable.is_none() && cause.model().term(&effect).is_some(),
+            next_measurement: words.next.to_string(),
+            params,
+            effects: vec![effect],
+        });
+    }
+    let mut out = join_axes(out);
+    if let Some((clamp, energy)) = clamp {
+        let value = clamp.limit_m_s2 * 1e3;
+        let half = 2.0 * clamp.se_m_s2 * 1e3;
+        out.push(plain(Cause::FeedClamp, None, value, half, HIGHEST, share(energy), rms(energy), BTreeMap::new()));
+    }
+    if let Some(tone) = &found.tone {
+        out.push(tone_finding(tone, share(tone_energy), rms(tone_energy)));
+    }
+    for (teeth, energy) in found.teeth.iter().zip(teeth_energy) {
+        let params = BTreeMap::from([("below_mm_s".to_string(), teeth.below_m_s * 1e3)]);
+        let odds = 0.5 * teeth.significance.powi(2) - 14.0;
+        let (value, half) = (teeth.height_m * 1e6, 2.0 * teeth.se_m * 1e6);
+        out.push(plain(Cause::StickSlip, Some(teeth.axis), value, half, sigmoid(odds), share(energy), rms(energy), params));
+    }
+    out.sort_by(|a, b| b.share_percent.total_cmp(&a.share_percent));
+    out
+}
+
+#[allow(clippy::too_many_arguments, reason = "one line a field")]
+fn plain(
+    cause: Cause,
+    axis: Option<Axis>,
+    value: f64,
+    half: f64,
+    probability: f64,
+    share_percent: f64,
+    rms_um: f64,
+    params: BTreeMap<String, f64>,
+) -> Finding {
+    let words = cause.model().words();
+    let ci95 = [value - half, value + half];
+    let effect = Effect { cause, axis, value, ci95, params: params.clone() };
+    Finding {
+        cause,
+        axis,
+        probability,
+        estimate: Estimate { value, ci95, unit: words.unit },
+        share_percent,
+        rms_um,
+        indistinguishable_from: words.never_told_from.iter().map(|s| (*s).to_string()).collect(),
+        compensable: words.not_compensable.is_none() && cause.model().term(&effect).is_some(),
+        next_measurement: words.next.to_string(),
+        params,
+        effects: vec![effect],
+    }
+}
+
+fn tone_finding(tone: &Tone, share: f64, rms: f64) -> Finding {
+    let params = BTreeMap::from([
+        ("amplitude_um".to_string(), tone.amplitude_m * 1e6),
+        ("frequency_hz".to_string(), tone.frequency_hz),
+    ]);
+    let law = sigmoid(tone.law_evidence.min(50.0));
+    // The frequency is sharper than the model of it: a part in 1e5 for the clock of the instrument.
+    let se_hz = tone.se_hz.hypot(1e-5 * tone.frequency_hz);
+    let (cause, value, half) = match tone.amplitude {
+        Amplitude::Constant => (Cause::Vibration, tone.frequency_hz, 2.0 * se_hz),
+        Amplitude::Centripetal => {
+            let period = 1.0 / tone.frequency_hz;
+            (Cause::InterpolationChord, period, 2.0 * se_hz * period * period)
+        }
+    };
+    let other = match tone.amplitude {
+        Amplitude::Constant => Cause::InterpolationChord,
+        Amplitude::Centripetal => Cause::Vibration,
+    };
+    let axis = if cause == Cause::Vibration { tone.axis } else { None };
+    let mut finding = plain(cause, axis, value, half, law, share, rms, params);
+    if tone.law_evidence < 3.0 {
+        finding.indistinguishable_from.push(other.id().to_string());
+    }
+    finding
+}
+
+fn sigmoid(log_odds: f64) -> f64 {
+    (1.0 / (1.0 + (-log_odds).exp())).min(HIGHEST)
+}
+
+/// Value and half-width of its 95 % interval, in the contract's unit.
+fn estimate(found: &Explained, item: usize) -> (f64, f64) {
+    let columns = columns_of(&found.nuisance, &found.items, &found.chosen);
+    let own = &found.items[item].columns;
+    let at: Vec<usize> = own.iter().filter_map(|c| columns.iter().position(|other| other == c)).collect();
+    let dof = (found.runs.len().saturating_sub(columns.len())).max(1) as f64;
+    let t = StudentsT::new(0.0, 1.0, dof).map_or(2.0, |t| t.inverse_cdf(0.975));
+    let robust = robust_variances(found, &columns);
+    let value: Vec<f64> = at.iter().map(|&i| found.solution.coefficients[i]).collect();
+    let variance = |i: usize| found.solution.covariance[(i, i)].max(robust.get(i).copied().unwrap_or(0.0));
+    match (value.as_slice(), at.as_slice()) {
+        ([only], [i]) => (*only, t * variance(*i).sqrt()),
+        ([a, b], [i, j]) => {
+            let size = a.hypot(*b).max(f64::MIN_POSITIVE);
+            let se = ((a / size).powi(2) * variance(*i) + (b / size).powi(2) * variance(*j)).sqrt();
+            (size, t * se)
+        }
+        _ => (f64::NAN, f64::NAN),
+    }
+}
+
+/// Variances of the coefficients by the scatter of the runs' pulls (sandwich, with the run as the cluster).
+fn robust_variances(found: &Explained, columns: &[usize]) -> Vec<f64> {
+    let n = columns.len();
+    let mut meat = nalgebra::DMatrix::<f64>::zeros(n, n);
+    for run in 0..found.runs.len() {
+        let white = found.ledger.white_of(run);
+        let pull: Vec<f64> = columns
+            .iter()
+            .map(|&a| {
+                white[(a, 0)]
+                    - columns.iter().zip(&found.solution.coefficients).map(|(&b, x)| white[(a, b)] * x).sum::<f64>()
+            })
+            .collect();
+        for i in 0..n {
+            for j in 0..n {
+                meat[(i, j)] += pull[i] * pull[j];
+            }
+        }
+    }
+    let runs = found.runs.len() as f64;
+    let small = runs / (runs - n as f64).max(1.0);
+    let bread = &found.solution.covariance;
+    let sandwich = bread * meat * bread * small;
+    (0..n).map(|i| sandwich[(i, i)]).collect()
+}
+
+/// Probability of a chosen explanation against the best set that does without it.
+fn probability(found: &Explained, weights: &[f64], at: usize) -> f64 {
+    let products = found.ledger.white(weights);
+    let with = evidence(&products, &found.nuisance, &found.items, &found.chosen);
+    let rest: Vec<usize> = found.chosen.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, c)| *c).collect();
+    let same_cause: Vec<usize> = (0..found.items.len())
+        .filter(|&i| match (&found.items[i].kind, &found.items[found.chosen[at]].kind) {
+            (Kind::Cause { cause: a, .. }, Kind::Cause { cause: b, .. }) => a == b,
+            _ => false,
+        })
+        .collect();
+    let other = select(&products, &found.nuisance, &found.items, &rest, &same_cause);
+    let without = evidence(&products, &found.nuisance, &found.items, &other);
+    match (with, without) {
+        (Some(with), Some(without)) => sigmoid(0.5 * (with - without)),
+        _ => 0.5,
+    }
+}
+
+/// Other causes that would explain these data nearly as well in its place (evidence within 2·ln 20).
+fn look_alikes(found: &Explained, weights: &[f64], at: usize) -> Vec<String> {
+    let products = found.ledger.white(weights);
+    let best = evidence(&products, &found.nuisance, &found.items, &found.chosen).unwrap_or(0.0);
+    let own = found.chosen[at];
+    let Kind::Cause { cause, .. } = &found.items[own].kind else { return Vec::new() };
+    let mut out: Vec<String> = cause.model().words().never_told_from.iter().map(|s| (*s).to_string()).collect();
+    for (index, item) in found.items.iter().enumerate() {
+        let Kind::Cause { cause: other, .. } = &item.kind else { continue };
+        if other == cause || found.chosen.contains(&index) {
+            continue;
+        }
+        let mut swapped = found.chosen.clone();
+        swapped[at] = index;
+        let close = evidence(&products, &found.nuisance, &found.items, &swapped).is_some_and(|e| e > best - 6.0);
+        let id = other.id().to_string();
+        if close && !out.contains(&id) {
+            out.push(id);
+        }
+    }
+    out
+}
+
+/// Parameters that the linear fit gives: the phase of a cyclic error, where a bow was measured, ….
+fn complete(cause: Cause, found: &Explained, item: usize, params: &mut BTreeMap<String, f64>) {
+    let columns = columns_of(&found.nuisance, &found.items, &found.chosen);
+    let value = |k: usize| {
+        found.items[item]
+            .columns
+            .get(k)
+            .and_then(|c| columns.iter().position(|other| other == c))
+            .map_or(0.0, |i| found.solution.coefficients[i])
+    };
+    match cause {
+        Cause::CyclicError => {
+            params.insert("phase_rad".into(), value(1).atan2(value(0)));
+            if let Some(pitch) = params.remove("pitch_m") {
+                params.insert("pitch_mm".into(), pitch * 1e3);
+            }
+        }
+        Cause::Straightness => {
+            let largest = found.runs.iter().map(|run| run.view.largest_radius_m).fold(0.0, f64::max);
+            params.insert("over_radius_mm".into(), largest * 1e3);
+        }
+        Cause::ThermalDrift => {
+            if !params.get("settling").is_some_and(|s| s.is_finite()) {
+                params.insert("settling".into(), 0.0);
+            }
+        }
+        Cause::Backlash => {
+            params.remove("play_m");
+        }
+        _ => {}
+    }
+}
+
+/// One finding where both axes show the same cause of the same size.
+fn join_axes(findings: Vec<Finding>) -> Vec<Finding> {
+    let mut out: Vec<Finding> = Vec::new();
+    for finding in findings {
+        let twin = out.iter_mut().find(|other| other.cause == finding.cause && other.axis.is_some() && finding.axis.is_some());
+        match twin {
+            Some(twin) if alike(twin, &finding) => {
+                let halves = [&twin.estimate, &finding.estimate].map(|e| 0.5 * (e.ci95[1] - e.ci95[0]));
+                let value = 0.5 * (twin.estimate.value + finding.estimate.value);
+                let half = 0.5 * halves[0].hypot(halves[1]);
+                twin.axis = None;
+                twin.estimate.value = value;
+                twin.estimate.ci95 = [value - half, value + half];
+                twin.share_percent += finding.share_percent;
+                twin.rms_um = twin.rms_um.hypot(finding.rms_um);
+                twin.probability = twin.probability.max(finding.probability);
+                twin.effects.extend(finding.effects);
+            }
+            _ => out.push(finding),
+        }
+    }
+    out
+}
+
+fn alike(a: &Finding, b: &Finding) -> bool {
+    let width = |f: &Finding| f.estimate.ci95[1] - f.estimate.ci95[0];
+    let off = (a.estimate.value - b.estimate.value).abs();
+    off < width(a) + width(b) || off < 0.1 * a.estimate.value.abs()
+}

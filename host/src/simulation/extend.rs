@@ -1,0 +1,126 @@
+//! Changes to the chain that a diagnosis asks for: a response of higher order, axes that differ.
+use super::machine::{Machine, PositionLoop, SecondOrder};
+
+impl Machine {
+    /// Gives a chain of one lag per axis the fourth-order coefficient β2 (s⁴) beyond the lag's own 3κ2²/8, with
+    /// κ2 as it is: (R/Rm)² = 1 + κ2ω² − 2β2ω⁴. Negative β2: second-order mechanics with ωn⁴ = −1/(2β2) instead
+    /// of the loop; positive: feed-forward in the loop. A chain without a finite lag gets mechanics of its κ2 = 0.
+    pub fn add_beta2(&mut self, beta2_s4: f64) {
+        for axis in 0..2 {
+            let a = self.servo[axis].kv_per_s.powi(-2);
+            let b = -2.0 * beta2_s4;
+            if b > 0.0 {
+                let omega_n2 = b.powf(-0.5);
+                // a = (4ζ² − 2)/ωn²
+                let zeta = (0.5 + 0.25 * a * omega_n2).max(1e-4).sqrt();
+                self.mechanics[axis] = Some(SecondOrder { omega_n_rad_s: omega_n2.sqrt(), zeta });
+                self.servo[axis] = PositionLoop::default();
+            } else if b < 0.0 && a > 0.0 {
+                // (1 + ω²/k²)/(1 + c²ω²) = 1 + aω² + bω⁴ + …, c = feed-forward time
+                let c2 = -b / a;
+                let lag2 = a + c2;
+                self.servo[axis] =
+                    PositionLoop { kv_per_s: lag2.powf(-0.5), feed_forward: (c2 / lag2).sqrt() };
+            }
+        }
+    }
+
+    /// Makes X lag by `delta_tau_s` more than Y: in the gains of the loops where both have a finite one, else as
+    /// dead time.
+    pub fn split_lag(&mut self, delta_tau_s: f64) {
+        let lags = self.servo.map(|servo| 1.0 / servo.kv_per_s);
+        let split = [lags[0] + 0.5 * delta_tau_s, lags[1] - 0.5 * delta_tau_s];
+        if lags.iter().all(|lag| *lag > 0.0) && split.iter().all(|lag| *lag > 0.0) {
+            self.servo[0].kv_per_s = 1.0 / split[0];
+            self.servo[1].kv_per_s = 1.0 / split[1];
+        } else {
+            self.split_dead_time(delta_tau_s);
+        }
+    }
+
+    /// Delays X by `delta_s` more than Y.
+    pub fn split_dead_time(&mut self, delta_s: f64) {
+        let [x, y] = &mut self.dead_time_s;
+        *x += delta_s.max(0.0);
+        *y += (-delta_s).max(0.0);
+    }
+
+    /// Gives X a second cumulant larger by `delta_kappa2_s2` than Y's and the same delay: the loop or the
+    /// mechanics take the one, dead time makes up for the other.
+    pub fn split_bandwidth(&mut self, delta_kappa2_s2: f64) {
+        let mut delay = [0.0; 2];
+        for (axis, share) in [0.5 * delta_kappa2_s2, -0.5 * delta_kappa2_s2].into_iter().enumerate() {
+            let lag = 1.0 / self.servo[axis].kv_per_s;
+            let square = lag * lag + share;
+            if let (true, Some(mechanics)) = (square <= 0.0 || lag == 0.0, &mut self.mechanics[axis]) {
+                // κ2 = (4ζ² − 2)/ωn², delay 2ζ/ωn
+                let omega_n = mechanics.omega_n_rad_s;
+                let zeta = (mechanics.zeta.powi(2) + 0.25 * share * omega_n * omega_n).max(1e-4).sqrt();
+                delay[axis] = 2.0 * (zeta - mechanics.zeta) / omega_n;
+                mechanics.zeta = zeta;
+            } else if square > 0.0 {
+                self.servo[axis].kv_per_s = square.powf(-0.5);
+                delay[axis] = square.sqrt() - lag;
+            }
+        }
+        self.split_dead_time(delay[1] - delay[0]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{CircleTest, circle};
+    use super::*;
+    use giotto_shared::Direction;
+
+    /// Cosine and sine of order 2 of the radial deviation over the machine's angle.
+    fn oval(machine: &Machine, radius_m: f64, feed_m_s: f64, direction: Direction) -> [f64; 2] {
+        let trace = circle(machine, &CircleTest::new(radius_m, feed_m_s, direction));
+        let n = trace.deviation_m.len() as f64;
+        trace.position_m.iter().zip(&trace.deviation_m).fold([0.0; 2], |[c, s], (p, r)| {
+            let psi = 2.0 * p[1].atan2(p[0]);
+            [c + 2.0 / n * r * psi.cos(), s + 2.0 / n * r * psi.sin()]
+        })
+    }
+
+    fn lag(kv_per_s: f64) -> Machine {
+        Machine { servo: [PositionLoop { kv_per_s, feed_forward: 0.0 }; 2], ..Machine::default() }
+    }
+
+    #[test]
+    fn unequal_bandwidth_is_a_quarter_of_the_centripetal_acceleration_and_even() {
+        for direction in [Direction::Ccw, Direction::Cw] {
+            let mut machine = lag(100.0);
+            machine.split_bandwidth(2e-6);
+            let [cos, sin] = oval(&machine, 0.1, 0.3, direction);
+            let expected = -0.25 * 2e-6 * 0.3 * 0.3 / 0.1;
+            assert!((cos - expected).abs() < 0.02 * expected.abs(), "{cos} {expected}");
+            assert!(sin.abs() < 0.02 * expected.abs(), "{sin}");
+        }
+    }
+
+    #[test]
+    fn unequal_lag_is_half_of_the_way_and_odd() {
+        for (direction, sign) in [(Direction::Ccw, 1.0), (Direction::Cw, -1.0)] {
+            let mut machine = lag(100.0);
+            machine.split_lag(4e-5);
+            let [_, sin] = oval(&machine, 0.3, 0.2, direction);
+            let expected = sign * 0.5 * 0.2 * 4e-5;
+            assert!((sin - expected).abs() < 0.02 * expected.abs(), "{sin} {expected}");
+        }
+    }
+
+    #[test]
+    fn added_beta2_is_what_the_radius_shows_beyond_the_lag() {
+        for beta2 in [-2e-8, 2e-8] {
+            let mut machine = lag(100.0);
+            machine.add_beta2(beta2);
+            let (radius, feed) = (0.1, 0.2);
+            let test = CircleTest::new(radius, feed, Direction::Ccw);
+            let more =
+                circle(&machine, &test).mean_deviation_m() - circle(&lag(100.0), &test).mean_deviation_m();
+            let expected = beta2 * feed.powi(4) / radius.powi(3);
+            assert!((more - expected).abs() < 0.02 * expected.abs(), "{more} {expected}");
+        }
+    }
+}
