@@ -73,43 +73,16 @@ enum Share {
 }
 
 fn share(effect: &Effect) -> Result<Share, ModelTableError> {
-    let Effect { cause, value, .. } = *effect;
-    let missing = |name| ModelTableError::MissingParameter { cause, name };
-    let axis = || effect.axis.ok_or(missing("axis"));
-    let param = |name: &'static str| effect.params.get(name).copied().ok_or(missing(name));
-    let (micro, milli) = (value * 1e-6, value * 1e-3);
-    Ok(Share::Term(match cause {
-        Cause::HigherOrderDynamics => return Ok(Share::Kappa4(24.0 * value)),
-        Cause::RadiusOffset => Term::RadiusOffset { offset_m: milli },
-        Cause::ScaleError => Term::ScaleError { relative: micro },
-        Cause::ScaleMismatch => Term::ScaleMismatch { relative: micro },
-        Cause::Squareness => Term::Squareness { shear_rad: micro },
-        Cause::ServoMismatch => Term::ServoMismatch { delta_tau_s: value },
-        Cause::BandwidthMismatch => Term::BandwidthMismatch { delta_kappa2_s2: value },
-        Cause::Backlash => Term::Backlash { axis: axis()?, step_m: milli },
-        Cause::LateralPlay => Term::LateralPlay { axis: axis()?, shift_m: milli },
-        Cause::ReversalSpike => {
-            Term::ReversalSpike { axis: axis()?, peak_m: micro, decay_s: param("decay_s")? }
-        }
-        Cause::CyclicError => Term::Cyclic {
-            axis: axis()?,
-            amplitude_m: micro,
-            pitch_m: param("pitch_mm")? * 1e-3,
-            phase_rad: param("phase_rad")?,
-        },
-        Cause::Straightness => {
-            // The bow is over ±R of the largest circle seen.
-            let radius_m = param("radius_mm")? * 1e-3;
-            Term::Straightness { axis: axis()?, curvature_per_m: micro / (radius_m * radius_m) }
-        }
-        Cause::Vibration
-        | Cause::InterpolationChord
-        | Cause::FeedClamp
-        | Cause::ThermalDrift
-        | Cause::StickSlip
-        | Cause::JointLagMismatch
-        | Cause::JointReversal => return Ok(Share::Nothing),
-    }))
+    let model = effect.cause.model();
+    let one_axis = model.axes().iter().all(Option::is_some);
+    if one_axis && effect.axis.is_none() && model.words().not_compensable.is_none() {
+        return Err(ModelTableError::MissingParameter { cause: effect.cause, name: "axis" });
+    }
+    Ok(match (effect.cause, model.term(effect)) {
+        (Cause::HigherOrderDynamics, _) => Share::Kappa4(24.0 * effect.value),
+        (_, Some(term)) => Share::Term(term),
+        (_, None) => Share::Nothing,
+    })
 }
 
 /// Largest offset that a term asks for on circles up to `radius` and feeds up to `feed`, m.

@@ -1,11 +1,172 @@
 //! `giotto diagnose`: what the simulation gets wrong, why, the extended model, the gain.
-use super::{Failure, Output};
+use super::failure::{Failure, cannot_write};
+use super::output::Output;
+use crate::diagnosis::{Diagnosis, Finding, Options, diagnose};
+use crate::model_file::ModelFile;
+use comfy_table::{Table, presets};
+use std::path::PathBuf;
 
 /// Arguments of `giotto diagnose`.
 #[derive(clap::Args, Debug)]
-pub struct Args {}
+pub struct Args {
+    /// Directory with campaign.toml.
+    campaign: PathBuf,
+    /// Simulation to start from; without it one servo lag with fitted kv.
+    #[arg(long)]
+    model: Option<PathBuf>,
+    /// Write the extended model here.
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+    /// Write an HTML report here.
+    #[arg(long)]
+    report: Option<PathBuf>,
+    /// Seed of the bootstrap.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
 
 /// Runs the command.
-pub fn run(_args: Args, _out: Output) -> Result<(), Failure> {
-    Err(Failure::usage("giotto diagnose is not in this build"))
+pub fn run(args: Args, out: Output) -> Result<(), Failure> {
+    let campaign = crate::campaign::read(&args.campaign).map_err(Failure::input)?;
+    let model = args.model.as_deref().map(ModelFile::load).transpose().map_err(Failure::input)?;
+    let diagnosis = diagnose(&campaign, &Options { model, seed: args.seed }).map_err(|e| {
+        Failure::input(format_args!("{}: {e}", args.campaign.display()))
+            .help("see `giotto analyze` for what the runs hold")
+    })?;
+    if let Some(path) = &args.output {
+        diagnosis.model.save(path).map_err(Failure::input)?;
+        out.note(format_args!("wrote {}", path.display()));
+    }
+    if let Some(path) = &args.report {
+        let html = crate::report::html(&campaign, &diagnosis);
+        std::fs::write(path, html).map_err(|e| cannot_write(path, &e))?;
+        out.note(format_args!("wrote {}", path.display()));
+    }
+    if out.json {
+        return out.document(&diagnosis);
+    }
+    show(&campaign.name, &diagnosis, &out);
+    Ok(())
+}
+
+/// The diagnosis as a person reads it.
+pub(super) fn show(name: &str, d: &Diagnosis, out: &Output) {
+    out.say(format_args!(
+        "Campaign {name}: noise {:.2} µm a sample, {:.2} µm between runs; seed {}",
+        d.noise_um, d.spread_um, d.seed
+    ));
+    out.say(format_args!("Simulation: {}", d.baseline.name));
+    let m = &d.misfit;
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_HORIZONTAL_ONLY).set_header(["misfit of the simulation", "µm rms"]);
+    for (kind, value) in [
+        ("size of the circles", m.size_um),
+        ("  of which follows campaign time", m.drift_um),
+        ("harmonics 2–8, same both ways", m.harmonics_even_um),
+        ("harmonics 2–8, flip with direction", m.harmonics_odd_um),
+        ("at fixed places beyond these", m.localised_um),
+        ("periodic in time", m.periodic_um),
+        ("random and the rest", m.random_um),
+    ] {
+        table.add_row([kind.to_string(), format!("{value:.2}")]);
+    }
+    out.say(&table);
+    if d.findings.is_empty() && !d.unexplained.present && d.cannot_tell.is_empty() {
+        out.say("Nothing found: the simulation explains the data.");
+    } else if !d.findings.is_empty() {
+        let mut table = Table::new();
+        table.load_style(presets::UTF8_HORIZONTAL_ONLY).set_header([
+            "cause",
+            "axis",
+            "size",
+            "95 % interval",
+            "share",
+            "probability",
+            "correctable",
+        ]);
+        for f in &d.findings {
+            table.add_row(row(f));
+        }
+        out.say(&table);
+        for f in &d.findings {
+            let words = f.cause.model().words();
+            out.say(format_args!(
+                "{}: {}. Usually {}. Remedy: {}.",
+                words.name, words.what, words.usual, words.adjust
+            ));
+            if !f.indistinguishable_from.is_empty() {
+                out.say(format_args!(
+                    "  Not to be told from: {}. Measure: {}.",
+                    f.indistinguishable_from.join(", "),
+                    f.next_measurement
+                ));
+            }
+            if let (false, Some(why)) = (f.compensable, words.not_compensable) {
+                out.say(format_args!("  The controller cannot correct it: {why}."));
+            }
+        }
+    }
+    if d.unexplained.present {
+        out.say(format_args!(
+            "Unexplained: {:.2} µm rms that match no cause in the list:",
+            d.unexplained.rms_um
+        ));
+        for words in &d.unexplained.signature.words {
+            out.say(format_args!("  {words}"));
+        }
+    }
+    for missing in &d.cannot_tell {
+        out.say(format_args!("Cannot tell: {missing}."));
+    }
+    if let Some(g) = &d.gain {
+        out.say(format_args!(
+            "On runs left out (each radius, each speed): {:.2} µm rms, before {:.2}; β1, β2 alone {:.2}; no model {:.2}.",
+            g.extended_rms_um, g.baseline_rms_um, g.beta_rms_um, g.no_model_rms_um
+        ));
+        out.say(format_args!(
+            "Gain {:.1} % ({:.1} to {:.1}), {:.1} % of what a perfect model would gain.",
+            g.percent, g.ci95_percent[0], g.ci95_percent[1], g.of_perfect_percent
+        ));
+    }
+    out.say(format_args!("Next: {}", recommendation(d)));
+}
+
+fn row(f: &Finding) -> [String; 7] {
+    let e = &f.estimate;
+    let axis = f.axis.map_or("", |axis| if axis == giotto_shared::Axis::X { "x" } else { "y" });
+    [
+        f.cause.model().words().name.to_string(),
+        axis.to_string(),
+        format!("{} {}", number(e.value), e.unit),
+        format!("{} … {}", number(e.ci95[0]), number(e.ci95[1])),
+        format!("{:.0} %", f.share_percent),
+        format!("{:.3}", f.probability),
+        if f.compensable { "yes" } else { "no" }.to_string(),
+    ]
+}
+
+/// Four digits, in the form that is short.
+fn number(value: f64) -> String {
+    if value != 0.0 && (value.abs() < 1e-3 || value.abs() >= 1e5) {
+        format!("{value:.3e}")
+    } else {
+        format!("{value:.4}")
+    }
+}
+
+/// The one thing to do now.
+fn recommendation(d: &Diagnosis) -> String {
+    let correctable = d.findings.iter().any(|f| f.compensable);
+    if let (true, Some(first)) = (d.findings.is_empty(), d.cannot_tell.first()) {
+        return first.clone();
+    }
+    match (d.findings.first(), correctable) {
+        (Some(_), true) => format!(
+            "write the extended model with -o EXTENDED.toml and flash it: `giotto flash EXTENDED.toml --port PORT` (expected {:.0} % less error)",
+            d.gain_percent
+        ),
+        (Some(first), false) => first.cause.model().words().adjust.to_string(),
+        (None, _) if d.unexplained.present => "look at the place and the law of what is unexplained; `giotto plan` lists the runs that would narrow it down".into(),
+        (None, _) => "flash the fitted model: `giotto fit CAMPAIGN -o MODEL.toml`, `giotto flash MODEL.toml --port PORT`".into(),
+    }
 }

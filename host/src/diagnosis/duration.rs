@@ -50,7 +50,8 @@ pub fn read(campaign: &Campaign) -> Durations {
     let scatter = (slowed.iter().map(|a| (a - limit).powi(2)).sum::<f64>() / n.max(1.0)).sqrt();
     // All at one acceleration, none below it, and nothing above it left at full speed.
     let one_limit = slowed.len() >= 2 && slowed.len() == odd && scatter < 0.02 * limit;
-    let no_other = runs.iter().all(|run| (run.0 < 1.0) == (run.2 > 1.01 * limit) || (run.2 / limit - 1.0).abs() < 0.03);
+    let no_other =
+        runs.iter().all(|run| (run.0 < 1.0) == (run.2 > 1.01 * limit) || (run.2 / limit - 1.0).abs() < 0.03);
     if one_limit && no_other {
         // A turn is timed to about a sample in a thousand.
         let se = (scatter / n.sqrt()).max(2e-4 * limit);

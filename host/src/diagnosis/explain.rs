@@ -284,7 +284,7 @@ fn pass(
         propose_patterns(&mut found, &runs);
         let products = found.ledger.white(&all);
         found.chosen = select(&products, &found.nuisance, &found.items, &found.chosen, &barred);
-        drop_immaterial(&mut found, &all, &mut barred);
+        found.chosen = prune(&found, &all, found.chosen.clone(), &mut barred);
         if chosen_kinds(&found) == before {
             break;
         }
@@ -322,43 +322,47 @@ const SMALLEST_OF_EXPLAINED: [f64; 2] = [0.045, 0.07];
 
 /// Energy (sum of squares, m²) that each chosen explanation alone accounts for, and all of them.
 pub fn energies(found: &Explained, weights: &[f64]) -> (Vec<f64>, f64) {
+    energies_of(found, weights, &found.chosen)
+}
+
+fn energies_of(found: &Explained, weights: &[f64], set: &[usize]) -> (Vec<f64>, f64) {
     let products = found.ledger.plain(weights);
     let gain = |set: &[usize]| {
         solve(&products, &columns_of(&found.nuisance, &found.items, set))
             .map_or(0.0, |solution| solution.gain)
     };
-    let whole = gain(&found.chosen);
-    let each = (0..found.chosen.len())
+    let whole = gain(set);
+    let each = (0..set.len())
         .map(|at| {
             let rest: Vec<usize> =
-                found.chosen.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, c)| *c).collect();
+                set.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, c)| *c).collect();
             (whole - gain(&rest)).max(0.0)
         })
         .collect();
     (each, (whole - gain(&[])).max(0.0))
 }
 
-fn samples(runs: &[Prepared]) -> f64 {
-    runs.iter().map(|run| run.deviation_m.len() as f64).sum()
-}
-
-/// Drops what is real perhaps but of no interest, the smallest first, and bars it from coming back.
-fn drop_immaterial(found: &mut Explained, weights: &[f64], barred: &mut Vec<usize>) {
-    let count: f64 = found.ledger.samples(0).iter().map(|run| run.len() as f64).sum();
+/// Drops from a set what is real perhaps but of no interest, the smallest first, and bars it from coming back.
+pub fn prune(found: &Explained, weights: &[f64], mut set: Vec<usize>, barred: &mut Vec<usize>) -> Vec<usize> {
+    let count: f64 = found.ledger.samples(0).iter().zip(weights).map(|(run, w)| w * run.len() as f64).sum();
     loop {
-        let (each, whole) = energies(found, weights);
+        let (each, whole) = energies_of(found, weights, &set);
         let smallest = each
             .iter()
             .enumerate()
             .filter(|(at, energy)| {
-                let share = SMALLEST_OF_EXPLAINED[usize::from(!found.items[found.chosen[*at]].listed())];
+                let share = SMALLEST_OF_EXPLAINED[usize::from(!found.items[set[*at]].listed())];
                 let rms = (*energy / count).sqrt();
                 rms < SMALLEST_OF_NOISE * found.spread.noise_m() || rms < share * (whole / count).sqrt()
             })
             .min_by(|a, b| a.1.total_cmp(b.1));
-        let Some((at, _)) = smallest else { break };
-        barred.push(found.chosen.remove(at));
+        let Some((at, _)) = smallest else { return set };
+        barred.push(set.remove(at));
     }
+}
+
+fn samples(runs: &[Prepared]) -> f64 {
+    runs.iter().map(|run| run.deviation_m.len() as f64).sum()
 }
 
 /// How many of the most promising patterns join the search each time.

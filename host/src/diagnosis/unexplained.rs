@@ -25,9 +25,13 @@ pub fn describe(found: &Explained, durations: &Durations) -> Unexplained {
     if let Some((_, strongest)) = patterns.first() {
         fill(&mut signature, strongest);
     }
-    signature.words = patterns.iter().take(4).map(|(energy, pattern)| {
-        format!("{} ({:.2} µm rms)", words(pattern), (energy / samples).sqrt() * 1e6)
-    }).collect();
+    signature.words = patterns
+        .iter()
+        .take(4)
+        .map(|(energy, pattern)| {
+            format!("{} ({:.2} µm rms)", words(pattern), (energy / samples).sqrt() * 1e6)
+        })
+        .collect();
     if patterns.len() > 4 {
         signature.words.push(format!("and {} more of the kind", patterns.len() - 4));
     }
@@ -88,11 +92,15 @@ fn words(pattern: &Pattern) -> String {
     let ways = |odd: bool| if odd { "flips with the direction" } else { "the same both ways" };
     match *pattern {
         Pattern::Size { odd, law: l } => format!("a change of size, {}, {}", ways(odd), law(l)),
-        Pattern::Time { step: None, law: l } => format!("a change of size that grows over the campaign, {}", law(l)),
+        Pattern::Time { step: None, law: l } => {
+            format!("a change of size that grows over the campaign, {}", law(l))
+        }
         Pattern::Time { step: Some(at), law: l } => {
             format!("a step of size after {:.0} % of the campaign, {}", 100.0 * at, law(l))
         }
-        Pattern::Harmonic { order, odd, law: l, .. } => format!("{order} waves a turn, {}, {}", ways(odd), law(l)),
+        Pattern::Harmonic { order, odd, law: l, .. } => {
+            format!("{order} waves a turn, {}, {}", ways(odd), law(l))
+        }
         Pattern::Bump { centre_rad, width_rad, odd, law: l } => format!(
             "a bump at {:.0}° about {:.0}° wide, {}, {}",
             centre_rad.to_degrees(),

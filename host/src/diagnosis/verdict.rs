@@ -18,10 +18,18 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
     let samples: f64 = found.runs.iter().map(|run| run.deviation_m.len() as f64).sum();
     let (each, _) = energies(found, &weights);
     let tone_energy: f64 = found.tone.iter().flat_map(|tone| &tone.energy_m2).sum::<f64>().max(0.0);
-    let teeth_energy: Vec<f64> = found.teeth.iter().map(|teeth| {
-        let hidden: usize = found.runs.iter().map(|run| (0..run.hidden.len()).filter(|&i| teeth.covers(run, i)).count()).sum();
-        hidden as f64 * teeth.height_m.powi(2) / 3.0 * 0.5
-    }).collect();
+    let teeth_energy: Vec<f64> = found
+        .teeth
+        .iter()
+        .map(|teeth| {
+            let hidden: usize = found
+                .runs
+                .iter()
+                .map(|run| (0..run.hidden.len()).filter(|&i| teeth.covers(run, i)).count())
+                .sum();
+            hidden as f64 * teeth.height_m.powi(2) / 3.0 * 0.5
+        })
+        .collect();
     let total = each.iter().sum::<f64>()
         + tone_energy
         + teeth_energy.iter().sum::<f64>()
@@ -30,12 +38,10 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
     let rms = |energy: f64| (energy / samples).sqrt() * 1e6;
     let mut out = Vec::new();
     for (at, &item) in found.chosen.iter().enumerate() {
-        let Kind::Cause { cause, axis, shape } = &found.items[item].kind else { continue };
+        let Kind::Cause { cause, axis, .. } = &found.items[item].kind else { continue };
         let words = cause.model().words();
         let (value, half) = estimate(found, item);
-        let mut params: BTreeMap<String, f64> =
-            cause.model().shape_names().iter().map(|n| (*n).to_string()).zip(shape.iter().copied()).collect();
-        complete(*cause, found, item, &mut params);
+        let params = parameters(found, item);
         let ci95 = [value - half, value + half];
         let effect = Effect { cause: *cause, axis: *axis, value, ci95, params: params.clone() };
         out.push(Finding {
@@ -46,7 +52,7 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
             share_percent: share(each[at]),
             rms_um: rms(each[at]),
             indistinguishable_from: look_alikes(found, &weights, at),
-            compensable: words.not_compensable.is_none() && cause.model().term(&effect).is_some(),
+            compensable: compensable(&effect),
             next_measurement: words.next.to_string(),
             params,
             effects: vec![effect],
@@ -56,7 +62,16 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
     if let Some((clamp, energy)) = clamp {
         let value = clamp.limit_m_s2 * 1e3;
         let half = 2.0 * clamp.se_m_s2 * 1e3;
-        out.push(plain(Cause::FeedClamp, None, value, half, HIGHEST, share(energy), rms(energy), BTreeMap::new()));
+        out.push(plain(
+            Cause::FeedClamp,
+            None,
+            value,
+            half,
+            HIGHEST,
+            share(energy),
+            rms(energy),
+            BTreeMap::new(),
+        ));
     }
     if let Some(tone) = &found.tone {
         out.push(tone_finding(tone, share(tone_energy), rms(tone_energy)));
@@ -65,7 +80,16 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
         let params = BTreeMap::from([("below_mm_s".to_string(), teeth.below_m_s * 1e3)]);
         let odds = 0.5 * teeth.significance.powi(2) - 14.0;
         let (value, half) = (teeth.height_m * 1e6, 2.0 * teeth.se_m * 1e6);
-        out.push(plain(Cause::StickSlip, Some(teeth.axis), value, half, sigmoid(odds), share(energy), rms(energy), params));
+        out.push(plain(
+            Cause::StickSlip,
+            Some(teeth.axis),
+            value,
+            half,
+            sigmoid(odds),
+            share(energy),
+            rms(energy),
+            params,
+        ));
     }
     out.sort_by(|a, b| b.share_percent.total_cmp(&a.share_percent));
     out
@@ -93,7 +117,7 @@ fn plain(
         share_percent,
         rms_um,
         indistinguishable_from: words.never_told_from.iter().map(|s| (*s).to_string()).collect(),
-        compensable: words.not_compensable.is_none() && cause.model().term(&effect).is_some(),
+        compensable: compensable(&effect),
         next_measurement: words.next.to_string(),
         params,
         effects: vec![effect],
@@ -125,6 +149,11 @@ fn tone_finding(tone: &Tone, share: f64, rms: f64) -> Finding {
         finding.indistinguishable_from.push(other.id().to_string());
     }
     finding
+}
+
+/// Through a term of the table, or through its κ4.
+fn compensable(effect: &Effect) -> bool {
+    effect.cause == Cause::HigherOrderDynamics || effect.cause.model().term(effect).is_some()
 }
 
 fn sigmoid(log_odds: f64) -> f64 {
@@ -162,7 +191,11 @@ fn robust_variances(found: &Explained, columns: &[usize]) -> Vec<f64> {
             .iter()
             .map(|&a| {
                 white[(a, 0)]
-                    - columns.iter().zip(&found.solution.coefficients).map(|(&b, x)| white[(a, b)] * x).sum::<f64>()
+                    - columns
+                        .iter()
+                        .zip(&found.solution.coefficients)
+                        .map(|(&b, x)| white[(a, b)] * x)
+                        .sum::<f64>()
             })
             .collect();
         for i in 0..n {
@@ -182,7 +215,8 @@ fn robust_variances(found: &Explained, columns: &[usize]) -> Vec<f64> {
 fn probability(found: &Explained, weights: &[f64], at: usize) -> f64 {
     let products = found.ledger.white(weights);
     let with = evidence(&products, &found.nuisance, &found.items, &found.chosen);
-    let rest: Vec<usize> = found.chosen.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, c)| *c).collect();
+    let rest: Vec<usize> =
+        found.chosen.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, c)| *c).collect();
     let same_cause: Vec<usize> = (0..found.items.len())
         .filter(|&i| match (&found.items[i].kind, &found.items[found.chosen[at]].kind) {
             (Kind::Cause { cause: a, .. }, Kind::Cause { cause: b, .. }) => a == b,
@@ -203,7 +237,8 @@ fn look_alikes(found: &Explained, weights: &[f64], at: usize) -> Vec<String> {
     let best = evidence(&products, &found.nuisance, &found.items, &found.chosen).unwrap_or(0.0);
     let own = found.chosen[at];
     let Kind::Cause { cause, .. } = &found.items[own].kind else { return Vec::new() };
-    let mut out: Vec<String> = cause.model().words().never_told_from.iter().map(|s| (*s).to_string()).collect();
+    let mut out: Vec<String> =
+        cause.model().words().never_told_from.iter().map(|s| (*s).to_string()).collect();
     for (index, item) in found.items.iter().enumerate() {
         let Kind::Cause { cause: other, .. } = &item.kind else { continue };
         if other == cause || found.chosen.contains(&index) {
@@ -211,13 +246,23 @@ fn look_alikes(found: &Explained, weights: &[f64], at: usize) -> Vec<String> {
         }
         let mut swapped = found.chosen.clone();
         swapped[at] = index;
-        let close = evidence(&products, &found.nuisance, &found.items, &swapped).is_some_and(|e| e > best - 6.0);
+        let close =
+            evidence(&products, &found.nuisance, &found.items, &swapped).is_some_and(|e| e > best - 6.0);
         let id = other.id().to_string();
         if close && !out.contains(&id) {
             out.push(id);
         }
     }
     out
+}
+
+/// Further parameters of an explanation, in the units of their names.
+pub fn parameters(found: &Explained, item: usize) -> BTreeMap<String, f64> {
+    let Kind::Cause { cause, shape, .. } = &found.items[item].kind else { return BTreeMap::new() };
+    let names = cause.model().shape_names();
+    let mut params = names.iter().map(|n| (*n).to_string()).zip(shape.iter().copied()).collect();
+    complete(*cause, found, item, &mut params);
+    params
 }
 
 /// Parameters that the linear fit gives: the phase of a cyclic error, where a bow was measured, ….
@@ -257,7 +302,9 @@ fn complete(cause: Cause, found: &Explained, item: usize, params: &mut BTreeMap<
 fn join_axes(findings: Vec<Finding>) -> Vec<Finding> {
     let mut out: Vec<Finding> = Vec::new();
     for finding in findings {
-        let twin = out.iter_mut().find(|other| other.cause == finding.cause && other.axis.is_some() && finding.axis.is_some());
+        let twin = out
+            .iter_mut()
+            .find(|other| other.cause == finding.cause && other.axis.is_some() && finding.axis.is_some());
         match twin {
             Some(twin) if alike(twin, &finding) => {
                 let halves = [&twin.estimate, &finding.estimate].map(|e| 0.5 * (e.ci95[1] - e.ci95[0]));

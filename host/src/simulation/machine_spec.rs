@@ -74,6 +74,10 @@ pub struct AxisSpec {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub friction_decay_s: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    pub friction_rise_s: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub friction_presliding_um: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub stick_slip_um: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stick_travel_um: Option<f64>,
@@ -138,6 +142,9 @@ impl MachineSpec {
                 machine.friction[axis] = Some(Friction {
                     peak_m: peak.unwrap_or(0.0) * 1e-6,
                     decay_s: get(|a| a.friction_decay_s).unwrap_or(standard.decay_s),
+                    rise_s: get(|a| a.friction_rise_s).unwrap_or(standard.rise_s),
+                    presliding_m: get(|a| a.friction_presliding_um)
+                        .map_or(standard.presliding_m, |v| v * 1e-6),
                     stick_slip_m: stick.unwrap_or(0.0) * 1e-6,
                     stick_travel_m: get(|a| a.stick_travel_um).map_or(standard.stick_travel_m, |v| v * 1e-6),
                     stick_speed_m_s: get(|a| a.stick_speed_mm_s)

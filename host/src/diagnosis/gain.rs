@@ -1,0 +1,313 @@
+//! The proof: the extended *simulation* against runs that it has not seen.
+//!
+//! Each radius is left out once, then each speed. The causes are chosen again on the runs that are left, with
+//! their sizes; the shapes (pitch, time constants) are those found on all runs. The machine with the causes
+//! built in runs the circles left out, in the time domain, and what is measured there is compared.
+use super::baseline::{Size, fit_lag};
+use super::basis::dot;
+use super::duration::Clamp;
+use super::explain::{Explained, prune};
+use super::linear::solve;
+use super::search::{Kind, columns_of, select};
+use super::survey::Response;
+use crate::campaign::Campaign;
+use crate::causes::{Cause, Effect};
+use crate::model_file::{ModelFile, Servo};
+use crate::simulation::machine::{Machine, PositionLoop};
+use crate::simulation::{CircleTest, circle};
+use rand::{RngExt, SeedableRng};
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// Root mean squares over runs left out, centre free, sample by sample.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Gain {
+    /// Extended simulation, µm.
+    pub extended_rms_um: f64,
+    /// Simulation as it stood, µm.
+    pub baseline_rms_um: f64,
+    /// The paper's β1, β2 fit, µm.
+    pub beta_rms_um: f64,
+    /// No model at all, µm.
+    pub no_model_rms_um: f64,
+    /// What noise and scatter between runs leave to a perfect model, µm.
+    pub floor_rms_um: f64,
+    /// 100·(1 − extended/baseline).
+    pub percent: f64,
+    /// 95 % bootstrap interval of `percent` over runs.
+    pub ci95_percent: [f64; 2],
+    /// Gain in mean square as a share of what a perfect model would gain, %.
+    pub of_perfect_percent: f64,
+    /// Folds by radius and by speed.
+    pub folds: [usize; 2],
+}
+
+/// Resamples of the bootstrap.
+const RESAMPLES: usize = 1000;
+
+/// Response and effects as a machine.
+pub fn machine(response: &Response, effects: &[Effect], lag_s: Option<f64>) -> Machine {
+    let mut machine = Machine::default();
+    if response.a_s2 > 0.0 {
+        let servo = PositionLoop { kv_per_s: response.a_s2.powf(-0.5), feed_forward: 0.0 };
+        machine.servo = [servo; 2];
+        if response.b_s4 != 0.0 {
+            machine.add_beta2(-0.5 * response.b_s4);
+        }
+    } else if let Ok(other) = Machine::from_servo(&beta(response)) {
+        machine = other;
+    }
+    if let Some(lag_s) = lag_s {
+        // What the recording shows of delay beyond that of the response is dead time.
+        let own = match machine.mechanics[0] {
+            Some(mechanics) => 2.0 * mechanics.zeta / mechanics.omega_n_rad_s,
+            None => 0.0,
+        } + (1.0 - machine.servo[0].feed_forward) / machine.servo[0].kv_per_s;
+        machine.dead_time_s = [(lag_s - own).max(0.0); 2];
+    }
+    for effect in effects {
+        // Already in the response.
+        if effect.cause != Cause::HigherOrderDynamics {
+            effect.cause.model().apply(effect, &mut machine);
+        }
+    }
+    machine
+}
+
+/// Eq. 15 with the same κ2 and κ4.
+pub fn beta(response: &Response) -> Servo {
+    let (a, b) = (response.a_s2, response.b_s4);
+    Servo::Beta { beta1_s2: -0.5 * a, beta2_s4: 0.375 * a * a - 0.5 * b, half_width95: [0.0; 2] }
+}
+
+/// Response and effects that a set gives when it is fitted on some runs only.
+fn fitted(found: &Explained, weights: &[f64], set: &[usize]) -> Option<(Response, Vec<Effect>)> {
+    let columns = columns_of(&found.nuisance, &found.items, set);
+    let solution = solve(&found.ledger.white(weights), &columns)?;
+    let value =
+        |column: usize| columns.iter().position(|&c| c == column).map_or(0.0, |at| solution.coefficients[at]);
+    let mut response = found.response;
+    response.a_s2 += value(found.nuisance[0]);
+    if let Some(&fourth) = found.nuisance.get(1) {
+        response.b_s4 -= 2.0 * value(fourth);
+    } else {
+        response.b_s4 = 0.0;
+    }
+    let mut effects = Vec::new();
+    for &item in set {
+        let Kind::Cause { cause, axis, .. } = &found.items[item].kind else { continue };
+        let values: Vec<f64> = found.items[item].columns.iter().map(|&c| value(c)).collect();
+        if *cause == Cause::HigherOrderDynamics {
+            response.b_s4 = -2.0 * values[0];
+        }
+        let size = if values.len() == 2 { values[0].hypot(values[1]) } else { values[0] };
+        let mut params = super::verdict::parameters(found, item);
+        if values.len() == 2 {
+            params.insert("phase_rad".into(), values[1].atan2(values[0]));
+        }
+        effects.push(Effect { cause: *cause, axis: *axis, value: size, ci95: [size; 2], params });
+    }
+    Some((response, effects))
+}
+
+/// Measures the gain. `start` is the baseline if a model was given; else kv is fitted in each fold.
+pub fn measure(
+    campaign: &Campaign,
+    found: &Explained,
+    given: Option<&Machine>,
+    clamp: Option<Clamp>,
+    seed: u64,
+) -> Gain {
+    let mut folds: Vec<Vec<usize>> = Vec::new();
+    let by = |key: &dyn Fn(usize) -> f64| -> Vec<Vec<usize>> {
+        let mut values: Vec<f64> = (0..campaign.runs.len()).map(key).collect();
+        values.sort_by(f64::total_cmp);
+        values.dedup_by(|a, b| (*a - *b).abs() < 1e-9 * b.abs());
+        let same = |i: usize, value: f64| (key(i) - value).abs() < 1e-9 * value.abs();
+        values.iter().map(|&v| (0..campaign.runs.len()).filter(|&i| same(i, v)).collect()).collect()
+    };
+    let radii = by(&|i| campaign.runs[i].radius_m);
+    let feeds = by(&|i| campaign.runs[i].feed_m_s);
+    let count =
+        [if radii.len() > 1 { radii.len() } else { 0 }, if feeds.len() > 1 { feeds.len() } else { 0 }];
+    if count[0] > 0 {
+        folds.extend(radii);
+    }
+    if count[1] > 0 {
+        folds.extend(feeds);
+    }
+    let errors: Vec<Errors> =
+        folds.par_iter().flat_map(|out| fold(campaign, found, given, clamp, out)).collect();
+    let mean = |pick: &dyn Fn(&Errors) -> f64| -> f64 {
+        errors.iter().map(pick).sum::<f64>() / errors.len().max(1) as f64
+    };
+    let (extended, baseline) = (mean(&|e| e.extended), mean(&|e| e.baseline));
+    let floor = mean(&|e| e.floor);
+    let percent = |extended: f64, baseline: f64| {
+        if baseline > 0.0 { 100.0 * (1.0 - (extended / baseline).sqrt()) } else { 0.0 }
+    };
+    // Runs, not samples, are drawn again: both folds of a run go together.
+    let runs = campaign.runs.len();
+    let mut sums = vec![[0.0; 2]; runs];
+    for e in &errors {
+        sums[e.run][0] += e.extended;
+        sums[e.run][1] += e.baseline;
+    }
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    let mut draws: Vec<f64> = (0..RESAMPLES)
+        .map(|_| {
+            let mut total = [0.0; 2];
+            for _ in 0..runs {
+                let pick = sums[rng.random_range(0..runs)];
+                total = [total[0] + pick[0], total[1] + pick[1]];
+            }
+            percent(total[0], total[1])
+        })
+        .collect();
+    draws.sort_by(f64::total_cmp);
+    let possible = baseline - floor;
+    Gain {
+        extended_rms_um: extended.sqrt() * 1e6,
+        baseline_rms_um: baseline.sqrt() * 1e6,
+        beta_rms_um: mean(&|e| e.beta).sqrt() * 1e6,
+        no_model_rms_um: mean(&|e| e.none).sqrt() * 1e6,
+        floor_rms_um: floor.sqrt() * 1e6,
+        percent: percent(extended, baseline),
+        ci95_percent: [draws[RESAMPLES / 40], draws[RESAMPLES - 1 - RESAMPLES / 40]],
+        // Nothing to gain is all there is to gain.
+        of_perfect_percent: if possible > 0.3 * floor {
+            100.0 * (baseline - extended) / possible
+        } else {
+            100.0
+        },
+        folds: count,
+    }
+}
+
+/// Mean squares of one run left out, m².
+#[derive(Clone, Copy, Debug)]
+struct Errors {
+    run: usize,
+    extended: f64,
+    baseline: f64,
+    beta: f64,
+    none: f64,
+    floor: f64,
+}
+
+fn fold(
+    campaign: &Campaign,
+    found: &Explained,
+    given: Option<&Machine>,
+    clamp: Option<Clamp>,
+    out: &[usize],
+) -> Vec<Errors> {
+    let runs = &campaign.runs;
+    let weights: Vec<f64> = (0..runs.len()).map(|i| if out.contains(&i) { 0.0 } else { 1.0 }).collect();
+    let products = found.ledger.white(&weights);
+    let mut barred = Vec::new();
+    let set = select(&products, &found.nuisance, &found.items, &found.chosen, &barred);
+    let mut set = prune(found, &weights, set, &mut barred);
+    // A pattern without a name has no place in the simulation, but it must not bend the causes.
+    let training: Vec<usize> = (0..runs.len()).filter(|&i| weights[i] > 0.0).collect();
+    let programmed: Vec<Size> = training.iter().map(|&i| Size::of(&runs[i], runs[i].feed_m_s)).collect();
+    let lag_only = fit_lag(&programmed);
+    let baseline = given.cloned().unwrap_or_else(|| machine(&lag_only, &[], None));
+    set.sort_unstable();
+    let nothing_new = clamp.is_none() && !set.iter().any(|&i| found.items[i].listed());
+    let extended = fitted(found, &weights, &set).filter(|_| !nothing_new).map(|(response, effects)| {
+        let lag = found.lag.measured.then_some(found.lag.tau_s);
+        let mut machine = machine(&response, &effects, lag);
+        if let Some(clamp) = clamp {
+            machine.centripetal_limit_m_s2 = Some(clamp.limit_m_s2);
+        }
+        machine
+    });
+    let beta = beta_of(&programmed);
+    let started = runs.iter().filter_map(|run| run.started_s).fold(f64::INFINITY, f64::min);
+    out.par_iter()
+        .map(|&i| {
+            let run = &runs[i];
+            let mut test = CircleTest::of(run);
+            if started.is_finite() {
+                test.started_s -= started;
+            }
+            let basis = &found.runs[i].basis;
+            let samples = run.samples.deviation_m.len() as f64;
+            let left = |prediction: &[f64]| -> f64 {
+                let rest: Vec<f64> =
+                    run.samples.deviation_m.iter().zip(prediction).map(|(y, p)| y - p).collect();
+                let coordinates = basis.coordinates(&rest);
+                // The centre is the operator's.
+                (dot(&rest, &rest) - coordinates[1].powi(2) - coordinates[2].powi(2)).max(0.0) / samples
+            };
+            let simulated = |machine: &Machine| left(&circle(machine, &test).deviation_m);
+            let base = simulated(&baseline);
+            let x = run.feed_m_s.powi(2) / run.radius_m;
+            let size = beta[0] * x + beta[1] * x * x / run.radius_m;
+            let flat = |value: f64| left(&vec![value; run.samples.deviation_m.len()]);
+            let scatter = found.spread.order_m2[0] + found.spread.order_m2[2..].iter().sum::<f64>();
+            Errors {
+                run: i,
+                extended: extended.as_ref().map_or(base, &simulated),
+                baseline: base,
+                beta: flat(size),
+                none: flat(0.0),
+                floor: found.spread.noise_m2 + scatter,
+            }
+        })
+        .collect()
+}
+
+/// β1, β2 by least squares on the sizes.
+fn beta_of(sizes: &[Size]) -> [f64; 2] {
+    let (mut xx, mut xy, mut yy, mut xe, mut ye) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for s in sizes {
+        let x = s.omega_rad_s.powi(2) * s.radius_m;
+        let y = s.omega_rad_s.powi(4) * s.radius_m;
+        xx += x * x;
+        xy += x * y;
+        yy += y * y;
+        xe += x * s.error_m;
+        ye += y * s.error_m;
+    }
+    let determinant = xx * yy - xy * xy;
+    if determinant.abs() > 1e-12 * xx * yy {
+        [(xe * yy - ye * xy) / determinant, (ye * xx - xe * xy) / determinant]
+    } else {
+        [if xx > 0.0 { xe / xx } else { 0.0 }, 0.0]
+    }
+}
+
+/// The model file of what was found on all runs.
+pub fn extended_model(campaign: &Campaign, found: &Explained, effects: Vec<Effect>) -> ModelFile {
+    let weights = vec![1.0; found.runs.len()];
+    let response = fitted(found, &weights, &found.chosen).map_or(found.response, |(response, _)| response);
+    let servo = if response.b_s4 > 0.0 {
+        let omega_n2 = response.b_s4.powf(-0.5);
+        let zeta = (0.5 + 0.25 * response.a_s2 * omega_n2).max(1e-4).sqrt();
+        Servo::SecondOrder { omega_n_rad_s: omega_n2.sqrt(), zeta }
+    } else if response.b_s4 == 0.0 && response.a_s2 > 0.0 {
+        Servo::Lag { kv_per_s: response.a_s2.powf(-0.5) }
+    } else {
+        beta(&response)
+    };
+    let range = |value: &dyn Fn(&crate::campaign::Run) -> f64| {
+        campaign
+            .runs
+            .iter()
+            .map(value)
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], v| [lo.min(v * 1e3), hi.max(v * 1e3)])
+    };
+    ModelFile {
+        format: crate::model_file::FORMAT,
+        campaign: campaign.name.clone(),
+        machine: campaign.machine.clone(),
+        servo,
+        valid: crate::model_file::Valid {
+            radius_mm: range(&|r| r.radius_m),
+            feed_mm_s: range(&|r| r.feed_m_s),
+        },
+        effects: effects.into_iter().filter(|e| e.cause != Cause::HigherOrderDynamics).collect(),
+    }
+}

@@ -1,0 +1,149 @@
+//! The misfit, seen: what the baseline leaves, by kind.
+use super::basis::{ORDERS, dot};
+use super::explain::{Explained, PLACES, place_means, residual};
+use super::ledger::Samples;
+use serde::Serialize;
+
+/// Root mean squares over all samples, µm.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Misfit {
+    /// All of it, the centre free.
+    pub total_um: f64,
+    /// Size of the circles.
+    pub size_um: f64,
+    /// Of the size: what follows campaign time.
+    pub drift_um: f64,
+    /// Harmonics 2 to 8 that are the same in both directions.
+    pub harmonics_even_um: f64,
+    /// Harmonics 2 to 8 that flip with the direction.
+    pub harmonics_odd_um: f64,
+    /// Beyond these, what sits at fixed places.
+    pub localised_um: f64,
+    /// Periodic in time.
+    pub periodic_um: f64,
+    /// The rest: noise, and what no kind above catches.
+    pub random_um: f64,
+}
+
+/// Root mean square of what the found model leaves in sample, µm.
+pub fn rms_um(found: &Explained) -> f64 {
+    let left = residual(found);
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (run, left) in found.runs.iter().zip(&left) {
+        let c = run.basis.coordinates(left);
+        sum += dot(left, left) - c[1] * c[1] - c[2] * c[2];
+        count += left.len() as f64;
+    }
+    (sum / f64::max(count, 1.0)).max(0.0).sqrt() * 1e6
+}
+
+/// Splits what the baseline leaves. The kinds are orthogonal but for drift, which is a part of size.
+pub fn split(found: &Explained) -> Misfit {
+    let data: &Samples = found.ledger.samples(0);
+    let count: f64 = data.iter().map(|run| run.len() as f64).sum::<f64>().max(1.0);
+    // Size after the baseline's own coefficient has been fitted.
+    let own = found.ledger.samples(found.nuisance[0]);
+    let (mut up, mut down) = (0.0, 0.0);
+    for (y, x) in data.iter().zip(own) {
+        up += dot(y, x);
+        down += dot(x, x);
+    }
+    let amount = if down > 0.0 { up / down } else { 0.0 };
+    let left: Samples =
+        data.iter().zip(own).map(|(y, x)| y.iter().zip(x).map(|(y, x)| y - amount * x).collect()).collect();
+    let harmonics: Vec<Harmonics> =
+        found.runs.iter().zip(&left).map(|(run, left)| run.basis.harmonics(left)).collect();
+    let (mut whole, mut size) = (0.0, 0.0);
+    for (run, (left, harmonics)) in found.runs.iter().zip(left.iter().zip(&harmonics)) {
+        let c = run.basis.coordinates(left);
+        whole += dot(left, left) - c[1] * c[1] - c[2] * c[2];
+        size += left.len() as f64 * harmonics[0][0].powi(2);
+    }
+    let [even, odd] = parity(found, &harmonics);
+    let places = localised(&place_means(&found.runs, &left), count);
+    let tone: f64 = found.tone.iter().flat_map(|tone| &tone.energy_m2).sum::<f64>().max(0.0);
+    let rms = |energy: f64| (energy / count).max(0.0).sqrt() * 1e6;
+    Misfit {
+        total_um: rms(whole + tone),
+        size_um: rms(size),
+        drift_um: drift_um(found, &harmonics),
+        harmonics_even_um: rms(even),
+        harmonics_odd_um: rms(odd),
+        localised_um: rms(places),
+        periodic_um: rms(tone),
+        random_um: rms(whole - size - even - odd - places),
+    }
+}
+
+type Harmonics = [[f64; 2]; ORDERS + 1];
+
+/// Energy of the harmonics 2 to 8 that is the same in both directions, and that flips: by pairs of runs of one
+/// radius and speed. A run without a twin counts half to each.
+fn parity(found: &Explained, harmonics: &[Harmonics]) -> [f64; 2] {
+    let mut energy = [0.0; 2];
+    for (run, own) in found.runs.iter().zip(harmonics) {
+        let same = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-6;
+        let twin = found.runs.iter().position(|other| {
+            other.view.sign != run.view.sign
+                && same(other.view.radius_m, run.view.radius_m)
+                && same(other.programmed_m_s, run.programmed_m_s)
+        });
+        let half = 0.5 * run.deviation_m.len() as f64;
+        for order in 2..=ORDERS {
+            for part in 0..2 {
+                let here = own[order][part];
+                match twin {
+                    Some(twin) => {
+                        let there = harmonics[twin][order][part];
+                        energy[0] += half * (0.5 * (here + there)).powi(2);
+                        energy[1] += half * (0.5 * (here - there)).powi(2);
+                    }
+                    None => {
+                        energy[0] += 0.5 * half * here * here;
+                        energy[1] += 0.5 * half * here * here;
+                    }
+                }
+            }
+        }
+    }
+    energy
+}
+
+/// Energy at fixed places beyond the eighth harmonic.
+fn localised(places: &[[f64; PLACES]], count: f64) -> f64 {
+    let runs = places.len().max(1) as f64;
+    let mut mean = [0.0; PLACES];
+    for run in places {
+        for (mean, value) in mean.iter_mut().zip(run) {
+            *mean += value / runs;
+        }
+    }
+    let angle = |bin: usize| std::f64::consts::TAU * (bin as f64 + 0.5) / PLACES as f64;
+    let n = PLACES as f64;
+    for order in 1..=ORDERS {
+        let wave = |bin: usize| (order as f64 * angle(bin)).sin_cos();
+        let (s, c) = (0..PLACES).fold((0.0, 0.0), |(s, c), bin| {
+            let (sin, cos) = wave(bin);
+            (s + 2.0 / n * mean[bin] * sin, c + 2.0 / n * mean[bin] * cos)
+        });
+        for (bin, value) in mean.iter_mut().enumerate() {
+            let (sin, cos) = wave(bin);
+            *value -= s * sin + c * cos;
+        }
+    }
+    count / n * mean.iter().map(|m| m * m).sum::<f64>()
+}
+
+/// Part of the size that a straight line over campaign time explains, µm rms.
+fn drift_um(found: &Explained, harmonics: &[Harmonics]) -> f64 {
+    let n = found.runs.len().max(1) as f64;
+    let mean_t = found.runs.iter().map(|run| run.view.elapsed).sum::<f64>() / n;
+    let mean_y = harmonics.iter().map(|h| h[0][0]).sum::<f64>() / n;
+    let (mut ty, mut tt) = (0.0, 0.0);
+    for (run, h) in found.runs.iter().zip(harmonics) {
+        let t = run.view.elapsed - mean_t;
+        ty += t * (h[0][0] - mean_y);
+        tt += t * t;
+    }
+    if tt > 0.0 { (ty * ty / tt / n).sqrt() * 1e6 } else { 0.0 }
+}
