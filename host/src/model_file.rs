@@ -104,16 +104,16 @@ impl ModelFile {
     /// Numbers that [`Self::load`] would refuse, and what the operating system says.
     pub fn save(&self, file: &Path) -> Result<(), TomlFileError> {
         let text = self.to_text(file)?;
-        crate::campaign::replace(file, &text).map_err(|e| TomlFileError {
-            at: (*e.at).clone(),
-            problem: TomlProblem::Io { action: "written", reason: e.problem.to_string() },
+        crate::campaign::replace(file, &text).map_err(|e| {
+            let problem = TomlProblem::Io { action: "written", reason: e.problem.to_string() };
+            TomlFileError::new((*e.at).clone(), problem)
         })
     }
 
     fn to_text(&self, file: &Path) -> Result<String, TomlFileError> {
-        let text = toml::to_string(self).map_err(|e| TomlFileError {
-            at: crate::campaign::Place::file(file),
-            problem: TomlProblem::Io { action: "written", reason: e.to_string() },
+        let text = toml::to_string(self).map_err(|e| {
+            let problem = TomlProblem::Io { action: "written", reason: e.to_string() };
+            TomlFileError::new(crate::campaign::Place::file(file), problem)
         })?;
         Self::parse(&text, file)?;
         Ok(text)

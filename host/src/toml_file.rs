@@ -9,9 +9,9 @@ use toml::de::{DeTable, DeValue};
 #[error("{at}: {problem}")]
 pub struct TomlFileError {
     /// Where.
-    pub at: Place,
+    pub at: Box<Place>,
     /// What, and what was expected.
-    pub problem: TomlProblem,
+    pub problem: Box<TomlProblem>,
 }
 
 /// Everything that a TOML file is refused for.
@@ -39,9 +39,14 @@ pub enum TomlProblem {
 }
 
 impl TomlFileError {
+    /// A problem at a place.
+    pub fn new(at: Place, problem: TomlProblem) -> Self {
+        Self { at: Box::new(at), problem: Box::new(problem) }
+    }
+
     /// What to do next, one sentence.
     pub fn help(&self) -> &'static str {
-        match self.problem {
+        match *self.problem {
             TomlProblem::Missing { .. } | TomlProblem::IsDirectory { .. } | TomlProblem::Io { .. } => {
                 "check the path"
             }
@@ -67,7 +72,7 @@ impl TomlText {
     /// # Errors
     /// Missing, a directory, unreadable, not UTF-8 or empty.
     pub fn read(file: &Path, expected: &'static str) -> Result<Self, TomlFileError> {
-        let fail = |at, problem| Err(TomlFileError { at, problem });
+        let fail = |at, problem| Err(TomlFileError::new(at, problem));
         let bytes = match std::fs::read(file) {
             Ok(bytes) => bytes,
             Err(_) if file.is_dir() => return fail(Place::file(file), TomlProblem::IsDirectory { expected }),
@@ -103,7 +108,7 @@ impl TomlText {
                 None => Place::file(&self.file),
             };
             let reason = e.message().replace('\n', ", ");
-            TomlFileError { at, problem: TomlProblem::Syntax { reason, expected: self.expected } }
+            TomlFileError::new(at, TomlProblem::Syntax { reason, expected: self.expected })
         })
     }
 
@@ -119,18 +124,18 @@ impl TomlText {
     pub fn value_error(&self, path: &[&str], found: impl ToString, expected: impl ToString) -> TomlFileError {
         let key = path.iter().filter(|k| k.parse::<usize>().is_err()).copied().collect::<Vec<_>>().join(".");
         let problem = TomlProblem::Value { key, found: found.to_string(), expected: expected.to_string() };
-        TomlFileError { at: self.place(path), problem }
+        TomlFileError::new(self.place(path), problem)
     }
 
     /// A problem of the whole of a table.
     pub fn missed(&self, path: &[&str], what: impl ToString, expected: impl ToString) -> TomlFileError {
         let problem = TomlProblem::Missed { what: what.to_string(), expected: expected.to_string() };
-        TomlFileError { at: self.place(path), problem }
+        TomlFileError::new(self.place(path), problem)
     }
 
     /// A problem with the format number at the top.
     pub fn format_error(&self, found: String, known: u32) -> TomlFileError {
-        TomlFileError { at: self.place(&["format"]), problem: TomlProblem::Format { found, known } }
+        TomlFileError::new(self.place(&["format"]), TomlProblem::Format { found, known })
     }
 
     fn place(&self, path: &[&str]) -> Place {

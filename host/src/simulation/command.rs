@@ -102,7 +102,7 @@ impl Knots {
         let last = self.position_m.len() - 1;
         let s = (inside - self.start_s) / self.dt_s;
         match s {
-            s if !(s >= 0.0) => Err(0),
+            s if s < 0.0 || s.is_nan() => Err(0),
             s if s >= last as f64 => Err(last),
             s => Ok(s as usize),
         }

@@ -193,7 +193,7 @@ impl Machine {
         }
         for axis in 0..2 {
             let servo = self.servo[axis];
-            if !(servo.kv_per_s >= 1.0 / MAX_TIME_CONSTANT_S) {
+            if servo.kv_per_s.is_nan() || servo.kv_per_s < 1.0 / MAX_TIME_CONSTANT_S {
                 return fail("kv_per_s", servo.kv_per_s, "0.2 /s and more");
             }
             finite("feed_forward", servo.feed_forward)?;

@@ -221,7 +221,7 @@ impl InstrumentSpec {
             ("setup_spread_um", self.setup_spread_um),
         ];
         for (key, value) in sizes {
-            if !(value >= 0.0 && value <= 1e4) {
+            if !(0.0..=1e4).contains(&value) {
                 return Err(text.value_error(&["instrument", key], value, "0 to 10000"));
             }
         }
@@ -232,7 +232,7 @@ impl InstrumentSpec {
             ("drift_um_per_h", self.drift_um_per_h, 1e5),
         ];
         for (key, value, most) in anywhere {
-            if !(value.abs() <= most) {
+            if value.abs() > most || value.is_nan() {
                 return Err(text.value_error(&["instrument", key], value, format!("-{most} to {most}")));
             }
         }
@@ -296,7 +296,7 @@ impl RunSpec {
                 return Err(text.value_error(&["run", &index, key], value, RANGE));
             }
         }
-        if !(self.start_angle_deg.abs() <= 360.0) {
+        if !(-360.0..=360.0).contains(&self.start_angle_deg) {
             return Err(text.value_error(
                 &["run", &index, "start_angle_deg"],
                 self.start_angle_deg,
@@ -308,7 +308,7 @@ impl RunSpec {
             return Err(text.value_error(&["run", &index, "started_s"], started, "0 to 1e9"));
         }
         let centre = self.centre_mm.unwrap_or_default();
-        if let Some(c) = centre.iter().find(|c| !(c.abs() <= 1e6)) {
+        if let Some(c) = centre.iter().find(|c| !(-1e6..=1e6).contains(*c)) {
             return Err(text.value_error(&["run", &index, "centre_mm"], c, "-1e6 to 1e6"));
         }
         let test = CircleTest {
