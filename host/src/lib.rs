@@ -8,6 +8,7 @@ pub mod cli;
 pub mod controller;
 pub mod diagnosis;
 pub mod fit;
+pub mod gcode;
 pub mod model_file;
 pub mod report;
 pub mod simulation;

@@ -1,11 +1,173 @@
 //! `giotto compensate`: rewrite the arcs of an NC program with the inverse correction.
 use super::{Failure, Output};
+use crate::gcode::{self, Compensated, Fate, Keep, Left, Options};
+use crate::model_file::ModelFile;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `giotto compensate`.
 #[derive(clap::Args, Debug)]
-pub struct Args {}
+pub struct Args {
+    /// NC program, RS-274 as LinuxCNC and Grbl speak it.
+    #[arg(value_name = "IN.nc")]
+    program: PathBuf,
+    /// Model of the machine, from `giotto fit` or `giotto diagnose`.
+    #[arg(long, value_name = "MODEL.toml")]
+    model: PathBuf,
+    /// Corrected program.
+    #[arg(short, long, value_name = "OUT.nc")]
+    output: PathBuf,
+    /// What stays when a radius changes: the feed, or the angular rate (the feed then grows with the radius).
+    #[arg(long, value_enum, default_value_t = KeepArg::Feed)]
+    keep: KeepArg,
+    /// Acceleration that the transitions may ask for, mm/s².
+    #[arg(long, value_name = "MM_S2", default_value_t = Options::default().acceleration_mm_s2)]
+    acceleration: f64,
+    /// Largest change of a radius, mm.
+    #[arg(long, value_name = "MM", default_value_t = Options::default().max_offset_mm)]
+    max_offset: f64,
+    /// Correct arcs in G18 and G19 as well, though the model was measured in one plane.
+    #[arg(long)]
+    all_planes: bool,
+}
+
+#[derive(clap::ValueEnum, Clone, Copy, Debug)]
+enum KeepArg {
+    Feed,
+    Omega,
+}
+
+#[derive(Serialize)]
+struct Document {
+    corrected: usize,
+    left: usize,
+    largest_change_um: f64,
+    arcs: Vec<Arc>,
+    not_applied: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct Arc {
+    line: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    radius_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    feed_mm_s: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    change_um: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    blocks: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    left: Option<String>,
+}
 
 /// Runs the command.
-pub fn run(_args: Args, _out: Output) -> Result<(), Failure> {
-    Err(Failure::usage("giotto compensate is not in this build"))
+pub fn run(args: Args, out: Output) -> Result<(), Failure> {
+    for (name, value) in [("--acceleration", args.acceleration), ("--max-offset", args.max_offset)] {
+        if value.is_nan() || value <= 0.0 || value.is_infinite() {
+            return Err(Failure::usage(format_args!("{name} {value}: expected a positive number")));
+        }
+    }
+    let program = read(&args.program)?;
+    let model = ModelFile::load(&args.model).map_err(|e| Failure::input(&e).help(e.help()))?;
+    let options = Options {
+        keep: match args.keep {
+            KeepArg::Feed => Keep::Feed,
+            KeepArg::Omega => Keep::Omega,
+        },
+        acceleration_mm_s2: args.acceleration,
+        max_offset_mm: args.max_offset,
+        all_planes: args.all_planes,
+    };
+    let result = gcode::compensate(&program, &model, &options);
+    std::fs::write(&args.output, &result.program)
+        .map_err(|e| super::failure::cannot_write(&args.output, &e))?;
+    let document = document(&result, &model);
+    if out.json { out.document(&document) } else { say(&args, &result, &document, out) }
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, Failure> {
+    let fail =
+        |what: &str| Failure::input(format_args!("{}: {what}; expected an NC program", path.display()));
+    match std::fs::read(path) {
+        Ok(bytes) if bytes.contains(&0) => Err(fail("holds zero bytes").help("check which file this is")),
+        Ok(bytes) => Ok(bytes),
+        Err(_) if path.is_dir() => Err(fail("is a directory").help("check the path")),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
+            Err(fail("no such file").help("check the path"))
+        }
+        Err(e) => Err(fail(&format!("cannot be read: {e}")).help("check the path")),
+    }
+}
+
+fn document(result: &Compensated, model: &ModelFile) -> Document {
+    let arcs: Vec<Arc> = result
+        .arcs
+        .iter()
+        .map(|report| {
+            let none = Arc {
+                line: report.line,
+                radius_mm: None,
+                feed_mm_s: None,
+                change_um: None,
+                blocks: None,
+                left: None,
+            };
+            match report.fate {
+                Fate::Left(left) => Arc { left: Some(left.to_string()), ..none },
+                Fate::Corrected { radius_mm, feed_mm_s, delta_mm, blocks } => Arc {
+                    radius_mm: Some(radius_mm),
+                    feed_mm_s: Some(feed_mm_s),
+                    change_um: Some(delta_mm * 1e3),
+                    blocks: Some(blocks),
+                    ..none
+                },
+            }
+        })
+        .collect();
+    Document {
+        corrected: arcs.iter().filter(|a| a.left.is_none()).count(),
+        left: arcs.iter().filter(|a| a.left.is_some()).count(),
+        largest_change_um: arcs.iter().filter_map(|a| a.change_um).fold(0.0, |m, c| f64::max(m, c.abs())),
+        not_applied: model.effects.iter().map(|e| format!("{:?}", e.cause)).collect(),
+        arcs,
+    }
+}
+
+fn say(args: &Args, result: &Compensated, document: &Document, out: Output) -> Result<(), Failure> {
+    out.say(format_args!(
+        "{}: {} of {} arcs corrected, radius changed by up to {:.1} µm",
+        args.output.display(),
+        document.corrected,
+        document.arcs.len(),
+        document.largest_change_um
+    ));
+    let name = args.program.display();
+    let mut negligible = 0;
+    let mut reasons: BTreeMap<usize, Left> = BTreeMap::new();
+    for report in &result.arcs {
+        match report.fate {
+            Fate::Left(Left::Negligible) => negligible += 1,
+            Fate::Left(left) => _ = reasons.insert(report.line, left),
+            Fate::Corrected { radius_mm, feed_mm_s, delta_mm, blocks } => out.say(format_args!(
+                "  {name}:{}: R {radius_mm:.3} mm at {feed_mm_s:.1} mm/s: {:+.1} µm, {blocks} blocks",
+                report.line,
+                delta_mm * 1e3
+            )),
+        }
+    }
+    for (line, left) in reasons {
+        out.say(format_args!("  {name}:{line}: left as it was: {left}"));
+    }
+    if negligible > 0 {
+        out.say(format_args!("  {negligible} arcs need less than 0.5 µm and were left as they were"));
+    }
+    if !document.not_applied.is_empty() {
+        out.say(format_args!(
+            "only the radius law is applied; {} act on lines too and belong to the controller's table",
+            document.not_applied.join(", ")
+        ));
+    }
+    Ok(())
 }

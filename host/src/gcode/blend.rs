@@ -1,0 +1,199 @@
+//! Tangent transitions between a programmed path and its corrected twin.
+//!
+//! The correction is an offset across the programmed path: δ on an arc, none on a line. A servo chain answers
+//! after the command, so that the offset it needs begins to change at the joint and not before: for one lag
+//! exactly as (s/σf)² over the way σf behind the joint, σ = √κ2. A smooth step over σf (1.25·σf for one lag)
+//! stands for it; what remains at the joint is 4 % of δ for one lag, 8 % for two lags or a lag with a moving
+//! average of twice its length, 20 % for a moving average alone. An arc's own blocks carry the change at its start; after its end the following arc does, or a
+//! run-out along the following line, whose block then starts from a point farther along it and is not touched.
+//! From standstill the machine falls behind only as it gets going, and the step is longer. Where nothing may
+//! follow (a stop, a corner, increments), the offset ends inside the arc with an overshoot of equal area, and up
+//! to 40 % of δ remains at that point. Pairs of arcs (biarcs) follow the step with a common tangent at every joint.
+use super::state::{Arc, sub};
+
+/// How a corrected arc begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Entry {
+    /// Outward offset at the start, mm: that of the arc before, carried on.
+    pub(super) from_mm: f64,
+    /// Way to the arc's own offset, mm; 0: it is there already.
+    pub(super) length_mm: f64,
+}
+
+/// How a corrected arc ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Exit {
+    /// With its offset: the next arc goes on from there.
+    Held,
+    /// The offset runs out along the line that follows.
+    RunOut {
+        /// Way, mm.
+        length_mm: f64,
+        /// Direction of the line.
+        along: [f64; 2],
+    },
+    /// The offset is gone at the programmed end.
+    Inside {
+        /// Way, mm.
+        length_mm: f64,
+    },
+}
+
+/// Largest |g″|·L² of the step: what it adds to the curvature, in Δ/L².
+pub(super) const STEP_CURVATURE: f64 = 6.0;
+/// As [`STEP_CURVATURE`], of the step with overshoot.
+pub(super) const INSIDE_CURVATURE: f64 = 36.0;
+
+impl Exit {
+    /// Way inside the arc, mm.
+    pub(super) fn inside_mm(self) -> f64 {
+        if let Self::Inside { length_mm } = self { length_mm } else { 0.0 }
+    }
+}
+
+/// Smooth step and its slope at u, 0…1.
+fn step(u: f64) -> [f64; 2] {
+    [u * u * (3.0 - 2.0 * u), 6.0 * u * (1.0 - u)]
+}
+
+/// Step with an overshoot: 15u²(1 − u)² has the area ½ that the step lacks.
+fn step_of_equal_area(u: f64) -> [f64; 2] {
+    let ([rise, slope], v) = (step(u), u * (1.0 - u));
+    [rise + 15.0 * v * v, slope + 30.0 * v * (1.0 - 2.0 * u)]
+}
+
+/// One block of the corrected path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Piece {
+    pub(super) end: [f64; 2],
+    /// Centre of an arc; `None`: a line.
+    pub(super) centre: Option<[f64; 2]>,
+    pub(super) ccw: bool,
+    /// Full turns beyond the first, P − 1.
+    pub(super) more_turns: u32,
+    /// Share of the programmed sweep at the end.
+    pub(super) share: f64,
+    pub(super) length_mm: f64,
+}
+
+/// Beyond this radius, mm, an arc is written as a line; over a millimetre they differ by 0.1 nm.
+const STRAIGHT_MM: f64 = 1e6;
+
+/// Biarcs to a step, and to a step with overshoot.
+const STEP_BIARCS: usize = 2;
+const INSIDE_BIARCS: usize = 4;
+
+/// The corrected path of `arc` with radius R + δ.
+pub(super) fn pieces(arc: &Arc, delta_mm: f64, entry: Entry, exit: Exit) -> Vec<Piece> {
+    let total = arc.sweep_rad.abs();
+    let side = arc.sweep_rad.signum();
+    let [x, y] = sub(arc.start, arc.centre);
+    let start_angle = y.atan2(x);
+    // Place and direction of travel where the outward offset is `offset` mm and grows by `slope` per mm.
+    let node = |swept: f64, offset: f64, slope: f64| {
+        let (sin, cos) = (start_angle + side * swept).sin_cos();
+        let r = arc.radius_mm + offset;
+        let outward = slope * arc.radius_mm;
+        let raw = [outward * cos - side * r * sin, outward * sin + side * r * cos];
+        let norm = raw[0].hypot(raw[1]);
+        ([arc.centre[0] + r * cos, arc.centre[1] + r * sin], raw.map(|v| v / norm))
+    };
+    let in_rad = entry.length_mm / arc.radius_mm;
+    let out_rad = exit.inside_mm() / arc.radius_mm;
+    let mut list = Vec::new();
+    let mut last = node(0.0, entry.from_mm, 0.0);
+    if entry.from_mm == 0.0 {
+        last.0 = arc.start;
+    }
+    if in_rad > 0.0 {
+        let rise = delta_mm - entry.from_mm;
+        for k in 1..=STEP_BIARCS {
+            let u = k as f64 / STEP_BIARCS as f64;
+            let [g, slope] = step(u);
+            let next = node(u * in_rad, entry.from_mm + rise * g, rise * slope / entry.length_mm);
+            biarc(&mut list, last, next, u * in_rad / total);
+            last = next;
+        }
+    }
+    let swept = total - in_rad - out_rad;
+    let next = node(total - out_rad, delta_mm, 0.0);
+    // P counts begun turns; exactly n turns end where they started and count n.
+    let turns = (swept / std::f64::consts::TAU - 1e-9).ceil().max(1.0) - 1.0;
+    list.push(Piece {
+        end: next.0,
+        centre: Some(arc.centre),
+        ccw: side > 0.0,
+        more_turns: turns as u32,
+        share: 1.0 - out_rad / total,
+        length_mm: swept * (arc.radius_mm + delta_mm),
+    });
+    last = next;
+    match exit {
+        Exit::Held => {}
+        Exit::Inside { length_mm } => {
+            for k in (0..INSIDE_BIARCS).rev() {
+                let u = k as f64 / INSIDE_BIARCS as f64;
+                let [g, slope] = step_of_equal_area(u);
+                let mut next = node(total - u * out_rad, delta_mm * g, -delta_mm * slope / length_mm);
+                if k == 0 {
+                    // The programmed end may lie off the circle by the program's rounding; it stays.
+                    next.0 = arc.end;
+                }
+                biarc(&mut list, last, next, 1.0 - u * out_rad / total);
+                last = next;
+            }
+        }
+        Exit::RunOut { length_mm, along } => {
+            // Outward of a CCW arc is to the right of travel.
+            let across = [along[1] * side, -along[0] * side];
+            for k in 1..=STEP_BIARCS {
+                let u = k as f64 / STEP_BIARCS as f64;
+                let [g, slope] = step(u);
+                let (way, offset, tilt) =
+                    (u * length_mm, delta_mm * (1.0 - g), -delta_mm * slope / length_mm);
+                let norm = tilt.hypot(1.0);
+                let place = std::array::from_fn(|i| arc.end[i] + way * along[i] + offset * across[i]);
+                let direction = std::array::from_fn(|i| (along[i] + tilt * across[i]) / norm);
+                biarc(&mut list, last, (place, direction), 1.0);
+                last = (place, direction);
+            }
+        }
+    }
+    list
+}
+
+type Node = ([f64; 2], [f64; 2]);
+
+/// Two arcs from node to node (place, direction) with a common tangent where they meet.
+fn biarc(list: &mut Vec<Piece>, (p0, t0): Node, (p1, t1): Node, share: f64) {
+    let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
+    let v = sub(p1, p0);
+    let t = [t0[0] + t1[0], t0[1] + t1[1]];
+    // |t0 − t1|² instead of 2(1 − t0·t1), which loses its digits for nearly equal directions.
+    let turn = sub(t0, t1);
+    let (vt, vv) = (dot(v, t), dot(v, v));
+    let d = vv / (vt + (vt * vt + dot(turn, turn) * vv).sqrt());
+    let middle: [f64; 2] = std::array::from_fn(|i| 0.5 * (p0[i] + d * t0[i] + p1[i] - d * t1[i]));
+    let before = list.last().map_or(0.0, |p: &Piece| p.share);
+    list.push(piece(p0, middle, p0, t0, 0.5 * (before + share)));
+    list.push(piece(middle, p1, p1, t1, share));
+}
+
+/// Arc from `from` to `end` that has direction `tangent` in `at`, one of the two.
+fn piece(from: [f64; 2], end: [f64; 2], at: [f64; 2], tangent: [f64; 2], share: f64) -> Piece {
+    let other = if at == from { end } else { from };
+    let normal = [-tangent[1], tangent[0]];
+    let [dx, dy] = sub(other, at);
+    let radius = (dx * dx + dy * dy) / (2.0 * (normal[0] * dx + normal[1] * dy));
+    let chord = dx.hypot(dy);
+    let straight = !radius.is_finite() || radius.abs() > STRAIGHT_MM;
+    let half = if straight { 0.0 } else { (chord / (2.0 * radius.abs())).min(1.0).asin() };
+    Piece {
+        end,
+        centre: (!straight).then(|| [at[0] + normal[0] * radius, at[1] + normal[1] * radius]),
+        ccw: radius > 0.0,
+        more_turns: 0,
+        share,
+        length_mm: if straight { chord } else { 2.0 * half * radius.abs() },
+    }
+}
