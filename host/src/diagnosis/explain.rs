@@ -77,7 +77,8 @@ pub fn explain(campaign: &Campaign, start: &Start) -> Explained {
             teeth = Some(roughness::find(&found.runs, &first_look(&found), &found.spread));
         }
         if tone.is_none() && teeth.as_ref().is_none_or(Vec::is_empty) {
-            tone = tone::find(&found.runs, &residual(&found), &found.spread);
+            tone = tone::find(&found.runs, &residual(&found), &found.spread)
+                .filter(|tone| material(&found, tone));
         }
         kinds = if teeth.as_ref().is_some_and(|t| !t.is_empty()) && found.teeth.is_empty() {
             // What was found with the teeth in sight is not to be trusted.
@@ -319,6 +320,15 @@ fn refit(found: &mut Explained, _runs: &[Prepared], weights: &[f64]) {
 const SMALLEST_OF_NOISE: f64 = 0.12;
 /// … and of all that is explained: below, it may be the error of another signature. Causes, patterns.
 const SMALLEST_OF_EXPLAINED: [f64; 2] = [0.045, 0.07];
+
+/// Whether a tone is large enough to be of interest.
+fn material(found: &Explained, tone: &Tone) -> bool {
+    let (_, explained) = energies(found, &vec![1.0; found.runs.len()]);
+    let count = samples(&found.runs);
+    let rms = (tone.energy_m2.iter().sum::<f64>().max(0.0) / count).sqrt();
+    rms > 2.0 * SMALLEST_OF_NOISE * found.spread.noise_m()
+        && rms > SMALLEST_OF_EXPLAINED[1] * (explained / count).sqrt()
+}
 
 /// Energy (sum of squares, m²) that each chosen explanation alone accounts for, and all of them.
 pub fn energies(found: &Explained, weights: &[f64]) -> (Vec<f64>, f64) {

@@ -162,8 +162,14 @@ pub fn diagnose(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Dia
             .sum::<f64>();
         (clamp, energy)
     });
-    let cannot_tell = poverty(campaign);
-    let too_poor = campaign.runs.len() < FEWEST_RUNS;
+    let mut cannot_tell = poverty(campaign);
+    // Labels that the clock contradicts, and not as a clamp would: nothing that depends on them can be believed.
+    let contradicted =
+        matches!(durations, Durations::Unexplained { runs, .. } if 4 * runs > campaign.runs.len());
+    let too_poor = campaign.runs.len() < FEWEST_RUNS || contradicted;
+    if contradicted {
+        cannot_tell.push("the turns did not last as the programmed radius and feed say: check which file belongs to which run".into());
+    }
     let findings = if too_poor { Vec::new() } else { verdict::findings(&found, clamp_energy) };
     let unexplained =
         if too_poor { Unexplained::default() } else { unexplained::describe(&found, &durations) };

@@ -35,7 +35,16 @@ const SIGNIFICANT: f64 = 8.0;
 
 /// Looks for teeth on both axes.
 pub fn find(runs: &[Prepared], residual: &Samples, spread: &Spread) -> Vec<Teeth> {
-    [Axis::X, Axis::Y].into_iter().filter_map(|axis| find_on(axis, runs, residual, spread)).collect()
+    let both = [Axis::X, Axis::Y].map(|axis| find_on(axis, runs, residual, spread, None));
+    let rougher = |a: &Teeth, b: &Teeth| a.significance > b.significance;
+    match both {
+        // One axis's teeth lie where the other is fast: hide them before the other is believed.
+        [Some(x), Some(y)] => {
+            let (first, other) = if rougher(&x, &y) { (x, Axis::Y) } else { (y, Axis::X) };
+            std::iter::once(first).chain(find_on(other, runs, residual, spread, Some(&first))).collect()
+        }
+        [x, y] => x.into_iter().chain(y).collect(),
+    }
 }
 
 /// Speed of the axis at a sample, m/s.
@@ -49,7 +58,13 @@ fn bin_of(speed: f64) -> Option<usize> {
     (bin < BINS).then_some(bin)
 }
 
-fn find_on(axis: Axis, runs: &[Prepared], residual: &Samples, spread: &Spread) -> Option<Teeth> {
+fn find_on(
+    axis: Axis,
+    runs: &[Prepared],
+    residual: &Samples,
+    spread: &Spread,
+    known: Option<&Teeth>,
+) -> Option<Teeth> {
     let quarter = if axis == Axis::Y { std::f64::consts::FRAC_PI_2 } else { 0.0 };
     let (sums, counts) = runs
         .par_iter()
@@ -59,7 +74,7 @@ fn find_on(axis: Axis, runs: &[Prepared], residual: &Samples, spread: &Spread) -
             for i in 1..left.len().saturating_sub(1) {
                 let near = run.view.since_reversal_s(run.view.psi_rad[i], quarter);
                 let facing = run.view.direction[i][axis.index()].abs();
-                if near < SPIKE_S || facing < 0.3 {
+                if near < SPIKE_S || facing < 0.3 || known.is_some_and(|known| known.covers(run, i)) {
                     continue;
                 }
                 if let Some(bin) = bin_of(axis_speed(run, axis, i)) {
@@ -112,7 +127,7 @@ fn find_on(axis: Axis, runs: &[Prepared], residual: &Samples, spread: &Spread) -
             };
             let zone: Vec<f64> = (0..left.len())
                 .filter(|&i| {
-                    axis_speed(run, axis, i) < 0.8 * below_m_s
+                    axis_speed(run, axis, i) < 0.6 * below_m_s
                         && run.view.direction[i][axis.index()].abs() > 0.3
                 })
                 .map(|i| (clean[i] / run.view.direction[i][axis.index()]).powi(2))
@@ -129,7 +144,7 @@ fn find_on(axis: Axis, runs: &[Prepared], residual: &Samples, spread: &Spread) -
     }
     let height_m = heights.iter().map(|h| h.0 * h.1).sum::<f64>() / weight;
     let variance = heights.iter().map(|h| h.1 * (h.0 - height_m).powi(2)).sum::<f64>() / weight;
-    let se_m = (variance / (heights.len() - 1) as f64).sqrt().max(0.02 * height_m);
+    let se_m = (variance / (heights.len() - 1) as f64).sqrt().max(0.05 * height_m);
     Some(Teeth { axis, below_m_s, height_m, se_m, significance })
 }
 

@@ -58,6 +58,7 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
             effects: vec![effect],
         });
     }
+    let out = without_bent(out, unexplained_energy(found, &each), found);
     let mut out = join_axes(out);
     if let Some((clamp, energy)) = clamp {
         let value = clamp.limit_m_s2 * 1e3;
@@ -73,7 +74,9 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
             BTreeMap::new(),
         ));
     }
-    if let Some(tone) = &found.tone {
+    let (pieces, energy) = unexplained_energy(found, &each);
+    let hidden_by_pieces = pieces >= PIECES && tone_energy < 9.0 * energy;
+    if let Some(tone) = found.tone.as_ref().filter(|_| !hidden_by_pieces) {
         out.push(tone_finding(tone, share(tone_energy), rms(tone_energy)));
     }
     for (teeth, energy) in found.teeth.iter().zip(teeth_energy) {
@@ -93,6 +96,35 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
     }
     out.sort_by(|a, b| b.share_percent.total_cmp(&a.share_percent));
     out
+}
+
+/// Number of patterns and their energy, m².
+fn unexplained_energy(found: &Explained, each: &[f64]) -> (usize, f64) {
+    found
+        .chosen
+        .iter()
+        .zip(each)
+        .filter(|(item, _)| !found.items[**item].listed())
+        .fold((0, 0.0), |(count, sum), (_, energy)| (count + 1, sum + energy))
+}
+
+/// So many patterns side by side are pieces of one thing that none of them describes.
+const PIECES: usize = 3;
+
+/// Takes out findings that the best set does without, and flexible ones that may be pieces of something
+/// unlisted: where three patterns or more were needed, a cause with shape parameters counts only if it is far larger
+/// than all of them.
+fn without_bent(findings: Vec<Finding>, (pieces, energy): (usize, f64), found: &Explained) -> Vec<Finding> {
+    let samples: f64 = found.runs.iter().map(|run| run.deviation_m.len() as f64).sum();
+    let unexplained_um = (energy / samples).sqrt() * 1e6;
+    findings
+        .into_iter()
+        .filter(|f| {
+            let flexible = !f.cause.model().shape_names().is_empty() || f.cause == Cause::LateralPlay;
+            let piece = flexible && pieces >= PIECES && f.rms_um < 3.0 * unexplained_um;
+            f.probability >= 0.5 && !piece
+        })
+        .collect()
 }
 
 #[allow(clippy::too_many_arguments, reason = "one line a field")]
