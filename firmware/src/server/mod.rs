@@ -62,6 +62,7 @@ pub struct Server<F, M> {
     /// A set-point that does not continue the batch before it.
     held: Option<TimedSetPoint>,
     lost_bytes: u32,
+    stack_bytes: u32,
     reset: bool,
     frame: [u8; MAX_FRAME],
 }
@@ -87,6 +88,7 @@ impl<F: NorFlash, M: Motion> Server<F, M> {
             on_link: false,
             held: None,
             lost_bytes: 0,
+            stack_bytes: 0,
             reset: false,
             frame: [0; MAX_FRAME],
         };
@@ -122,6 +124,11 @@ impl<F: NorFlash, M: Motion> Server<F, M> {
     /// Counts bytes that the port lost before [`Server::receive`].
     pub const fn count_lost_bytes(&mut self, count: u32) {
         self.lost_bytes = self.lost_bytes.wrapping_add(count);
+    }
+
+    /// Deepest stack since boot, as the board measures it.
+    pub const fn note_stack(&mut self, bytes: u32) {
+        self.stack_bytes = bytes;
     }
 
     /// Takes a byte from the link; returns the frame to send if it completed a request.
@@ -274,6 +281,7 @@ impl<F: NorFlash, M: Motion> Server<F, M> {
             slots: [self.store.state(0), self.store.state(1)],
             probation: self.probation,
             tick: now.tick,
+            stack_bytes: self.stack_bytes,
             raw_nm: now.raw_nm,
             corrected_nm: now.corrected_nm,
             counters: Counters {

@@ -244,6 +244,8 @@ pub struct Status {
     pub probation: Probation,
     /// Ticks since boot, wrapping.
     pub tick: u32,
+    /// Deepest stack since boot, bytes; 0: not measured.
+    pub stack_bytes: u32,
     /// Programmed position, nm.
     pub raw_nm: Pose,
     /// Corrected position, nm.

@@ -53,6 +53,7 @@ fn largest_messages_fit() {
         slots: [slot; 2],
         probation: Probation::FirstRun,
         tick: most,
+        stack_bytes: most,
         raw_nm: [i32::MIN; 3],
         corrected_nm: [i32::MIN; 3],
         counters: Counters {

@@ -1,0 +1,45 @@
+//! Gives the linker the memory of the board whose image is built. The host's library needs nothing.
+use std::env;
+use std::fs;
+use std::path::PathBuf;
+
+/// Memory of a board, for cortex-m-rt's link.x. Flash and RAM are as long as an image may be, not as long as
+/// the part has: what does not fit does not link.
+struct Memory {
+    feature: &'static str,
+    flash: (u32, u32),
+    ram: (u32, u32),
+}
+
+/// Most text of an image, bytes.
+const TEXT: u32 = 64 * 1024;
+/// Most RAM of an image, stack and all, bytes.
+const RAM: u32 = 16 * 1024;
+
+const BOARDS: [Memory; 2] = [
+    // SSRAM1 as code memory, SSRAM2 as data memory (ARM DAI0386). The flash stand-in is at 0x0010_0000.
+    Memory { feature: "CARGO_FEATURE_MPS2_AN386", flash: (0x0000_0000, TEXT), ram: (0x2000_0000, RAM) },
+    // Sectors 0 to 3 (RM0090 table 5), 64 KiB; the slots are in sectors 10 and 11.
+    Memory { feature: "CARGO_FEATURE_STM32F405", flash: (0x0800_0000, TEXT), ram: (0x2000_0000, RAM) },
+];
+
+fn main() {
+    println!("cargo:rerun-if-changed=build.rs");
+    if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
+        return;
+    }
+    let chosen = BOARDS.iter().find(|board| env::var_os(board.feature).is_some());
+    let (Some(board), Some(out)) = (chosen, env::var_os("OUT_DIR")) else { return };
+    let out = PathBuf::from(out);
+    let region = |name, (origin, length)| format!("  {name} : ORIGIN = {origin:#010x}, LENGTH = {length}\n");
+    let memory = format!("MEMORY\n{{\n{}{}}}\n", region("FLASH", board.flash), region("RAM", board.ram));
+    for (name, text) in [("memory.x", memory.as_str()), ("device.x", "/* the vector table names its handlers */\n")] {
+        if let Err(error) = fs::write(out.join(name), text) {
+            println!("cargo:error=cannot write {name}: {error}");
+        }
+    }
+    println!("cargo:rustc-link-search={}", out.display());
+    for argument in ["--nmagic", "-Tlink.x", "-Tdefmt.x"] {
+        println!("cargo:rustc-link-arg-bins={argument}");
+    }
+}

@@ -1,0 +1,21 @@
+//! What the flash drivers of the boards share: their error.
+use embedded_storage::nor_flash::{NorFlashError, NorFlashErrorKind};
+
+/// Why a flash operation failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FlashError {
+    /// Place or alignment.
+    Range(NorFlashErrorKind),
+    /// The flash controller reports an error or does not answer.
+    #[allow(dead_code, reason = "not every board has a controller that can")]
+    Controller,
+}
+
+impl NorFlashError for FlashError {
+    fn kind(&self) -> NorFlashErrorKind {
+        match self {
+            Self::Range(kind) => *kind,
+            Self::Controller => NorFlashErrorKind::Other,
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! What all boards share: the tick in SysTick, the hand-over to it, the background loop, the log.
+//!
+//! | priority | runs | takes |
+//! |---|---|---|
+//! | highest | SysTick: one tick of the engine | what `giotto-hil ticks` counts |
+//! | middle | receive interrupt of the link: a byte into a queue | some 30 instructions |
+//! | thread | server, flash, set-points out, log, watchdog; sleeps when there is nothing to do | – |
+//!
+//! RTIC would prove that no lock is held across priorities. There is no lock: tick and background meet in two
+//! single-producer, single-consumer queues and a page of words, each written by one side, so its ceilings would
+//! guard nothing; and the emulated board has no PAC that it could be told about. The priorities are three
+//! lines below.
+pub mod flash;
+pub mod log;
+pub mod stack;
+
+use core::cell::RefCell;
+use cortex_m::peripheral::scb::SystemHandler;
+use cortex_m::peripheral::syst::SystClkSource;
+use cortex_m::peripheral::{SCB, SYST};
+use cortex_m::singleton;
+use cortex_m_rt::exception;
+use critical_section::Mutex;
+use embedded_io::{Read, ReadReady, Write};
+use embedded_storage::nor_flash::NorFlash;
+use giotto_firmware::control::{self, Desk, Shared, Tick};
+use giotto_firmware::engine::{Config, Executor, Planned, Planner};
+use giotto_firmware::server::{Board, Server, TimedSetPoint};
+use giotto_firmware::store::Layout;
+use heapless::spsc::{Consumer, Producer, Queue};
+
+/// Ticks a second.
+pub const TICK_HZ: u32 = 1000;
+/// Priority of the link's receive interrupt; the tick has 0.
+pub const LINK_PRIORITY: u8 = 0x40;
+/// Bytes that arrive while the background is busy with the flash: three requests and their repetition.
+pub const RECEIVED: usize = 1024;
+
+type BoardTick = Tick<&'static Shared, Consumer<'static, Planned>, Producer<'static, TimedSetPoint>>;
+type BoardDesk = Desk<&'static Shared, Producer<'static, Planned>, Consumer<'static, TimedSetPoint>>;
+
+static SHARED: Shared = Shared::new();
+static HAND_OVER: Mutex<RefCell<Option<BoardTick>>> = Mutex::new(RefCell::new(None));
+
+/// The tick's owner once it has begun. See the table above for its contract; the late flag is the next tick's
+/// own request, already pending.
+#[exception]
+fn SysTick() {
+    static mut TICK: Option<BoardTick> = None;
+    static mut LATE: bool = false;
+    let Some(tick) = TICK else {
+        *TICK = critical_section::with(|token| HAND_OVER.borrow(token).take());
+        return;
+    };
+    tick.tick(*LATE);
+    *LATE = SCB::is_pendst_pending();
+}
+
+/// Prepares the engine and hands its fast half to SysTick, which is started. `None` if called twice.
+pub fn start(syst: &mut SYST, scb: &mut SCB, clock_hz: u32) -> Option<BoardDesk> {
+    let config = Config::robot(TICK_HZ);
+    let segments = singleton!(: Queue<Planned, { control::SEGMENTS + 1 }> = Queue::new())?;
+    let set_points = singleton!(: Queue<TimedSetPoint, { control::SET_POINTS + 1 }> = Queue::new())?;
+    let (segments_in, segments_out) = segments.split();
+    let (points_in, points_out) = set_points.split();
+    let executor = Executor::new([0; 3], config.engage_ticks(), true);
+    let tick = Tick::new(executor, &SHARED, segments_out, points_in);
+    critical_section::with(|token| HAND_OVER.borrow(token).replace(Some(tick)));
+    // SAFETY: the priority of SysTick guards no critical section that is based on priorities; there is none.
+    #[allow(unsafe_code, reason = "cortex-m has no safe way to set a priority")]
+    unsafe {
+        scb.set_priority(SystemHandler::SysTick, 0);
+    }
+    syst.set_clock_source(SystClkSource::Core);
+    syst.set_reload(clock_hz / TICK_HZ - 1);
+    syst.clear_current();
+    syst.enable_interrupt();
+    syst.enable_counter();
+    Some(Desk::new(Planner::new(&config, [0; 3]), &SHARED, segments_in, points_out))
+}
+
+/// What the background loop needs of a board.
+pub struct Ports<L, S, G> {
+    /// The host's link.
+    pub link: L,
+    /// Where set-points stream unless the link asks for them; `None`: nowhere.
+    pub stream: Option<S>,
+    /// Where the log goes.
+    pub log: G,
+    /// Feeds the watchdog.
+    pub feed: fn(),
+    /// Bytes the link has lost since it was last asked.
+    pub lost: fn() -> u32,
+}
+
+/// Serves for ever.
+pub fn background<F, L, S, G>(board: Board, flash: F, layout: Layout, desk: BoardDesk, mut ports: Ports<L, S, G>) -> !
+where
+    F: NorFlash,
+    L: Read + ReadReady + Write,
+    S: Write,
+    G: Write,
+{
+    let mut server = Server::boot(board, flash, layout, desk);
+    match server.active() {
+        Some(slot) => defmt::info!("boot: table in slot {=u8}", slot),
+        None => defmt::info!("boot: no confirmed table, bypass"),
+    }
+    if ports.stream.is_some() {
+        server.subscribe(1, false);
+    }
+    let mut rounds: u8 = 0;
+    loop {
+        (ports.feed)();
+        server.count_lost_bytes((ports.lost)());
+        if rounds == 0 {
+            server.note_stack(stack::worst_bytes());
+        }
+        rounds = rounds.wrapping_add(1);
+        // A port that fails loses what was being sent; the host asks again.
+        let _ = server.serve(&mut ports.link);
+        if let Some(stream) = &mut ports.stream {
+            let _ = server.stream(stream);
+        }
+        log::drain(&mut ports.log);
+        if server.reset_requested() {
+            defmt::info!("reset");
+            log::drain(&mut ports.log);
+            SCB::sys_reset();
+        }
+        cortex_m::asm::wfi();
+    }
+}
+
+/// A panic is a defect. Nothing moves on: the watchdog ends it, and the controller boots into a defined state.
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+    cortex_m::interrupt::disable();
+    loop {
+        cortex_m::asm::nop();
+    }
+}

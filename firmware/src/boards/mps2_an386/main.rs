@@ -1,0 +1,59 @@
+//! Image for ARM's MPS2 with the AN386 FPGA image (Cortex-M4F, 25 MHz) as QEMU emulates it: `-machine mps2-an386`.
+//!
+//! | port | use |
+//! |---|---|
+//! | UART0 | the host's link |
+//! | UART1 | set-points while a run is in progress, in the frames of the link |
+//! | UART2 | the log, in defmt's encoding (`defmt-print -e IMAGE`) |
+//!
+//! Tables are kept in a window of code memory that behaves like NOR flash; it survives a warm reset, not the
+//! end of the emulator. Never run on the FPGA board itself.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(not(target_os = "none"))]
+fn main() {
+    eprintln!("an image for a board: build it for thumbv7em-none-eabihf");
+}
+
+#[cfg(target_os = "none")]
+#[path = "../common/mod.rs"]
+mod common;
+#[cfg(target_os = "none")]
+mod flash;
+#[cfg(target_os = "none")]
+mod uart;
+#[cfg(target_os = "none")]
+mod vectors;
+#[cfg(target_os = "none")]
+mod watchdog;
+
+#[cfg(target_os = "none")]
+mod image {
+    use super::{common, flash, uart, vectors, watchdog};
+    use cortex_m_rt::entry;
+    use giotto_firmware::server::Board;
+
+    /// Clock of core and peripherals (DAI0386 2.5).
+    const CLOCK_HZ: u32 = 25_000_000;
+    const BOARD: Board = Board { name: "mps2-an386", tick_hz: common::TICK_HZ };
+
+    #[entry]
+    fn main() -> ! {
+        let started = cortex_m::Peripherals::take().and_then(|mut core| {
+            let link = uart::Uart::link()?;
+            vectors::enable(&mut core.NVIC);
+            let desk = common::start(&mut core.SYST, &mut core.SCB, CLOCK_HZ)?;
+            Some((link, desk))
+        });
+        let Some((link, desk)) = started else { cortex_m::asm::udf() };
+        watchdog::start(CLOCK_HZ);
+        let ports = common::Ports {
+            link,
+            stream: Some(uart::Uart::stream()),
+            log: uart::Uart::log(),
+            feed: watchdog::feed,
+            lost: uart::lost,
+        };
+        common::background(BOARD, flash::Window::new(), flash::LAYOUT, desk, ports)
+    }
+}
