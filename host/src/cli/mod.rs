@@ -10,12 +10,14 @@ mod flash;
 mod import;
 mod monitor;
 mod plan;
+mod port;
 mod report;
 mod rollback;
 mod run;
 mod simulate;
 mod status;
 mod table;
+mod table_file;
 mod verify;
 
 pub mod failure;

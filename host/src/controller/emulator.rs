@@ -16,6 +16,10 @@ const PROGRAM: &str = "qemu-system-arm";
 /// How long it may take to say where its pty is.
 const START_TIME: Duration = Duration::from_secs(10);
 
+/// Runs the emulator until its own input ends, which it does however this process ends.
+const KEEPER: &str = r#"exec 3<&0; "$@" </dev/null 3<&- & emulator=$!
+exec >/dev/null 2>&1; cat <&3; kill $emulator; wait $emulator"#;
+
 /// How fast time goes in the emulator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
@@ -29,6 +33,7 @@ pub enum Pace {
 #[derive(Debug)]
 pub struct Emulator {
     process: Child,
+    words: mpsc::Receiver<String>,
     pty: String,
     folder: TempDir,
 }
@@ -75,7 +80,8 @@ impl Emulator {
             None => image::ensure(board, note)?,
         };
         let folder = tempfile::Builder::new().prefix("giotto-qemu-").tempdir().map_err(|e| failed(&e))?;
-        let mut command = Command::new(&program);
+        let mut command = Command::new("sh");
+        command.args(["-c", KEEPER, "sh", &program]);
         command.args(["-machine", board.machine(), "-nographic", "-monitor", "none", "-kernel"]).arg(&image);
         command.args(["-serial", "pty"]);
         for name in ["uart1", "uart2"] {
@@ -89,10 +95,10 @@ impl Emulator {
             // 32 ns for an instruction, about what the 25 MHz of the board allow.
             command.args(["-icount", "shift=5,sleep=off,align=off"]);
         }
-        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut process = command.spawn().map_err(|error| failed(&error))?;
         match find_pty(&mut process) {
-            Ok(pty) => Ok(Self { process, pty, folder }),
+            Ok((pty, words)) => Ok(Self { process, words, pty, folder }),
             Err(error) => {
                 end(&mut process);
                 Err(error)
@@ -127,11 +133,8 @@ impl Emulator {
     }
 
     /// Waits until the emulator ends by itself.
-    ///
-    /// # Errors
-    /// Those of the system.
-    pub fn wait(&mut self) -> io::Result<()> {
-        self.process.wait().map(drop)
+    pub fn wait(&mut self) {
+        while self.words.recv().is_ok() {}
     }
 
     /// Opens UART0; the emulator ends with the link.
@@ -145,8 +148,8 @@ impl Emulator {
 }
 
 fn end(process: &mut Child) {
-    // It may have ended by itself; then there is nothing to do.
-    let _ = process.kill();
+    // Its keeper sees the end of its input; both are gone when it is waited for.
+    drop(process.stdin.take());
     let _ = process.wait();
 }
 
@@ -161,7 +164,7 @@ fn failed(error: &io::Error) -> ControllerError {
 }
 
 /// Reads "char device redirected to PATH (label serial0)".
-fn find_pty(process: &mut Child) -> Result<String, ControllerError> {
+fn find_pty(process: &mut Child) -> Result<(String, mpsc::Receiver<String>), ControllerError> {
     let (sender, lines) = mpsc::channel();
     let readers: [Option<Box<dyn io::Read + Send>>; 2] = [
         process.stdout.take().map(|pipe| Box::new(pipe) as _),
@@ -181,7 +184,8 @@ fn find_pty(process: &mut Child) -> Result<String, ControllerError> {
     while let Ok(line) = lines.recv_timeout(START_TIME) {
         let path = line.strip_prefix("char device redirected to ").and_then(|rest| rest.split(' ').next());
         if let Some(path) = path {
-            return Ok(path.to_owned());
+            let path = path.to_owned();
+            return Ok((path, lines));
         }
         words.push(line);
     }
