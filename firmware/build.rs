@@ -12,9 +12,9 @@ struct Memory {
 }
 
 /// Most text of an image, bytes.
-const TEXT: u32 = 64 * 1024;
+const TEXT: u32 = 128 * 1024;
 /// Most RAM of an image, stack and all, bytes.
-const RAM: u32 = 16 * 1024;
+const RAM: u32 = 32 * 1024;
 
 const BOARDS: [Memory; 2] = [
     // SSRAM1 as code memory, SSRAM2 as data memory (ARM DAI0386). The flash stand-in is at 0x0010_0000.
@@ -33,7 +33,9 @@ fn main() {
     let out = PathBuf::from(out);
     let region = |name, (origin, length)| format!("  {name} : ORIGIN = {origin:#010x}, LENGTH = {length}\n");
     let memory = format!("MEMORY\n{{\n{}{}}}\n", region("FLASH", board.flash), region("RAM", board.ram));
-    for (name, text) in [("memory.x", memory.as_str()), ("device.x", "/* the vector table names its handlers */\n")] {
+    for (name, text) in
+        [("memory.x", memory.as_str()), ("device.x", "/* the vector table names its handlers */\n")]
+    {
         if let Err(error) = fs::write(out.join(name), text) {
             println!("cargo:error=cannot write {name}: {error}");
         }

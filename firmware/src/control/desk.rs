@@ -1,17 +1,17 @@
 //! The background's half: plans what the tick runs, and is the [`Motion`] of the server.
 use super::ports::{Receiver, Sender};
 use super::shared::Shared;
-use crate::engine::{Planned, Planner, Refused};
+use crate::engine::{Planned, Planner, Refused, ZoneError};
 use crate::server::{Motion, Snapshot, TimedSetPoint};
-use core::ops::Deref;
+use core::ops::{Deref, DerefMut};
 use core::sync::atomic::Ordering::Relaxed;
 use giotto_shared::path::CircleRun;
-use giotto_shared::table::Table;
-use giotto_shared::wire::{MotionRefusal, MotionState};
+use giotto_shared::table::{self, Table, TableError};
+use giotto_shared::wire::{MotionRefusal, MotionState, Refusal};
 
 /// What the background owns.
-pub struct Desk<S, O, I> {
-    planner: Planner,
+pub struct Desk<P, S, O, I> {
+    planner: P,
     shared: S,
     segments: O,
     set_points: I,
@@ -19,15 +19,28 @@ pub struct Desk<S, O, I> {
     accepted_at: Option<u32>,
 }
 
-impl<S, O, I> Desk<S, O, I>
+impl<P, S, O, I> Desk<P, S, O, I>
 where
+    P: DerefMut<Target = Planner>,
     S: Deref<Target = Shared>,
     O: Sender<Planned>,
     I: Receiver<TimedSetPoint>,
 {
     /// Plans for the tick at the other end of these queues.
-    pub fn new(planner: Planner, shared: S, segments: O, set_points: I) -> Self {
+    pub fn new(planner: P, shared: S, segments: O, set_points: I) -> Self {
         Self { planner, shared, segments, set_points, accepted_at: None }
+    }
+}
+
+/// Why a table cannot be used.
+enum Unusable {
+    Table(TableError),
+    Terms,
+}
+
+impl From<ZoneError> for Unusable {
+    fn from(_: ZoneError) -> Self {
+        Self::Terms
     }
 }
 
@@ -40,8 +53,9 @@ fn in_words(refused: Refused) -> MotionRefusal {
     }
 }
 
-impl<S, O, I> Motion for Desk<S, O, I>
+impl<P, S, O, I> Motion for Desk<P, S, O, I>
 where
+    P: DerefMut<Target = Planner>,
     S: Deref<Target = Shared>,
     O: Sender<Planned>,
     I: Receiver<TimedSetPoint>,
@@ -55,11 +69,18 @@ where
         now
     }
 
-    fn install(&mut self, table: Option<&Table>) -> Result<(), MotionRefusal> {
+    fn install(&mut self, image: Option<&[u8]>) -> Result<(), Refusal> {
         if matches!(self.snapshot().state, MotionState::Running | MotionState::Stopping) {
-            return Err(MotionRefusal::Busy);
+            return Err(Refusal::Motion(MotionRefusal::Busy));
         }
-        self.planner.set_table(table).map_err(|_| MotionRefusal::Terms)
+        let Some(image) = image else {
+            return self.planner.set_table(None).map_err(|_| Refusal::Motion(MotionRefusal::Terms));
+        };
+        let fill = |table: &mut Table| table::decode_into(image, table).map_err(Unusable::Table);
+        self.planner.load_table(fill).map_err(|unusable| match unusable {
+            Unusable::Table(error) => Refusal::Table(error),
+            Unusable::Terms => Refusal::Motion(MotionRefusal::Terms),
+        })
     }
 
     fn bypass(&mut self, on: bool) {

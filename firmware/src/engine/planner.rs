@@ -57,11 +57,28 @@ impl Planner {
 
     /// The table used for segments planned from now on; `None`: no correction. On an error the old one stays.
     pub fn set_table(&mut self, table: Option<&Table>) -> Result<(), ZoneError> {
-        self.zones = match table {
-            Some(table) => Zones::build(table)?,
-            None => Zones::default(),
-        };
-        Ok(())
+        match table {
+            Some(table) => {
+                super::zones::check(table)?;
+                self.zones.load(|place| {
+                    place.clone_from(table);
+                    Ok(())
+                })
+            }
+            None => {
+                self.zones.clear();
+                Ok(())
+            }
+        }
+    }
+
+    /// As [`Planner::set_table`], written in place by `fill`: a controller has no room for two. On an error no
+    /// table is in use.
+    pub fn load_table<E: From<ZoneError>>(
+        &mut self,
+        fill: impl FnOnce(&mut Table) -> Result<(), E>,
+    ) -> Result<(), E> {
+        self.zones.load(fill)
     }
 
     /// After a stop or a declared position: plans on from where the executor stands.
@@ -298,7 +315,7 @@ impl Planner {
             feed_m_s: round.feed,
             ccw: Some(round.ccw),
         };
-        if let Some(zone) = self.zones.choose(&asked) {
+        if let Some(zone) = &self.zones.choose(&asked) {
             let mut ramp = ramp_ticks;
             for _ in 0..6 {
                 let slower = timing(ramp);

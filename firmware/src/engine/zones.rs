@@ -1,7 +1,7 @@
 //! The table as the planner uses it: each zone's operator and merged terms, checked once.
 use giotto_shared::law::{Operator, Profile, ProfileError};
 use giotto_shared::model::Cumulants;
-use giotto_shared::table::{Limits, MAX_TERMS, MAX_ZONES, Table, Travel, Zone};
+use giotto_shared::table::{Limits, MAX_TERMS, Table, Travel, Zone};
 use giotto_shared::term::Term;
 
 /// Why a table cannot be used. Zones count from 0.
@@ -30,66 +30,88 @@ pub(crate) struct Built {
     pub(crate) profile: Option<Profile<f64>>,
     /// Where position errors are counted from: the middle of the zone's place.
     pub(crate) reference_m: Option<[f64; 3]>,
-    zone: Zone,
 }
 
-/// All zones, and the table's limits.
-#[derive(Clone, Debug, Default)]
+impl Built {
+    /// Merges the terms of zone `index`.
+    fn new(zone: &Zone, index: usize) -> Result<Self, ZoneError> {
+        let cumulants = Cumulants {
+            kappa2_s2: f64::from(zone.cumulants.kappa2_s2),
+            kappa4_s4: f64::from(zone.cumulants.kappa4_s4),
+        };
+        let bounds = [zone.radius_m, zone.feed_m_s];
+        let numbers = bounds.iter().flatten();
+        if !(numbers.copied().all(f32::is_finite)
+            && cumulants.kappa2_s2.is_finite()
+            && cumulants.kappa4_s4.is_finite()
+            && zone.place_m.iter().flatten().flatten().all(|v| v.is_finite()))
+        {
+            return Err(ZoneError::Value(Some(index)));
+        }
+        let terms: heapless::Vec<Term<f64>, MAX_TERMS> =
+            zone.terms.iter().map(|term| term.map(f64::from)).collect();
+        let profile = Profile::new(&terms).map_err(|e| ZoneError::Term(index, e))?;
+        let reference_m = zone.place_m.map(|[low, high]| {
+            let middle = |i: usize| 0.5 * (f64::from(low[i]) + f64::from(high[i]));
+            [middle(0), middle(1), middle(2)]
+        });
+        let profile = (!terms.is_empty()).then_some(profile);
+        Ok(Self { operator: Operator::new(&cumulants), profile, reference_m })
+    }
+}
+
+/// The table in use. A zone is built when a segment asks for it: eight built zones take three times the memory of
+/// the table.
+#[derive(Clone, Debug)]
 pub(crate) struct Zones {
-    built: heapless::Vec<Built, MAX_ZONES>,
-    limits: Option<Limits>,
+    table: Table,
+}
+
+impl Default for Zones {
+    fn default() -> Self {
+        Self { table: Table::empty() }
+    }
 }
 
 impl Zones {
-    /// Checks and merges a table.
-    pub(crate) fn build(table: &Table) -> Result<Self, ZoneError> {
-        let limit = |v: f32| v.is_finite() && v > 0.0;
-        if !(limit(table.limits.offset_m) && limit(table.limits.slew_m_s)) {
-            return Err(ZoneError::Value(None));
+    /// Lets `fill` write a table in place and checks it. On an error no table is in use.
+    pub(crate) fn load<E: From<ZoneError>>(
+        &mut self,
+        fill: impl FnOnce(&mut Table) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let loaded = fill(&mut self.table).and_then(|()| Ok(check(&self.table)?));
+        if loaded.is_err() {
+            self.clear();
         }
-        let mut built = heapless::Vec::new();
-        for (index, zone) in table.zones.iter().enumerate() {
-            let cumulants = Cumulants {
-                kappa2_s2: f64::from(zone.cumulants.kappa2_s2),
-                kappa4_s4: f64::from(zone.cumulants.kappa4_s4),
-            };
-            let bounds = [zone.radius_m, zone.feed_m_s];
-            let numbers = bounds.iter().flatten();
-            if !(numbers.copied().all(f32::is_finite)
-                && cumulants.kappa2_s2.is_finite()
-                && cumulants.kappa4_s4.is_finite()
-                && zone.place_m.iter().flatten().flatten().all(|v| v.is_finite()))
-            {
-                return Err(ZoneError::Value(Some(index)));
-            }
-            let terms: heapless::Vec<Term<f64>, MAX_TERMS> =
-                zone.terms.iter().map(|term| term.map(f64::from)).collect();
-            let profile = Profile::new(&terms).map_err(|e| ZoneError::Term(index, e))?;
-            let reference_m = zone.place_m.map(|[low, high]| {
-                let middle = |i: usize| 0.5 * (f64::from(low[i]) + f64::from(high[i]));
-                [middle(0), middle(1), middle(2)]
-            });
-            let profile = (!terms.is_empty()).then_some(profile);
-            // As many as the table can hold.
-            let _ = built.push(Built {
-                operator: Operator::new(&cumulants),
-                profile,
-                reference_m,
-                zone: zone.clone(),
-            });
-        }
-        Ok(Self { built, limits: Some(table.limits) })
+        loaded
+    }
+
+    /// No table.
+    pub(crate) fn clear(&mut self) {
+        self.table.zones.clear();
+        self.table.limits = Limits { offset_m: 0.0, slew_m_s: 0.0 };
     }
 
     /// The first zone that fits.
-    pub(crate) fn choose(&self, asked: &Asked) -> Option<&Built> {
-        self.built.iter().find(|built| fits(&built.zone, asked))
+    pub(crate) fn choose(&self, asked: &Asked) -> Option<Built> {
+        let zone = self.table.zones.iter().find(|zone| fits(zone, asked))?;
+        // Checked when it was loaded.
+        Built::new(zone, 0).ok()
     }
 
     /// The table's limits; 0 without a table.
     pub(crate) fn limits(&self) -> Limits {
-        self.limits.unwrap_or(Limits { offset_m: 0.0, slew_m_s: 0.0 })
+        self.table.limits
     }
+}
+
+/// Whether a table can be used.
+pub(crate) fn check(table: &Table) -> Result<(), ZoneError> {
+    let limit = |v: f32| v.is_finite() && v > 0.0;
+    if !(limit(table.limits.offset_m) && limit(table.limits.slew_m_s)) {
+        return Err(ZoneError::Value(None));
+    }
+    table.zones.iter().enumerate().try_for_each(|(index, zone)| Built::new(zone, index).map(drop))
 }
 
 fn fits(zone: &Zone, asked: &Asked) -> bool {

@@ -1,12 +1,13 @@
 //! Serving a byte stream.
-use super::{Motion, Server};
+use super::{Buffers, Motion, Server};
+use core::ops::DerefMut;
 use embedded_io::{Read, ReadReady, Write};
 use embedded_storage::nor_flash::NorFlash;
 
 /// Bytes taken from the port at once.
 const PIECE: usize = 32;
 
-impl<F: NorFlash, M: Motion> Server<F, M> {
+impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     /// Answers what has arrived and sends the set-points that are due. Returns when nothing is left to do;
     /// to be called again and again.
     ///

@@ -16,6 +16,7 @@ mod tests;
 pub use motion::{Motion, Snapshot, TimedSetPoint};
 
 use crate::store::{ImageBuffer, Layout, Store};
+use core::ops::DerefMut;
 use embedded_storage::nor_flash::NorFlash;
 use giotto_shared::table::{FORMAT_VERSION, MAX_IMAGE_BYTES, SCHEMA_HASH, bounds};
 use giotto_shared::wire::{
@@ -40,16 +41,47 @@ pub struct Board {
     pub tick_hz: u32,
 }
 
+/// Memory of a server that is too large for a stack: a board keeps it in a static, the host on the heap.
+#[derive(Debug)]
+pub struct Buffers {
+    image: ImageBuffer,
+    accumulator: Accumulator,
+    /// The reply to the last request, for its repetition.
+    reply: [u8; MAX_FRAME],
+    reply_length: usize,
+    /// Any other frame on its way out.
+    frame: [u8; MAX_FRAME],
+}
+
+impl Default for Buffers {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Buffers {
+    /// Empty.
+    pub const fn new() -> Self {
+        let frame = [0; MAX_FRAME];
+        Self {
+            image: [0; MAX_IMAGE_BYTES],
+            accumulator: Accumulator::new(),
+            reply: frame,
+            reply_length: 0,
+            frame,
+        }
+    }
+}
+
 /// The server of one controller.
 #[derive(Debug)]
-pub struct Server<F, M> {
+pub struct Server<F, M, B> {
     board: Board,
     store: Store<F>,
     motion: M,
-    accumulator: Accumulator,
+    buffers: B,
     session: Session,
     upload: Upload,
-    buffer: ImageBuffer,
     /// Slot whose table the engine has.
     active: Option<u8>,
     /// Slot programmed since boot and not yet committed.
@@ -64,22 +96,19 @@ pub struct Server<F, M> {
     lost_bytes: u32,
     stack_bytes: u32,
     reset: bool,
-    frame: [u8; MAX_FRAME],
 }
 
-impl<F: NorFlash, M: Motion> Server<F, M> {
+impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     /// Boots: the newest confirmed table that this image reads goes to the engine; if there is none, bypass.
-    pub fn boot(board: Board, flash: F, layout: Layout, motion: M) -> Self {
-        let mut buffer = [0; MAX_IMAGE_BYTES];
-        let store = Store::open(flash, layout, &mut buffer);
+    pub fn boot(board: Board, flash: F, layout: Layout, motion: M, mut buffers: B) -> Self {
+        let store = Store::open(flash, layout, &mut buffers.image);
         let mut server = Self {
             board,
             store,
             motion,
-            accumulator: Accumulator::new(),
+            buffers,
             session: Session::new(),
             upload: Upload::new(),
-            buffer,
             active: None,
             written: None,
             probation: Probation::None,
@@ -90,7 +119,6 @@ impl<F: NorFlash, M: Motion> Server<F, M> {
             lost_bytes: 0,
             stack_bytes: 0,
             reset: false,
-            frame: [0; MAX_FRAME],
         };
         server.install_last_good();
         server
@@ -133,7 +161,7 @@ impl<F: NorFlash, M: Motion> Server<F, M> {
 
     /// Takes a byte from the link; returns the frame to send if it completed a request.
     pub fn receive(&mut self, byte: u8) -> Option<&[u8]> {
-        let payload = self.accumulator.push(byte)?;
+        let payload = self.buffers.accumulator.push(byte)?;
         let (head, command) = match session::read(payload) {
             Some(request) => request,
             None => {
@@ -142,19 +170,24 @@ impl<F: NorFlash, M: Motion> Server<F, M> {
             }
         };
         let opens = matches!(command, Ok(Command::Hello));
-        let reply = match self.session.turn(head, opens) {
-            Turn::Repeated => return self.session.last_reply(),
+        match self.session.turn(head, opens) {
+            Turn::Repeated => {}
             Turn::Late => return None,
             // Not remembered: a stranger does not disturb whoever has the session.
             Turn::Unknown => {
-                return session::frame(head, Reply::Refused(Refusal::NoSession), &mut self.frame);
+                return session::frame(head, Reply::Refused(Refusal::NoSession), &mut self.buffers.frame);
             }
-            Turn::New => match command {
-                Ok(command) => self.execute(command).unwrap_or_else(Reply::Refused),
-                Err(session::NotUnderstood) => Reply::Refused(Refusal::NotUnderstood),
-            },
-        };
-        self.session.answer(head, reply)
+            Turn::New => {
+                let reply = match command {
+                    Ok(command) => self.execute(command).unwrap_or_else(Reply::Refused),
+                    Err(session::NotUnderstood) => Reply::Refused(Refusal::NotUnderstood),
+                };
+                self.session.answered(head);
+                let framed = session::frame(head, reply, &mut self.buffers.reply);
+                self.buffers.reply_length = framed.map_or(0, <[u8]>::len);
+            }
+        }
+        self.buffers.reply.get(..self.buffers.reply_length)
     }
 
     /// The next frame of set-points, once it is full or the run has ended.
@@ -180,7 +213,7 @@ impl<F: NorFlash, M: Motion> Server<F, M> {
             }
             next = self.motion.next_set_point();
         }
-        wire::encode(&FromController::SetPoints(batch), &mut self.frame).ok().map(|frame| &*frame)
+        wire::encode(&FromController::SetPoints(batch), &mut self.buffers.frame).ok().map(|frame| &*frame)
     }
 
     fn execute(&mut self, command: Command) -> Result<Reply, Refusal> {
@@ -188,7 +221,9 @@ impl<F: NorFlash, M: Motion> Server<F, M> {
             Command::Hello => return Ok(Reply::Identity(self.identity())),
             Command::Status => return Ok(Reply::Status(self.status())),
             Command::WriteBegin { length, crc } => self.upload.begin(length, crc)?,
-            Command::WriteChunk { offset, data } => self.upload.chunk(offset, &data, &mut self.buffer)?,
+            Command::WriteChunk { offset, data } => {
+                self.upload.chunk(offset, &data, &mut self.buffers.image)?
+            }
             Command::WriteEnd => return self.program().map(|slot| Reply::Written { slot }),
             Command::ReadBack { slot, offset, length } => return self.read_back(slot, offset, length),
             Command::Commit => self.commit()?,
@@ -273,7 +308,7 @@ impl<F: NorFlash, M: Motion> Server<F, M> {
 
     fn status(&self) -> Status {
         let now = self.motion.snapshot();
-        let frames = self.accumulator.counts();
+        let frames = self.buffers.accumulator.counts();
         Status {
             motion: now.state,
             bypass: self.bypassed(),

@@ -1,6 +1,5 @@
 //! What the server needs of an engine.
-use giotto_shared::table::Table;
-use giotto_shared::wire::{CircleRun, MotionRefusal, MotionState, Pose, SetPoint};
+use giotto_shared::wire::{CircleRun, MotionRefusal, MotionState, Pose, Refusal, SetPoint};
 
 /// The engine as its tick last left it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,11 +38,12 @@ pub trait Motion {
     /// State, position and counts.
     fn snapshot(&self) -> Snapshot;
 
-    /// Corrects with this table from the next program on; `None`: no correction.
+    /// Corrects with the table of this image from the next program on; `None`: no correction.
     ///
     /// # Errors
-    /// [`MotionRefusal::Busy`] while a program runs.
-    fn install(&mut self, table: Option<&Table>) -> Result<(), MotionRefusal>;
+    /// [`MotionRefusal::Busy`] while a program runs: nothing has changed then. [`Refusal::Table`] or
+    /// [`MotionRefusal::Terms`] if the table cannot be used: there is no correction then.
+    fn install(&mut self, image: Option<&[u8]>) -> Result<(), Refusal>;
 
     /// Switches the correction off (`true`) or on, smoothly.
     fn bypass(&mut self, on: bool);

@@ -36,19 +36,22 @@ pub(super) enum Turn {
     Unknown,
 }
 
-/// The session that is open and the reply to its last request.
+/// The session that is open.
 #[derive(Debug)]
 pub(super) struct Session {
     last: Option<Head>,
-    reply: [u8; MAX_FRAME],
-    length: usize,
     repeated: u32,
     malformed: u32,
 }
 
 impl Session {
     pub(super) const fn new() -> Self {
-        Self { last: None, reply: [0; MAX_FRAME], length: 0, repeated: 0, malformed: 0 }
+        Self { last: None, repeated: 0, malformed: 0 }
+    }
+
+    /// The request with this head is the one whose reply is remembered.
+    pub(super) const fn answered(&mut self, head: Head) {
+        self.last = Some(head);
     }
 
     pub(super) const fn repeated(&self) -> u32 {
@@ -79,20 +82,9 @@ impl Session {
             _ => Turn::Late,
         }
     }
-
-    pub(super) fn last_reply(&self) -> Option<&[u8]> {
-        self.reply.get(..self.length)
-    }
-
-    /// Frames and remembers the reply.
-    pub(super) fn answer(&mut self, head: Head, reply: Reply) -> Option<&[u8]> {
-        self.last = Some(head);
-        self.length = frame(head, reply, &mut self.reply).map_or(0, <[u8]>::len);
-        self.reply.get(..self.length)
-    }
 }
 
-/// Frames a reply that is not to be remembered.
+/// Frames a reply.
 pub(super) fn frame(head: Head, reply: Reply, out: &mut [u8; MAX_FRAME]) -> Option<&[u8]> {
     let Head { session, seq } = head;
     let message = FromController::Reply { session, seq, reply };

@@ -1,16 +1,21 @@
 //! Which table corrects: what boots, what is on probation, what comes back.
-use super::{Motion, Server};
+use super::{Buffers, Motion, Server};
+use core::ops::DerefMut;
 use embedded_storage::nor_flash::NorFlash;
 use giotto_shared::table;
-use giotto_shared::wire::{Probation, Refusal};
+use giotto_shared::wire::{MotionRefusal, Probation, Refusal};
 
-impl<F: NorFlash, M: Motion> Server<F, M> {
+impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     /// Gives the table in `slot` to the engine.
     fn install(&mut self, slot: u8) -> Result<(), Refusal> {
         self.upload.abort();
-        let image = self.store.load(slot, &mut self.buffer).map_err(Refusal::Flash)?;
-        let table = table::decode(image).map_err(Refusal::Table)?;
-        self.motion.install(Some(&table)).map_err(Refusal::Motion)?;
+        let image = self.store.load(slot, &mut self.buffers.image).map_err(Refusal::Flash)?;
+        table::check(image).map_err(Refusal::Table)?;
+        self.motion.install(Some(image)).inspect_err(|refusal| {
+            if !matches!(refusal, Refusal::Motion(MotionRefusal::Busy)) {
+                self.active = None;
+            }
+        })?;
         self.active = Some(slot);
         self.apply_bypass();
         Ok(())
@@ -40,16 +45,16 @@ impl<F: NorFlash, M: Motion> Server<F, M> {
     /// Checks the uploaded table and programs the slot that does not boot.
     pub(super) fn program(&mut self) -> Result<u8, Refusal> {
         self.idle()?;
-        let length = self.upload.end(&self.buffer)?;
-        let image = self.buffer.get(..length).ok_or(Refusal::UploadIncomplete)?;
-        table::decode(image).map(drop).map_err(Refusal::Table)?;
+        let length = self.upload.end(&self.buffers.image)?;
+        let image = self.buffers.image.get(..length).ok_or(Refusal::UploadIncomplete)?;
+        table::check(image).map_err(Refusal::Table)?;
         let slot = match self.last_good() {
             Some(0) => 1,
             _ => 0,
         };
         self.written = None;
         let on_probation = self.probation != Probation::None;
-        let written = self.store.write(slot, length, &mut self.buffer);
+        let written = self.store.write(slot, length, &mut self.buffers.image);
         if on_probation {
             // Its slot is gone; the engine must not keep what can no longer be read back.
             self.install_last_good();
@@ -63,7 +68,10 @@ impl<F: NorFlash, M: Motion> Server<F, M> {
     pub(super) fn commit(&mut self) -> Result<(), Refusal> {
         self.idle()?;
         let slot = self.written.ok_or(Refusal::NothingToCommit)?;
-        self.install(slot)?;
+        if let Err(refusal) = self.install(slot) {
+            self.install_last_good();
+            return Err(refusal);
+        }
         self.written = None;
         self.probation = Probation::Fresh;
         Ok(())
@@ -77,7 +85,7 @@ impl<F: NorFlash, M: Motion> Server<F, M> {
         };
         let slot = slot.ok_or(Refusal::NothingToConfirm)?;
         self.upload.abort();
-        self.store.confirm(slot, &mut self.buffer).map_err(Refusal::Flash)?;
+        self.store.confirm(slot, &mut self.buffers.image).map_err(Refusal::Flash)?;
         self.probation = Probation::None;
         Ok(())
     }
@@ -94,8 +102,11 @@ impl<F: NorFlash, M: Motion> Server<F, M> {
         let other = other.ok_or(Refusal::NothingToRollBack)?;
         self.upload.abort();
         // Read before it is confirmed: a table this image cannot use must not become the one that boots.
-        self.install(other)?;
-        if let Err(fault) = self.store.confirm(other, &mut self.buffer) {
+        if let Err(refusal) = self.install(other) {
+            self.install_last_good();
+            return Err(refusal);
+        }
+        if let Err(fault) = self.store.confirm(other, &mut self.buffers.image) {
             self.install_last_good();
             return Err(Refusal::Flash(fault));
         }

@@ -23,7 +23,10 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     }
     match (slot, generation) {
         (Some(slot), Some(generation)) => {
-            out.say(format_args!("{}: back to the table in slot {slot}, generation {generation}", controller.port()));
+            out.say(format_args!(
+                "{}: back to the table in slot {slot}, generation {generation}",
+                controller.port()
+            ));
         }
         _ => out.say(format_args!("{}: no confirmed table, bypass", controller.port())),
     }

@@ -102,8 +102,7 @@ fn offset_m(a: [f64; 3], b: [f64; 3]) -> f64 {
 fn write(path: &Path, recording: &Recording) -> Result<(), Failure> {
     let failed = |error: csv::Error| cannot_write(path, &std::io::Error::other(error));
     let mut writer = csv::Writer::from_path(path).map_err(failed)?;
-    let header =
-        ["time_s", "x_mm", "y_mm", "z_mm", "corrected_x_mm", "corrected_y_mm", "corrected_z_mm"];
+    let header = ["time_s", "x_mm", "y_mm", "z_mm", "corrected_x_mm", "corrected_y_mm", "corrected_z_mm"];
     writer.write_record(header).map_err(failed)?;
     for point in &recording.points {
         // Nanometres and microseconds, to the last digit.

@@ -77,7 +77,9 @@ fn slot_words(state: &SlotState) -> String {
     match state {
         SlotState::Empty => "empty".to_owned(),
         SlotState::Invalid => "not a whole table".to_owned(),
-        SlotState::OtherFormat { version } => format!("table of format {version}, which this image cannot read"),
+        SlotState::OtherFormat { version } => {
+            format!("table of format {version}, which this image cannot read")
+        }
         SlotState::Table(info) => {
             let confirmed = match info.generation {
                 Some(generation) => format!("generation {generation}"),

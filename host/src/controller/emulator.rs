@@ -91,10 +91,15 @@ impl Emulator {
                 .arg(format!("socket,id={name},path={},server=on,wait=off", path.display()));
             command.args(["-serial", &format!("chardev:{name}")]);
         }
-        if pace == Pace::Fast {
-            // 32 ns for an instruction, about what the 25 MHz of the board allow.
-            command.args(["-icount", "shift=5,sleep=off,align=off"]);
-        }
+        // Time counts instructions, 32 ns each (about what the 25 MHz of the board allow), so that a busy host delays
+        // the controller but never makes a tick late.
+        command.args([
+            "-icount",
+            match pace {
+                Pace::Fast => "shift=5,sleep=off,align=off",
+                Pace::Clock => "shift=5,sleep=on,align=off",
+            },
+        ]);
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut process = command.spawn().map_err(|error| failed(&error))?;
         match find_pty(&mut process) {

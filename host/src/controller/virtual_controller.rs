@@ -6,7 +6,7 @@ use super::error::ControllerError;
 use super::link::Link;
 use giotto_firmware::control::{Desk, Receiver, SEGMENTS, SET_POINTS, Sender, Shared, Tick};
 use giotto_firmware::engine::{Config, Executor, Planned, Planner};
-use giotto_firmware::server::{Board, Server, TimedSetPoint};
+use giotto_firmware::server::{Board, Buffers, Server, TimedSetPoint};
 use giotto_firmware::store::{Layout, ram::RamFlash};
 use std::collections::VecDeque;
 use std::convert::Infallible;
@@ -72,7 +72,8 @@ impl<T> Receiver<T> for Queue<T> {
 }
 
 type VirtualTick = Tick<Arc<Shared>, Queue<Planned>, Queue<TimedSetPoint>>;
-type VirtualServer = Server<Flash, Desk<Arc<Shared>, Queue<Planned>, Queue<TimedSetPoint>>>;
+type VirtualDesk = Desk<Box<Planner>, Arc<Shared>, Queue<Planned>, Queue<TimedSetPoint>>;
+type VirtualServer = Server<Flash, VirtualDesk, Box<Buffers>>;
 
 /// The port of a virtual controller: bytes for it, bytes from it.
 #[derive(Debug, Default)]
@@ -135,9 +136,9 @@ impl VirtualController {
         let (points_in, points_out) = Queue::new(SET_POINTS);
         let origin = [0; 3];
         let executor = Executor::new(origin, config.engage_ticks(), true);
-        let planner = Planner::new(&config, origin);
+        let planner = Box::new(Planner::new(&config, origin));
         let desk = Desk::new(planner, Arc::clone(&shared), segments_in, points_out);
-        let server = Server::boot(BOARD, flash, LAYOUT, desk);
+        let server = Server::boot(BOARD, flash, LAYOUT, desk, Box::default());
         let tick = Tick::new(executor, shared, segments_out, points_in);
         Self { server, tick, wires: Wires::default(), ticks: 0 }
     }

@@ -14,7 +14,7 @@
 //!
 //! The CRC is ISO-HDLC (the one of Ethernet and zip). The order of checks is magic, length, CRC, version,
 //! flags, schema, body, numbers: a flipped bit is called a flipped bit, not a newer version.
-use super::{MAX_TERMS, MAX_ZONES, Table, TableError};
+use super::{Limits, MAX_TERMS, MAX_ZONES, Table, TableError, Zone};
 use crate::wire::CRC;
 
 /// First four bytes of a table.
@@ -118,6 +118,36 @@ impl Header {
 /// # Errors
 /// The first failed check, in the order of the module's text.
 pub fn decode(bytes: &[u8]) -> Result<Table, TableError> {
+    let mut table = Table::empty();
+    decode_into(bytes, &mut table).map(|()| table)
+}
+
+/// As [`decode`], into a table that is already there. On an error `table` is not to be used.
+///
+/// # Errors
+/// As [`decode`].
+pub fn decode_into(bytes: &[u8], table: &mut Table) -> Result<(), TableError> {
+    table.zones.clear();
+    let head = read(bytes, &mut |zone| table.zones.push(zone).map_err(|_| TableError::Malformed))?;
+    (table.machine, table.limits) = head;
+    Ok(())
+}
+
+/// As [`decode`], without keeping anything: a controller has no room for two tables.
+///
+/// # Errors
+/// As [`decode`].
+pub fn check(bytes: &[u8]) -> Result<(), TableError> {
+    let mut zones = 0;
+    read(bytes, &mut |_| {
+        zones += 1;
+        if zones > MAX_ZONES { Err(TableError::Malformed) } else { Ok(()) }
+    })
+    .map(drop)
+}
+
+/// The body of an image whose header holds.
+fn body(bytes: &[u8]) -> Result<&[u8], TableError> {
     let header = Header::check(bytes)?;
     if bytes.len() > header.length {
         return Err(TableError::TooLong { length: bytes.len() as u32, max: header.length as u32 });
@@ -135,15 +165,34 @@ pub fn decode(bytes: &[u8]) -> Result<Table, TableError> {
         return Err(TableError::SchemaMismatch { found, expected: SCHEMA_HASH });
     }
     let trailer = if header.flags & FLAG_SIGNED == 0 { 0 } else { SIGNATURE_BYTES };
-    let body = header
-        .length
-        .checked_sub(trailer)
-        .and_then(|end| bytes.get(HEADER_BYTES..end))
-        .ok_or(TableError::Malformed)?;
-    match postcard::take_from_bytes::<Table>(body) {
-        Ok((table, [])) => table.validate().map(|()| table),
-        _ => Err(TableError::Malformed),
+    let end = header.length.checked_sub(trailer);
+    end.and_then(|end| bytes.get(HEADER_BYTES..end)).ok_or(TableError::Malformed)
+}
+
+/// What a table has beside its zones.
+type Head = (heapless::String<32>, Limits);
+
+/// Reads an image zone by zone. Postcard writes a struct as its fields in order and a vector as its length (LEB128)
+/// and its elements; the tests compare with the whole.
+fn read(bytes: &[u8], keep: &mut dyn FnMut(Zone) -> Result<(), TableError>) -> Result<Head, TableError> {
+    let malformed = |_| TableError::Malformed;
+    let (machine, rest) = postcard::take_from_bytes(body(bytes)?).map_err(malformed)?;
+    let (count, mut rest) = postcard::take_from_bytes::<u32>(rest).map_err(malformed)?;
+    if count == 0 {
+        return Err(TableError::NoZones);
     }
+    for index in 0..count {
+        let (zone, after) = postcard::take_from_bytes::<Zone>(rest).map_err(malformed)?;
+        zone.validate(index as usize)?;
+        keep(zone)?;
+        rest = after;
+    }
+    let (limits, rest) = postcard::take_from_bytes::<Limits>(rest).map_err(malformed)?;
+    if !rest.is_empty() {
+        return Err(TableError::Malformed);
+    }
+    limits.validate()?;
+    Ok((machine, limits))
 }
 
 /// Writes the unsigned image of `table` to the start of `out` and returns its length.

@@ -251,7 +251,7 @@ impl Limits {
 }
 
 impl Zone {
-    fn validate(&self, index: usize) -> Result<(), TableError> {
+    pub(super) fn validate(&self, index: usize) -> Result<(), TableError> {
         let check = Check(Where(Some(index as u8)));
         if let Some([lo, hi]) = self.place_m {
             for (lo, hi) in lo.into_iter().zip(hi) {

@@ -25,7 +25,7 @@ use embedded_io::{Read, ReadReady, Write};
 use embedded_storage::nor_flash::NorFlash;
 use giotto_firmware::control::{self, Desk, Shared, Tick};
 use giotto_firmware::engine::{Config, Executor, Planned, Planner};
-use giotto_firmware::server::{Board, Server, TimedSetPoint};
+use giotto_firmware::server::{Board, Buffers, Server, TimedSetPoint};
 use giotto_firmware::store::Layout;
 use heapless::spsc::{Consumer, Producer, Queue};
 
@@ -37,7 +37,8 @@ pub const LINK_PRIORITY: u8 = 0x40;
 pub const RECEIVED: usize = 1024;
 
 type BoardTick = Tick<&'static Shared, Consumer<'static, Planned>, Producer<'static, TimedSetPoint>>;
-type BoardDesk = Desk<&'static Shared, Producer<'static, Planned>, Consumer<'static, TimedSetPoint>>;
+type BoardDesk =
+    Desk<&'static mut Planner, &'static Shared, Producer<'static, Planned>, Consumer<'static, TimedSetPoint>>;
 
 static SHARED: Shared = Shared::new();
 static HAND_OVER: Mutex<RefCell<Option<BoardTick>>> = Mutex::new(RefCell::new(None));
@@ -56,11 +57,18 @@ fn SysTick() {
     *LATE = SCB::is_pendst_pending();
 }
 
+/// The server's memory. `None` if asked for twice.
+pub fn buffers() -> Option<&'static mut Buffers> {
+    singleton!(: Buffers = Buffers::new())
+}
+
 /// Prepares the engine and hands its fast half to SysTick, which is started. `None` if called twice.
+#[inline(never)] // Its frame would stay below that of the loop that never returns.
 pub fn start(syst: &mut SYST, scb: &mut SCB, clock_hz: u32) -> Option<BoardDesk> {
     let config = Config::robot(TICK_HZ);
     let segments = singleton!(: Queue<Planned, { control::SEGMENTS + 1 }> = Queue::new())?;
     let set_points = singleton!(: Queue<TimedSetPoint, { control::SET_POINTS + 1 }> = Queue::new())?;
+    let planner = singleton!(: Planner = Planner::new(&config, [0; 3]))?;
     let (segments_in, segments_out) = segments.split();
     let (points_in, points_out) = set_points.split();
     let executor = Executor::new([0; 3], config.engage_ticks(), true);
@@ -76,7 +84,7 @@ pub fn start(syst: &mut SYST, scb: &mut SCB, clock_hz: u32) -> Option<BoardDesk>
     syst.clear_current();
     syst.enable_interrupt();
     syst.enable_counter();
-    Some(Desk::new(Planner::new(&config, [0; 3]), &SHARED, segments_in, points_out))
+    Some(Desk::new(planner, &SHARED, segments_in, points_out))
 }
 
 /// What the background loop needs of a board.
@@ -94,14 +102,20 @@ pub struct Ports<L, S, G> {
 }
 
 /// Serves for ever.
-pub fn background<F, L, S, G>(board: Board, flash: F, layout: Layout, desk: BoardDesk, mut ports: Ports<L, S, G>) -> !
+pub fn background<F, L, S, G>(
+    board: Board,
+    flash: F,
+    layout: Layout,
+    (desk, buffers): (BoardDesk, &'static mut Buffers),
+    mut ports: Ports<L, S, G>,
+) -> !
 where
     F: NorFlash,
     L: Read + ReadReady + Write,
     S: Write,
     G: Write,
 {
-    let mut server = Server::boot(board, flash, layout, desk);
+    let mut server = Server::boot(board, flash, layout, desk, buffers);
     match server.active() {
         Some(slot) => defmt::info!("boot: table in slot {=u8}", slot),
         None => defmt::info!("boot: no confirmed table, bypass"),

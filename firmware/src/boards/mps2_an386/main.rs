@@ -43,9 +43,9 @@ mod image {
             let link = uart::Uart::link()?;
             vectors::enable(&mut core.NVIC);
             let desk = common::start(&mut core.SYST, &mut core.SCB, CLOCK_HZ)?;
-            Some((link, desk))
+            Some((link, desk, common::buffers()?))
         });
-        let Some((link, desk)) = started else { cortex_m::asm::udf() };
+        let Some((link, desk, buffers)) = started else { cortex_m::asm::udf() };
         watchdog::start(CLOCK_HZ);
         let ports = common::Ports {
             link,
@@ -54,6 +54,6 @@ mod image {
             feed: watchdog::feed,
             lost: uart::lost,
         };
-        common::background(BOARD, flash::Window::new(), flash::LAYOUT, desk, ports)
+        common::background(BOARD, flash::Window::new(), flash::LAYOUT, (desk, buffers), ports)
     }
 }

@@ -9,6 +9,7 @@ use giotto_shared::Direction;
 use giotto_shared::model::Cumulants;
 use giotto_shared::table::{self, Limits, Table, Travel, Zone};
 use giotto_shared::wire::{Request, TableInfo};
+use std::boxed::Box;
 use std::string::{String, ToString};
 use std::vec::Vec;
 
@@ -44,11 +45,11 @@ impl Motion for Bench {
         }
     }
 
-    fn install(&mut self, table: Option<&Table>) -> Result<(), MotionRefusal> {
+    fn install(&mut self, image: Option<&[u8]>) -> Result<(), Refusal> {
         if self.state == MotionState::Running {
-            return Err(MotionRefusal::Busy);
+            return Err(Refusal::Motion(MotionRefusal::Busy));
         }
-        self.table = table.map(|table| table.machine.to_string());
+        self.table = image.map(|image| table::decode(image).unwrap().machine.to_string());
         Ok(())
     }
 
@@ -79,14 +80,14 @@ impl Motion for Bench {
 
 /// A controller on the bench with a host beside it.
 struct Desk {
-    server: Server<Flash, Bench>,
+    server: Server<Flash, Bench, Box<Buffers>>,
     seq: u16,
 }
 
 /// Boots a controller whose flash has these cells.
 fn boot(cells: Cells, after: Option<u32>, tear: Tear) -> Desk {
     let bench = Bench { table: None, bypass: true, state: MotionState::Idle, runs: 0 };
-    let server = Server::boot(BOARD, Flash::new(cells, after, tear), LAYOUT, bench);
+    let server = Server::boot(BOARD, Flash::new(cells, after, tear), LAYOUT, bench, Box::default());
     let mut desk = Desk { server, seq: 0 };
     assert!(matches!(desk.ask(Command::Hello), Some(Reply::Identity(_))));
     desk

@@ -112,7 +112,10 @@ fn largest_table_fits_exactly() {
     table.zones.resize(MAX_ZONES, longest).unwrap();
     let image = bytes(&table);
     assert_eq!(image.len(), MAX_IMAGE_BYTES - SIGNATURE_BYTES);
-    assert_eq!(decode(&image), Ok(table));
+    assert_eq!(decode(&image), Ok(table.clone()));
+    assert_eq!(check(&image), Ok(()));
+    // Zone by zone is what postcard makes of the whole.
+    assert_eq!(postcard::from_bytes::<Table>(&image[HEADER_BYTES..]), Ok(table));
 }
 
 #[test]
@@ -160,7 +163,8 @@ fn each_breakage_has_its_own_error() {
     assert_eq!(edit(6, 2), TableError::UnknownFlags { flags: 2 });
     assert!(matches!(edit(16, !good[16]), TableError::SchemaMismatch { .. }));
     assert_eq!(edit(20, 200), TableError::Malformed);
-    assert_eq!(edit(28, 0), TableError::Malformed); // bytes left over
+    assert_eq!(edit(28, 0), TableError::NoZones);
+    assert_eq!(edit(28, 2), TableError::Malformed); // a zone missing
 }
 
 #[test]
