@@ -119,7 +119,7 @@ pub fn diagnose(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Dia
     if !campaign.runs.iter().any(|run| run.samples.deviation_m.len() >= 16) {
         return Err(DiagnosisError::Empty);
     }
-    let given = options.model.as_ref().map(given_machine).transpose()?;
+    let given = options.model.as_ref().map(Machine::from_model).transpose()?;
     let programmed: Vec<Size> = campaign.runs.iter().map(|run| Size::of(run, run.feed_m_s)).collect();
     let believed: Vec<Size> = campaign.runs.iter().map(|run| Size::of(run, believed_feed_m_s(run))).collect();
     let (start, name) = match &options.model {
@@ -194,15 +194,6 @@ pub fn diagnose(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Dia
         model: gain::extended_model(campaign, &found, effects),
         findings,
     })
-}
-
-fn given_machine(model: &ModelFile) -> Result<Machine, MachineError> {
-    let mut machine = Machine::from_model(model)?;
-    for effect in &model.effects {
-        effect.cause.model().apply(effect, &mut machine);
-    }
-    machine.check()?;
-    Ok(machine)
 }
 
 fn knows_clamp(known: &[Effect]) -> bool {

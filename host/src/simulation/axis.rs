@@ -7,6 +7,9 @@ use super::machine::{AccDec, Friction, Machine};
 /// oscillation at standstill would be taken for reversals.
 const REVERSAL_TRAVEL_M: f64 = 1e-8;
 
+/// Pieces of a step in which friction turns its sign.
+const PIECES: u32 = 8;
+
 /// Steps of one length.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grid {
@@ -65,27 +68,22 @@ pub(super) fn motion(
         let y = stepper.as_mut().map_or(u, |stepper| stepper.step(u));
 
         let mut turn = memory.as_ref().and_then(|_| turning_point(y, h));
+        let mut behind = 0.0;
         let last = k + 1 == grid.steps;
         while let Some(t) = times.next_if(|t| *t < t0 + h || last) {
             let s = ((t - t0) / h).clamp(0.0, 1.0);
             let [drive_m, velocity] = hermite(y, h, s);
             let mut point = AxisPoint { drive_m, velocity_m_s: velocity, error_m: 0.0, sign: 0.0 };
             if let Some(memory) = &mut memory {
-                if let Some(turn_s) = turn.filter(|turn_s| *turn_s <= s) {
-                    memory.visit(t0 + h * turn_s, hermite(y, h, turn_s)[0]);
-                    turn = None;
-                }
-                memory.visit(t, drive_m);
+                memory.follow(t0, h, y, [behind, s], &mut turn);
+                behind = s;
                 point.error_m = memory.error_m(drive_m, velocity);
                 point.sign = memory.sign;
             }
             points.push(point);
         }
         if let Some(memory) = &mut memory {
-            if let Some(turn_s) = turn {
-                memory.visit(t0 + h * turn_s, hermite(y, h, turn_s)[0]);
-            }
-            memory.visit(t0 + h, y[2]);
+            memory.follow(t0, h, y, [behind, 1.0], &mut turn);
         }
     }
     points
@@ -143,6 +141,28 @@ impl Memory {
         })
     }
 
+    /// Goes along a step `y` from share to share, by way of its turning point and, while friction is turning
+    /// its sign, in pieces.
+    fn follow(&mut self, t0: f64, h: f64, y: [f64; 4], [from, to]: [f64; 2], turn: &mut Option<f64>) {
+        let mut from = from;
+        let mut turning = self.is_turning();
+        if let Some(s) = turn.take_if(|s| *s <= to) {
+            self.visit(t0 + h * s, hermite(y, h, s)[0]);
+            from = s;
+            turning = self.friction.is_some();
+        }
+        let pieces = if turning { PIECES } else { 1 };
+        for k in 1..=pieces {
+            let s = from + (to - from) * f64::from(k) / f64::from(pieces);
+            self.visit(t0 + h * s, hermite(y, h, s)[0]);
+        }
+    }
+
+    /// Whether friction is between its two signs.
+    fn is_turning(&self) -> bool {
+        self.friction.is_some_and(|f| f.presliding_m > 0.0) && self.slide.abs() < 0.999
+    }
+
     /// Takes notice of the drive's position; every extreme has to be visited.
     fn visit(&mut self, t: f64, x: f64) {
         let gap = self.half_backlash_m.abs();
@@ -177,8 +197,9 @@ impl Memory {
         let step_s = t - last_t;
         for (answer, tau) in self.answers.iter_mut().zip([friction.decay_s, friction.rise_s]) {
             let ratio = step_s / tau;
-            // A change spread evenly over the step; a rise of zero answers nothing.
+            // A change spread evenly over the step, or with it all at its beginning; a rise of zero answers nothing.
             let [keep, take] = match ratio.is_finite() {
+                true if stay == 0.0 => [(-ratio).exp(); 2],
                 true if ratio > 1e-9 => [(-ratio).exp(), (1.0 - (-ratio).exp()) / ratio],
                 true => [1.0, 1.0],
                 false => [0.0, 0.0],

@@ -349,3 +349,21 @@ fn nonsense_comes_back_as_nan() {
         assert!(trace.deviation_m.iter().all(|d| d.is_nan()), "{radius} {feed}");
     }
 }
+
+/// A sample every 94 ms or every 3 ms: the pulse, of 30 ms, is the same where both look.
+#[test]
+fn friction_does_not_depend_on_the_steps() {
+    for presliding_m in [0.0, 2e-6, 30e-6] {
+        let friction =
+            Friction { peak_m: 10e-6, decay_s: 0.03, rise_s: 0.002, presliding_m, ..Friction::default() };
+        let machine = Machine { friction: [Some(friction); 2], ..loops(40.0, 0.0) };
+        let lap = |samples| {
+            let test = CircleTest { samples: Some(samples), ..CircleTest::new(0.3, 0.02, Ccw) };
+            circle(&machine, &test).deviation_m
+        };
+        let (coarse, fine) = (lap(1000), lap(32_000));
+        let off = coarse.iter().zip(fine.iter().step_by(32)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 0.05 * 10e-6, "{presliding_m}: {off:e}");
+        assert!(fine.iter().copied().fold(0.0, f64::max) > 0.5e-6, "{presliding_m}: there is a pulse");
+    }
+}

@@ -8,7 +8,7 @@ const FEED_FORWARD_MAX_RATIO: f64 = 18.0;
 const LAG_RATIO_TOLERANCE: f64 = 1e-9;
 
 impl Machine {
-    /// The machine of a model's servo law; its effects are added by the causes.
+    /// The machine of a model: its servo law, and its effects as their causes put them in.
     ///
     /// `Lag` and `SecondOrder` are taken as they are. `Beta` becomes the simplest stable chain with the same
     /// κ2 = −2β1 and κ4 = 24β2 − 3κ2²:
@@ -26,10 +26,15 @@ impl Machine {
     /// # Errors
     /// Coefficients that are not finite, or that only a machine slower than the simulation allows can have.
     pub fn from_model(model: &ModelFile) -> Result<Self, MachineError> {
-        Self::from_servo(&model.servo)
+        let mut machine = Self::from_servo(&model.servo)?;
+        for effect in &model.effects {
+            effect.cause.model().apply(effect, &mut machine);
+        }
+        machine.check()?;
+        Ok(machine)
     }
 
-    /// As [`Self::from_model`], of the radius law alone.
+    /// As [`Self::from_model`], without effects.
     ///
     /// # Errors
     /// As [`Self::from_model`].

@@ -31,7 +31,7 @@ fn load(text: &str) -> Result<Plan, TomlFileError> {
     std::fs::write(&file, text).unwrap();
     std::fs::write(
         dir.path().join("model.toml"),
-        "format = 1\ncampaign = \"c\"\nmachine = \"m\"\n[servo]\nkind = \"lag\"\nkv_per_s = 40.0\n[valid]\nradius_mm = [1.0, 2.0]\nfeed_mm_s = [1.0, 2.0]\n",
+        "format = 1\ncampaign = \"c\"\nmachine = \"m\"\n[servo]\nkind = \"lag\"\nkv_per_s = 40.0\n[valid]\nradius_mm = [1.0, 2.0]\nfeed_mm_s = [1.0, 2.0]\n[[effect]]\ncause = \"backlash\"\naxis = \"y\"\nvalue = 0.004\n",
     )
     .unwrap();
     Plan::load(&file).map_err(|mut e| {
@@ -62,6 +62,7 @@ fn model_and_runs_may_stand_instead() {
     let runs = "model = \"model.toml\"\n[[run]]\nradius_mm = 100.0\nfeed_mm_s = 50.0\ndirection = \"cw\"\nstarted_s = 30.0\n[[run]]\nradius_mm = 150.0\nfeed_mm_s = 60.0\ndirection = \"ccw\"\nstart_angle_deg = 90.0\ncentre_mm = [1.0, 2.0, 3.0]\n";
     let plan = load(runs).unwrap();
     assert_eq!(plan.machine.servo[0].kv_per_s, 40.0);
+    assert!((plan.machine.backlash_m[1] - 4e-6).abs() < 1e-15 && plan.machine.backlash_m[0] == 0.0);
     assert_eq!(plan.instrument, Instrument::ballbar());
     let result = campaign(&plan, 4);
     assert_eq!(result.runs[0].started_s, Some(30.0));
