@@ -382,13 +382,36 @@ const PROMISING: usize = 6;
 fn propose_patterns(found: &mut Explained, runs: &[Prepared]) {
     let left = residual(found);
     let noise = found.spread.noise_m2;
-    let harmonics: Vec<_> = runs.iter().zip(&left).map(|(run, left)| run.basis.harmonics(left)).collect();
-    let mut ranked: Vec<(f64, Pattern)> = Pattern::harmonics(ORDERS)
+    let harmonics: Vec<_> = runs.par_iter().zip(&left).map(|(run, left)| run.basis.harmonics(left)).collect();
+    // Also beside each chosen cause as if it were not there: a pattern may describe its data better.
+    let mut views = vec![harmonics.clone()];
+    let columns = columns_of(&found.nuisance, &found.items, &found.chosen);
+    for &item in found.chosen.iter().filter(|&&item| found.items[item].listed()) {
+        let mut with = harmonics.clone();
+        for &column in &found.items[item].columns {
+            let at = columns.iter().position(|&c| c == column);
+            let amount = at.map_or(0.0, |at| found.solution.coefficients[at]);
+            with.par_iter_mut().zip(runs).zip(found.ledger.samples(column)).for_each(
+                |((with, run), samples)| {
+                    for (with, own) in with.iter_mut().zip(run.basis.harmonics(samples)) {
+                        with[0] += amount * own[0];
+                        with[1] += amount * own[1];
+                    }
+                },
+            );
+        }
+        views.push(with);
+    }
+    let candidates: Vec<(usize, Pattern)> = (0..views.len())
+        .flat_map(|view| Pattern::harmonics(ORDERS).into_iter().map(move |p| (view, p)))
+        .collect();
+    let mut ranked: Vec<(f64, f64, Pattern)> = candidates
         .into_par_iter()
-        .map(|pattern| {
-            let Pattern::Harmonic { order, odd, machine, .. } = pattern else { return (0.0, pattern) };
-            let (mut re, mut im, mut own) = (0.0, 0.0, 0.0);
-            for (run, harmonics) in runs.iter().zip(&harmonics) {
+        .map(|(view, pattern)| {
+            let harmonics = &views[view];
+            let Pattern::Harmonic { order, odd, machine, .. } = pattern else { return (0.0, 0.0, pattern) };
+            let (mut re, mut im, mut own, mut energy) = (0.0, 0.0, 0.0, 0.0);
+            for (run, harmonics) in runs.iter().zip(harmonics) {
                 let between = found.spread.order_m2[order];
                 let variance = between + 2.0 * noise / run.deviation_m.len() as f64;
                 let size = pattern.size(run) * if odd { run.view.sign } else { 1.0 };
@@ -398,13 +421,18 @@ fn propose_patterns(found: &mut Explained, runs: &[Prepared]) {
                 re += size * (c * cos + s * sin) / variance;
                 im += size * (s * cos - c * sin) / variance;
                 own += size * size / variance;
+                energy += 0.5 * run.deviation_m.len() as f64 * size * size;
             }
-            (if own > 0.0 { (re * re + im * im) / own } else { 0.0 }, pattern)
+            if own > 0.0 {
+                ((re * re + im * im) / own, energy * (re * re + im * im) / (own * own), pattern)
+            } else {
+                (0.0, 0.0, pattern)
+            }
         })
         .collect();
     let places = place_means(runs, &left);
     ranked.par_extend(Pattern::bumps().into_par_iter().map(|pattern| {
-        let Pattern::Bump { centre_rad, width_rad, odd, .. } = pattern else { return (0.0, pattern) };
+        let Pattern::Bump { centre_rad, width_rad, odd, .. } = pattern else { return (0.0, 0.0, pattern) };
         let weights = bump_weights(centre_rad, width_rad);
         let (mut sum, mut own) = (0.0, 0.0);
         for (run, means) in runs.iter().zip(&places) {
@@ -415,20 +443,21 @@ fn propose_patterns(found: &mut Explained, runs: &[Prepared]) {
                 own += (size * weight).powi(2) / variance;
             }
         }
-        (if own > 0.0 { sum * sum / own } else { 0.0 }, pattern)
+        // What takes χ² off white samples takes noise²·χ² of energy.
+        let gain = if own > 0.0 { sum * sum / own } else { 0.0 };
+        (gain, gain * noise, pattern)
     }));
     let (_, whole) = energies(found, &vec![1.0; runs.len()]);
     let count = samples(runs);
     let smallest =
         (SMALLEST_OF_NOISE * found.spread.noise_m()).max(SMALLEST_OF_EXPLAINED[1] * (whole / count).sqrt());
-    ranked.retain(|(gain, pattern)| {
+    ranked.retain(|(gain, energy, pattern)| {
         let kind = Kind::Pattern(*pattern);
-        // What takes χ² off white samples takes noise²·χ² of energy.
-        let rms = (gain * noise / count).sqrt();
+        let rms = (energy / count).sqrt();
         *gain > price(&kind, 1) && rms > 0.3 * smallest && !found.items.iter().any(|item| item.kind == kind)
     });
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-    for (_, pattern) in ranked.into_iter().take(PROMISING) {
+    for (_, _, pattern) in ranked.into_iter().take(PROMISING) {
         let kind = Kind::Pattern(pattern);
         let columns = (0..width(&kind)).map(|i| found.ledger.push(runs, column(&kind, i, runs))).collect();
         found.items.push(Item { price: price(&kind, 1), columns, kind, fitted_beside: None });
