@@ -327,6 +327,7 @@ fn broken_files_are_refused_by_line() {
         lines[number - 1] = lines[number - 1].replacen(from, to, 1);
         lines.join("\n").chars().map(|c| u32::from(c) as u8).collect::<Vec<u8>>()
     };
+    #[allow(clippy::type_complexity, reason = "a table of cases, read once")]
     let cases: Vec<(&str, Vec<u8>, &[&str], &[&str])> = vec![
         (
             "text in a number",

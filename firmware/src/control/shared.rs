@@ -41,13 +41,12 @@ const FAULT: u8 = 3;
 impl Shared {
     /// At rest at the origin, bypassed.
     pub const fn new() -> Self {
-        const NM: AtomicI32 = AtomicI32::new(0);
         Self {
             tick: AtomicU32::new(0),
             state: AtomicU8::new(REST),
             epoch: AtomicU8::new(0),
-            raw_nm: [NM; 3],
-            corrected_nm: [NM; 3],
+            raw_nm: [const { AtomicI32::new(0) }; 3],
+            corrected_nm: [const { AtomicI32::new(0) }; 3],
             overruns: AtomicU32::new(0),
             offset_cuts: AtomicU32::new(0),
             slew_cuts: AtomicU32::new(0),

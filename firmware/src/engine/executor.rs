@@ -263,6 +263,7 @@ impl Executor {
     }
 
     #[inline(never)]
+    #[allow(clippy::too_many_arguments, reason = "scalars in registers: a struct would go through memory")]
     fn out_with_care(&mut self, nx: i32, ny: i32, nz: i32, wx: i32, wy: i32, wz: i32, flags: u16) -> Output {
         self.finish([nx, ny, nz], [wx, wy, wz], flags)
     }

@@ -80,7 +80,9 @@ pub struct Store<F> {
 
 impl<F: NorFlash> Store<F> {
     const FITS: () = assert!(
-        RECORD_BYTES % F::WRITE_SIZE == 0 && PIECE % F::WRITE_SIZE == 0 && F::READ_SIZE == 1,
+        RECORD_BYTES.is_multiple_of(F::WRITE_SIZE)
+            && PIECE.is_multiple_of(F::WRITE_SIZE)
+            && F::READ_SIZE == 1,
         "flash geometry not supported"
     );
 

@@ -35,7 +35,7 @@ pub(super) fn read(path: &Path, out: Output) -> Result<TableFile, Failure> {
         let table = table::decode(&bytes).map_err(|error| bad_table(path, &error))?;
         return Ok(TableFile { table, image: bytes });
     }
-    if !path.extension().is_some_and(|extension| extension == "toml") {
+    if path.extension().is_none_or(|extension| extension != "toml") {
         return Err(Failure::input(format_args!("{shown}: not a giotto table; expected {expected}"))
             .help("make one with `giotto table MODEL.toml -o TABLE.bin`"));
     }

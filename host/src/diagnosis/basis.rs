@@ -18,6 +18,10 @@ pub struct Basis {
     triangle: [[f64; COLUMNS]; COLUMNS],
 }
 
+#[allow(
+    clippy::needless_range_loop,
+    reason = "columns, rows and orders are numbers here, not places in a list"
+)]
 impl Basis {
     /// Gram–Schmidt (twice) on 1, cosθ, sinθ, …; a column that the earlier ones already span is left out as zero.
     pub fn new(angle_rad: &[f64]) -> Self {

@@ -44,11 +44,6 @@ impl Ledger {
         ledger
     }
 
-    /// Number of columns, the data included.
-    pub fn len(&self) -> usize {
-        self.entries.len()
-    }
-
     /// Adds a column and gives its number.
     pub fn push(&mut self, runs: &[Prepared], samples: Samples) -> usize {
         let at = self.entries.len();

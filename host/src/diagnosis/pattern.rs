@@ -152,11 +152,13 @@ impl Pattern {
         for order in 2..=highest {
             for law in LAWS {
                 for odd in [false, true] {
-                    let covered = match (order, law.feed, law.radius, odd) {
-                        (2, 0.0, 1.0, false) | (2, 2.0, -1.0, false) | (2, 1.0, 0.0, true) => true,
-                        (3, 0.0, 2.0, false) => true,
-                        _ => false,
-                    };
+                    let covered = matches!(
+                        (order, law.feed, law.radius, odd),
+                        (2, 0.0, 1.0, false)
+                            | (2, 2.0, -1.0, false)
+                            | (2, 1.0, 0.0, true)
+                            | (3, 0.0, 2.0, false)
+                    );
                     if !covered {
                         out.extend([true, false].map(|machine| Self::Harmonic { order, odd, machine, law }));
                     }

@@ -223,6 +223,7 @@ fn measure_lag(runs: &[Prepared], response: &Response) -> Lag {
         .unwrap_or(guess);
     let mut tau3 = 0.0;
     let mut step = [widest / 80.0, 0.2 * tau.abs().max(1e-3) / (fastest * fastest)];
+    #[allow(clippy::needless_range_loop, reason = "the axis is a choice of parameter")]
     for _ in 0..60 {
         for axis in 0..2 {
             let at =

@@ -319,9 +319,8 @@ fn complete(cause: Cause, found: &Explained, item: usize, params: &mut BTreeMap<
             params.insert("over_radius_mm".into(), largest * 1e3);
         }
         Cause::ThermalDrift => {
-            if !params.get("settling").is_some_and(|s| s.is_finite()) {
-                params.insert("settling".into(), 0.0);
-            }
+            let settling = params.get("settling").copied().filter(|share| share.is_finite());
+            params.insert("settling".into(), settling.unwrap_or(0.0));
         }
         Cause::Backlash => {
             params.remove("play_m");
