@@ -8,6 +8,9 @@ use nalgebra::{DMatrix, DVector};
 /// Column norms are 1: a diagonal of R below this is rounding, not information.
 const RANK_TOLERANCE: f64 = 1e-11;
 
+/// Rows that are brought to a triangle at a time: they stay in cache.
+const BLOCK_ROWS: usize = 256;
+
 /// Observations and all candidate columns, reduced to a triangle.
 #[derive(Clone, Debug)]
 pub struct Triangle {
@@ -83,25 +86,42 @@ impl Triangle {
             }
         }
         let width = columns.len() + 1;
-        let (mut scales, mut means) = (Vec::with_capacity(width), Vec::with_capacity(width));
-        let mut matrix = DMatrix::zeros(n, width);
-        let all = columns.iter().map(|c| c.1).chain([observations]);
-        for (values, mut to) in all.zip(matrix.column_iter_mut()) {
-            let mean = if intercept { mean(values) } else { 0.0 };
-            for (to, value) in to.iter_mut().zip(values) {
-                *to = value - mean;
+        let all: Vec<&[f64]> = columns.iter().map(|c| c.1).chain([observations]).collect();
+        let means: Vec<f64> = all.iter().map(|values| if intercept { mean(values) } else { 0.0 }).collect();
+        // Largest values first to 1: squares neither overflow nor vanish.
+        let largest: Vec<f64> = all
+            .iter()
+            .zip(&means)
+            .map(|(values, mean)| values.iter().fold(0.0, |top: f64, v| top.max((v - mean).abs())))
+            .map(|top| if top > 0.0 { top } else { 1.0 })
+            .collect();
+        let mut r = DMatrix::zeros(0, width);
+        for start in (0..n).step_by(BLOCK_ROWS) {
+            // The triangle so far, over the next rows: its triangle is that of all rows up to here.
+            let (above, rows) = (r.nrows(), BLOCK_ROWS.min(n - start));
+            let mut block = r.resize_vertically(above + rows, 0.0);
+            for (j, values) in all.iter().enumerate() {
+                let to = block.column_mut(j);
+                for (to, value) in to.into_iter().skip(above).zip(&values[start..]) {
+                    *to = (value - means[j]) / largest[j];
+                }
             }
-            // Largest value first: squares neither overflow nor vanish.
-            let largest = to.amax();
-            let scale = if largest > 0.0 { largest * (&to / largest).norm() } else { 1.0 };
-            to /= scale;
-            scales.push(scale);
-            means.push(mean);
+            r = block.qr().unpack_r();
         }
-        let total = if matrix.column(width - 1).amax() > 0.0 { scales[width - 1].powi(2) } else { 0.0 };
+        let mut scales = largest;
+        for (mut column, scale) in r.column_iter_mut().zip(&mut scales) {
+            let norm = column.norm();
+            if norm > 0.0 {
+                column /= norm;
+                *scale *= norm;
+            } else {
+                *scale = 1.0;
+            }
+        }
+        let total = if r.column(width - 1).amax() > 0.0 { scales[width - 1].powi(2) } else { 0.0 };
         Ok(Self {
             names: columns.iter().map(|c| c.0.to_owned()).collect(),
-            r: matrix.qr().unpack_r(),
+            r,
             scales,
             means: intercept.then_some(means),
             observations: n,

@@ -198,15 +198,18 @@ fn core(observations: &[Observation], options: &Options) -> Result<Core, FitErro
     let rules = StepwiseOptions { enter: options.alpha, remove: options.alpha, partial_f: options.partial_f };
     let selection = stepwise(&triangle, &forced, &[0, 1], rules)?;
     let both: Vec<usize> = forced.iter().copied().chain([0, 1]).collect();
-    let full = triangle.solve(&both)?;
+    let full = if selection.columns == both { selection.fit.clone() } else { triangle.solve(&both)? };
+    let full_t = critical_t(ALPHA, full.dof)?;
     let mut beta = [0.0; 2];
     let mut ci95 = [[0.0; 2]; 2];
     for term in 0..2 {
         if let Some(j) = selection.columns.iter().position(|&c| c == term) {
             beta[term] = selection.fit.coefficients[j];
-            ci95[term] = interval(&selection.fit, j)?;
+            let t =
+                if selection.fit.dof == full.dof { full_t } else { critical_t(ALPHA, selection.fit.dof)? };
+            ci95[term] = interval(&selection.fit, j, t);
         } else {
-            ci95[term] = interval(&full, forced.len() + term)?;
+            ci95[term] = interval(&full, forced.len() + term, full_t);
         }
     }
     let offsets_m = radii
@@ -223,22 +226,21 @@ fn core(observations: &[Observation], options: &Options) -> Result<Core, FitErro
         steps: selection.steps,
         offsets_m,
         deviation_m: selection.fit.deviation(),
-        ratio95: ratio_interval(&full, forced.len())?,
+        ratio95: ratio_interval(&full, forced.len(), full_t),
     })
 }
 
 /// β ± t_{α/2; n−p}·√(σ²C) (Eq. 20).
-fn interval(fit: &LeastSquares, j: usize) -> Result<[f64; 2], FitError> {
-    let half = critical_t(ALPHA, fit.dof)? * fit.standard_error(j);
-    Ok([fit.coefficients[j] - half, fit.coefficients[j] + half])
+fn interval(fit: &LeastSquares, j: usize, t: f64) -> [f64; 2] {
+    let half = t * fit.standard_error(j);
+    [fit.coefficients[j] - half, fit.coefficients[j] + half]
 }
 
 /// Interval of κ4/κ2² = 6β2/β1² − 3 for β1, β2 at `first` and the next place. Unbounded while β1 may be zero.
-fn ratio_interval(fit: &LeastSquares, first: usize) -> Result<[f64; 2], FitError> {
+fn ratio_interval(fit: &LeastSquares, first: usize, t: f64) -> [f64; 2] {
     let (b1, b2) = (fit.coefficients[first], fit.coefficients[first + 1]);
-    let t = critical_t(ALPHA, fit.dof)?;
     if b1.abs() <= t * fit.standard_error(first) {
-        return Ok([f64::NEG_INFINITY, f64::INFINITY]);
+        return [f64::NEG_INFINITY, f64::INFINITY];
     }
     let (d1, d2) = (-12.0 * b2 / b1.powi(3), 6.0 / (b1 * b1));
     let variance = d1 * d1 * fit.covariance(first, first)
@@ -246,7 +248,7 @@ fn ratio_interval(fit: &LeastSquares, first: usize) -> Result<[f64; 2], FitError
         + d2 * d2 * fit.covariance(first + 1, first + 1);
     let ratio = 6.0 * b2 / (b1 * b1) - 3.0;
     let half = t * variance.max(0.0).sqrt();
-    Ok([ratio - half, ratio + half])
+    [ratio - half, ratio + half]
 }
 
 /// Runs of one radius that had no part in `model`, beside it. Their offset is no matter of the servo and cannot be predicted:

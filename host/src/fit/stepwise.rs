@@ -109,15 +109,16 @@ pub fn stepwise(
         }
         columns.push(enter.column);
         fit = with;
-        while let Some((leave, without)) =
-            weakest(triangle, &columns, forced.len(), &fit, remove, options.partial_f)?
-        {
-            if leave.column == enter.column {
-                break;
+        // The only one there is the one that has just come in.
+        while columns.len() > forced.len() + 1 {
+            match weakest(triangle, &columns, forced.len(), &fit, remove, options.partial_f)? {
+                Some(leave) if leave.column != enter.column => {
+                    steps.push(leave);
+                    columns.retain(|&c| c != leave.column);
+                    fit = triangle.solve(&columns)?;
+                }
+                Some(_) | None => break,
             }
-            steps.push(leave);
-            columns.retain(|&c| c != leave.column);
-            fit = without;
         }
     }
     Ok(Selection { columns, steps, fit })
@@ -160,7 +161,8 @@ fn strongest(
     Ok(best)
 }
 
-/// The column with the smallest F, if that is below the bar.
+/// The column with the smallest F, if that is below the bar. What a column explains beyond the others is b²/C, without
+/// another fit.
 fn weakest(
     triangle: &Triangle,
     columns: &[usize],
@@ -168,17 +170,23 @@ fn weakest(
     fit: &LeastSquares,
     remove: f64,
     rule: PartialF,
-) -> Result<Option<(Step, LeastSquares)>, FitError> {
-    let mut worst: Option<(Step, LeastSquares)> = None;
+) -> Result<Option<Step>, FitError> {
     let parameters = triangle.parameters(columns.len());
-    for &column in &columns[forced..] {
-        let rest: Vec<usize> = columns.iter().copied().filter(|&c| c != column).collect();
-        let without = triangle.solve(&rest)?;
-        let (f, dof) = partial_f(rule, &without, fit, parameters);
-        if worst.as_ref().is_none_or(|(step, _)| f < step.partial_f) {
-            let critical_f = critical_f(remove, dof.0, dof.1)?;
-            worst = Some((Step { action: Action::Remove, column, partial_f: f, critical_f, dof }, without));
-        }
-    }
-    Ok(worst.filter(|(step, _)| step.partial_f < step.critical_f))
+    let constant = parameters - columns.len();
+    let numerator = match rule {
+        PartialF::Textbook => 1,
+        PartialF::Paper => parameters,
+    };
+    let gained = |place: usize| {
+        let j = constant + place;
+        fit.coefficients[j].powi(2) / fit.unscaled_covariance[(j, j)]
+    };
+    let Some(place) = (forced..columns.len()).min_by(|&a, &b| gained(a).total_cmp(&gained(b))) else {
+        return Ok(None);
+    };
+    let partial_f = gained(place) / numerator as f64 / fit.variance();
+    let dof = (numerator, fit.dof);
+    let critical_f = critical_f(remove, dof.0, dof.1)?;
+    let step = Step { action: Action::Remove, column: columns[place], partial_f, critical_f, dof };
+    Ok((partial_f < critical_f).then_some(step))
 }

@@ -77,7 +77,7 @@ impl fmt::Display for CircleError {
 impl core::error::Error for CircleError {}
 
 /// Points that are enough for a start: at a noise of 1e-5 of the radius one Newton step from their circle is the end.
-const FEW: usize = 32768;
+const FEW: usize = 131_072;
 /// The few are taken in runs of this length, for memory comes in lines and pages.
 const RUN: usize = 64;
 /// From this many points on a fit starts from [`FEW`] of them instead of the algebraic circle of all: two passes over
