@@ -59,7 +59,7 @@ impl Engage {
             return offset;
         }
         if self.blending {
-            let (x, end) = self.clock.advance();
+            let (x, end) = if self.heading { self.clock.rise() } else { self.clock.fall() };
             self.share_q31 = match (end, self.heading) {
                 (true, true) => i32::MAX,
                 (true, false) => 0,

@@ -10,7 +10,7 @@ use super::guard::Guard;
 use super::planned::{Kind, Planned};
 use super::ramp::{Clock, POLYNOMIAL, Shapes, shapes};
 use super::{Counters, Fault, Output, flag};
-use giotto_shared::angle::{SinCos, sincos_with};
+use giotto_shared::angle::sincos;
 use giotto_shared::fixed::mulh;
 
 /// Where the next segment comes from: the receiving end of a lock-free queue.
@@ -39,12 +39,18 @@ enum Mode {
     Settle,
     /// Stands still for a time.
     Dwell,
-    /// Arc without profile terms at constant rate.
+    /// Arc without profile terms at constant rate, its change of offset proven by the planner.
     ArcCruise,
-    /// Arc without profile terms in a rising ramp.
+    /// The same in a rising ramp.
     ArcRise,
-    /// Arc without profile terms in a falling ramp.
+    /// The same in a falling ramp.
     ArcFall,
+    /// Arc with profile terms at constant rate.
+    TermCruise,
+    /// The same in a rising ramp.
+    TermRise,
+    /// The same in a falling ramp.
+    TermFall,
     /// Any segment at constant rate.
     Cruise,
     /// Any segment in a rising ramp.
@@ -65,7 +71,6 @@ pub struct Executor {
     phase: u64,
     clock: Clock,
     segment: Planned,
-    sincos: SinCos,
     ramp: [i32; 3],
     guard: Guard,
     engage: Engage,
@@ -97,7 +102,6 @@ impl Executor {
             phase: 0,
             clock: Clock::default(),
             segment: Planned::default(),
-            sincos: SinCos::NEW,
             ramp: POLYNOMIAL,
             // Bounds of 0 take the careful way, which also minds the engagement.
             guard: Guard::new(0, 0),
@@ -190,12 +194,12 @@ impl Executor {
         self.counters.stops = self.counters.stops.wrapping_add(1);
         let timing = &self.segment.timing;
         match self.mode {
-            Mode::ArcCruise | Mode::Cruise => {
+            Mode::ArcCruise | Mode::TermCruise | Mode::Cruise => {
                 let distance = (timing.step >> 1).wrapping_mul(u64::from(timing.ramp_ticks));
                 self.end = self.phase.wrapping_add(distance);
                 self.begin_fall();
             }
-            Mode::ArcRise | Mode::Rise => {
+            Mode::ArcRise | Mode::TermRise | Mode::Rise => {
                 // ∫ of the two ramps together: one step for each tick between their starts.
                 let apart = self.clock.elapsed();
                 self.end = timing.start.wrapping_add(timing.step.wrapping_mul(u64::from(apart)));
@@ -214,6 +218,9 @@ impl Executor {
             Mode::ArcCruise => self.arc_cruise(),
             Mode::ArcRise => self.arc_ramp::<false>(),
             Mode::ArcFall => self.arc_ramp::<true>(),
+            Mode::TermCruise => self.term_cruise(),
+            Mode::TermRise => self.term_ramp::<false>(),
+            Mode::TermFall => self.term_ramp::<true>(),
             Mode::Cruise => self.cruise(),
             Mode::Rise => self.any_ramp(false),
             Mode::Fall => self.any_ramp(true),
@@ -230,17 +237,12 @@ impl Executor {
         self.phase = phase;
         self.left = self.left.wrapping_sub(1);
         if self.left == 0 {
-            self.begin_arc_fall();
+            self.begin_fall();
         }
-        self.arc_steady(phase, flag::MOVING | flag::CRUISE)
-    }
-
-    #[inline(always)]
-    fn arc_steady(&mut self, phase: u64, flags: u16) -> Output {
-        let (c, s) = sincos_with(&self.sincos, (phase >> 32) as u32);
+        let (c, s) = sincos((phase >> 32) as u32);
         let [x, y, z] = &self.segment.axes;
         let wanted = [x.steady(c, s), y.steady(c, s), z.steady(c, s)];
-        self.arc_out(c, s, wanted, flags)
+        self.arc_out(c, s, wanted, flag::MOVING | flag::CRUISE)
     }
 
     /// The offset first, the position last: so the tick needs the fewest registers. The rare case is a call with
@@ -248,7 +250,7 @@ impl Executor {
     #[inline(always)]
     fn arc_out(&mut self, c: i32, s: i32, wanted: [i32; 3], flags: u16) -> Output {
         let [wx, wy, wz] = wanted;
-        if !self.guard.pass_easily([wx, wy, wz]) {
+        if !self.guard.small([wx, wy, wz]) {
             return self.arc_out_with_care(c, s, wx, wy, wz, flags);
         }
         let [x, y, z] = &self.segment.axes;
@@ -262,53 +264,86 @@ impl Executor {
         self.finish(nominal, [wx, wy, wz], flags)
     }
 
-    #[inline(never)]
-    #[allow(clippy::too_many_arguments, reason = "scalars in registers: a struct would go through memory")]
-    fn out_with_care(&mut self, nx: i32, ny: i32, nz: i32, wx: i32, wy: i32, wz: i32, flags: u16) -> Output {
-        self.finish([nx, ny, nz], [wx, wy, wz], flags)
-    }
-
     #[inline(always)]
     fn arc_ramp<const FALLING: bool>(&mut self) -> Output {
-        let (x, end) = self.clock.advance();
+        let (x, end) = if FALLING { self.clock.fall() } else { self.clock.rise() };
         if end {
-            return if FALLING { self.standstill() } else { self.arc_top() };
+            return if FALLING { self.standstill() } else { self.top() };
         }
         let shape = shapes(&self.ramp, x);
         let step = scaled(self.segment.timing.step, shape.s_q32);
         self.phase = self.phase.wrapping_add(step);
         let law = if FALLING { &self.segment.fall } else { &self.segment.rise };
         let phase_q32 = ramp_phase(self.phase, step, law.end_term(&shape));
-        let (c, s) = sincos_with(&self.sincos, phase_q32);
+        let (c, s) = sincos(phase_q32);
         let (re, im) = law.gain(&shape, c, s);
         let [x, y, z] = &self.segment.axes;
         let [nx, ny, nz] = [x.on_arc(c, s), y.on_arc(c, s), z.on_arc(c, s)];
         let [wx, wy, wz] = [x.turned(re, im), y.turned(re, im), z.turned(re, im)];
-        if !self.guard.pass_easily([wx, wy, wz]) {
-            return self.out_with_care(nx, ny, nz, wx, wy, wz, flag::MOVING);
+        if !self.guard.small([wx, wy, wz]) {
+            return self.arc_out_with_care(c, s, wx, wy, wz, flag::MOVING);
         }
         Output::new([nx, ny, nz], [wx, wy, wz], flag::MOVING)
     }
 
-    /// Top of the rising ramp of an arc: the phase is set to its exact value.
     #[inline(never)]
-    fn arc_top(&mut self) -> Output {
-        let phase = self.segment.timing.up;
+    fn term_cruise(&mut self) -> Output {
+        let phase = self.phase.wrapping_add(self.segment.timing.step);
         self.phase = phase;
-        self.left = self.segment.timing.cruise_ticks;
-        self.mode = Mode::ArcCruise;
+        let (c, s) = sincos((phase >> 32) as u32);
+        let [x, y, z] = &self.segment.axes;
+        let nominal = [x.on_arc(c, s), y.on_arc(c, s), z.on_arc(c, s)];
+        let wanted = [x.steady(c, s), y.steady(c, s), z.steady(c, s)];
+        let around = ([x.turned(c, s), y.turned(c, s)], self.segment.extra.ahead_at(c, s));
+        self.left = self.left.wrapping_sub(1);
         if self.left == 0 {
-            self.begin_arc_fall();
+            self.begin_fall();
         }
-        self.arc_steady(phase, flag::MOVING)
+        self.term_out(nominal, wanted, around, flag::MOVING | flag::CRUISE)
     }
 
+    #[inline(never)]
+    fn term_ramp<const FALLING: bool>(&mut self) -> Output {
+        let (x, end) = if FALLING { self.clock.fall() } else { self.clock.rise() };
+        if end {
+            return if FALLING { self.standstill() } else { self.top() };
+        }
+        let shape = shapes(&self.ramp, x);
+        let step = scaled(self.segment.timing.step, shape.s_q32);
+        self.phase = self.phase.wrapping_add(step);
+        let law = if FALLING { &self.segment.fall } else { &self.segment.rise };
+        let phase_q32 = ramp_phase(self.phase, step, law.end_term(&shape));
+        let (c, s) = sincos(phase_q32);
+        let (re, im) = law.gain(&shape, c, s);
+        let [x, y, z] = &self.segment.axes;
+        let nominal = [x.on_arc(c, s), y.on_arc(c, s), z.on_arc(c, s)];
+        let around = ([x.turned(c, s), y.turned(c, s)], self.segment.extra.ahead_at(c, s));
+        let turning = if FALLING { shape.w4_q31.wrapping_neg() } else { shape.w4_q31 };
+        let [lx, ly, lz] = &self.segment.extra.linear;
+        let rate = (shape.s_q32 >> 1) as i32;
+        let rate2 = mulh(rate, rate).wrapping_mul(2);
+        let wanted = [
+            x.turned(re, im).wrapping_add(lx.on_arc(rate, rate2, turning, c, s)),
+            y.turned(re, im).wrapping_add(ly.on_arc(rate, rate2, turning, c, s)),
+            z.turned(re, im).wrapping_add(lz.at_rest(c, s)),
+        ];
+        self.term_out(nominal, wanted, around, flag::MOVING)
+    }
+
+    /// `around`: distance from the centre and indicators of the sense, X and Y.
     #[inline(always)]
-    fn begin_arc_fall(&mut self) {
-        self.mode = Mode::ArcFall;
-        self.clock = Clock::falling(self.segment.timing.clock_step);
-        // So that the sum of steps less half the last one is the phase.
-        self.phase = self.phase.wrapping_add(self.segment.timing.step >> 1);
+    fn term_out(
+        &mut self,
+        nominal: [i32; 3],
+        wanted: [i32; 3],
+        around: ([i32; 2], [i32; 2]),
+        flags: u16,
+    ) -> Output {
+        let (arm, ahead) = around;
+        let extra = &self.segment.extra;
+        let [ex, ey] = extra.unsteady_at(&mut self.sides, &self.ramp, ahead, nominal, arm);
+        let [x, y, z] = wanted;
+        self.out(nominal, [x.wrapping_add(ex), y.wrapping_add(ey), z], flags)
     }
 
     #[inline(never)]
@@ -340,9 +375,9 @@ impl Executor {
     /// Adds the profile terms that are not linear.
     #[inline(always)]
     fn with_terms(&mut self, c: i32, s: i32, nominal: [i32; 3], wanted: [i32; 3]) -> [i32; 3] {
-        let arm = self.arm(c, s);
-        let tables = (&self.sincos, &self.ramp);
-        let [ex, ey] = self.segment.extra.unsteady_at(&mut self.sides, tables, (c, s), nominal, arm);
+        let (arm, ahead) = (self.arm(c, s), self.segment.extra.ahead_at(c, s));
+        let tables = &self.ramp;
+        let [ex, ey] = self.segment.extra.unsteady_at(&mut self.sides, tables, ahead, nominal, arm);
         let [x, y, z] = wanted;
         [x.wrapping_add(ex), y.wrapping_add(ey), z]
     }
@@ -359,7 +394,7 @@ impl Executor {
 
     #[inline(never)]
     fn any_ramp(&mut self, falling: bool) -> Output {
-        let (x, end) = self.clock.advance();
+        let (x, end) = if falling { self.clock.fall() } else { self.clock.rise() };
         if end {
             return if falling { self.standstill() } else { self.top() };
         }
@@ -368,8 +403,8 @@ impl Executor {
 
     #[inline(never)]
     fn both(&mut self) -> Output {
-        let (x, end) = self.clock.advance();
-        let (later, _) = self.second.advance();
+        let (x, end) = self.clock.rise();
+        let (later, _) = self.second.rise();
         if end {
             // The rising ramp is over: what remains is the falling one alone.
             self.clock = self.second.mirrored();
@@ -414,9 +449,9 @@ impl Executor {
             let (ex, ey) = (x.on_line(c, rate, turning), y.on_line(c, rate, turning));
             return [wx.wrapping_add(ex), wy.wrapping_add(ey), wz];
         }
-        let (ex, ey) = (x.on_arc(rate, turning, c, s), y.on_arc(rate, turning, c, s));
-        let ez = mulh(z.a[0], c).wrapping_add(mulh(z.b[0], s));
-        [wx.wrapping_add(ex), wy.wrapping_add(ey), wz.wrapping_add(ez)]
+        let rate2 = mulh(rate, rate).wrapping_mul(2);
+        let (ex, ey) = (x.on_arc(rate, rate2, turning, c, s), y.on_arc(rate, rate2, turning, c, s));
+        [wx.wrapping_add(ex), wy.wrapping_add(ey), wz.wrapping_add(z.at_rest(c, s))]
     }
 
     /// Offset wanted, nm, standing at these weights.
@@ -424,29 +459,47 @@ impl Executor {
         if !self.segment.extended {
             return [0; 3];
         }
-        let tables = (&self.sincos, &self.ramp);
+        let tables = &self.ramp;
         let (arm, extra) = (self.arm(c, s), &self.segment.extra);
-        let [ex, ey] = extra.standing_at(&self.sides, tables, (c, s), self.rest_nm, arm);
+        let [ex, ey] = extra.standing_at(&self.sides, tables, self.rest_nm, arm);
         self.with_linear(c, s, 0, 0, [ex, ey, 0])
     }
 
-    /// Top of a rising ramp: the phase is set to its exact value, one step early for [`Self::cruise`] to make.
+    /// Top of a rising ramp: the phase is set to its exact value, one step early for the cruise to make.
     #[inline(never)]
     fn top(&mut self) -> Output {
-        let timing = self.segment.timing;
-        self.set_phase(timing.up);
-        let (turns, phase) = (self.turns, self.phase);
-        (self.phase, self.turns) = {
-            let (before, wrapped) = phase.overflowing_sub(timing.step);
-            (before, turns.wrapping_sub(i32::from(wrapped)))
+        self.set_phase(self.segment.timing.up);
+        let (before, wrapped) = self.phase.overflowing_sub(self.segment.timing.step);
+        (self.phase, self.turns) = (before, self.turns.wrapping_sub(i32::from(wrapped)));
+        self.left = self.segment.timing.cruise_ticks.wrapping_add(1);
+        let mut out = match self.mode {
+            Mode::ArcRise => {
+                self.mode = Mode::ArcCruise;
+                self.arc_cruise()
+            }
+            Mode::TermRise => {
+                self.mode = Mode::TermCruise;
+                self.term_cruise()
+            }
+            _ => {
+                self.mode = Mode::Cruise;
+                self.cruise()
+            }
         };
-        self.left = timing.cruise_ticks.wrapping_add(1);
-        self.mode = Mode::Cruise;
-        self.cruise()
+        // The last tick of the ramp is not yet one at constant feed.
+        out.flags &= !flag::CRUISE;
+        out
     }
 
     #[inline(never)]
     fn standstill(&mut self) -> Output {
+        self.counters.segments = self.counters.segments.wrapping_add(1);
+        if self.mode == Mode::ArcFall && self.end == self.segment.timing.end {
+            // Without profile terms nothing is wanted at rest.
+            self.mode = Mode::Rest;
+            (self.rest_nm, self.rest_offset_nm) = (self.segment.end_nm, [0; 3]);
+            return self.finish(self.rest_nm, self.rest_offset_nm, flag::MOVING);
+        }
         self.set_phase(self.end);
         self.mode = Mode::Rest;
         let phase_q32 = (self.phase >> 32) as u32;
@@ -456,16 +509,18 @@ impl Executor {
             self.rest_nm = self.segment.end_nm;
         }
         self.rest_offset_nm = self.standing_offset(c, s);
-        self.counters.segments = self.counters.segments.wrapping_add(1);
         self.finish(self.rest_nm, self.rest_offset_nm, flag::MOVING)
     }
 
+    #[inline(always)]
     fn begin_fall(&mut self) {
-        if self.mode == Mode::ArcCruise {
-            return self.begin_arc_fall();
-        }
-        self.mode = Mode::Fall;
+        self.mode = match self.mode {
+            Mode::ArcCruise => Mode::ArcFall,
+            Mode::TermCruise => Mode::TermFall,
+            _ => Mode::Fall,
+        };
         self.clock = Clock::falling(self.segment.timing.clock_step);
+        // So that the sum of steps less half the last one is the phase.
         self.advance(self.segment.timing.step >> 1);
     }
 
@@ -506,7 +561,7 @@ impl Executor {
     #[inline(never)]
     fn settle(&mut self) -> Output {
         let target = self.target_nm;
-        let (x, end) = self.clock.advance();
+        let (x, end) = self.clock.rise();
         let share = shapes(&self.ramp, x).s_q32;
         if end || self.rest_offset_nm == target {
             self.rest_offset_nm = target;
@@ -527,9 +582,13 @@ impl Executor {
         self.mode = match self.segment.kind {
             _ if self.segment.epoch != self.epoch => Mode::Rest,
             Kind::Dwell => Mode::Dwell,
-            Kind::Arc if !self.segment.extended => Mode::ArcRise,
+            Kind::Arc if self.segment.extended => Mode::TermRise,
+            Kind::Arc if self.segment.proven => Mode::ArcRise,
             Kind::Arc | Kind::Line | Kind::Helix => Mode::Rise,
         };
+        if self.mode == Mode::ArcRise {
+            self.guard.rely_on_plan();
+        }
         self.clock = Clock::rising(timing.clock_step);
         self.phase = timing.start;
         self.turns = 0;
@@ -563,11 +622,7 @@ impl Executor {
     /// Weights of a curve's two vectors, Q31: cosine and sine, or the share of a line.
     #[inline(always)]
     fn weights(&self, phase_q32: u32) -> (i32, i32) {
-        if self.segment.kind == Kind::Line {
-            ((phase_q32 >> 1) as i32, 0)
-        } else {
-            sincos_with(&self.sincos, phase_q32)
-        }
+        if self.segment.kind == Kind::Line { ((phase_q32 >> 1) as i32, 0) } else { sincos(phase_q32) }
     }
 
     /// Position, nm.
@@ -608,8 +663,11 @@ impl Executor {
     #[inline(never)]
     fn finish(&mut self, nominal: [i32; 3], wanted: [i32; 3], flags: u16) -> Output {
         let wanted = self.engage.apply(wanted);
-        self.guard.watch(!self.engage.full());
         let (offset, verdict) = self.guard.pass(wanted);
+        self.guard.watch(!self.engage.full());
+        if matches!(self.mode, Mode::ArcRise | Mode::ArcCruise | Mode::ArcFall) {
+            self.guard.rely_on_plan_if_easy();
+        }
         let mut flags = flags;
         if verdict.offset_cut | verdict.slew_cut {
             self.counters.offset_cuts = self.counters.offset_cuts.wrapping_add(u32::from(verdict.offset_cut));

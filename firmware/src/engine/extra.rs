@@ -1,6 +1,6 @@
 //! Profile terms in fixed point: what a zone with profile terms adds to the tick.
 use super::ramp::{Clock, FIRST, clock_step, shapes};
-use giotto_shared::angle::{SinCos, phase_from_rad, sincos_with};
+use giotto_shared::angle::{phase_from_rad, sincos};
 use giotto_shared::fixed::{mulh, mulh_add, to_fixed};
 use giotto_shared::law::Profile;
 
@@ -37,7 +37,7 @@ pub(crate) struct Extra {
     /// Height of the pulse where its onset begins, nm·2⁸, and its loss per tick, Q32.
     spike: [i32; 2],
     loss_q32: [i32; 2],
-    take_up_step: i64,
+    take_up_step: u64,
     cyclic: [Cyclic; 2],
     /// Opposite of the bow, Q32 for u²/2³² in nm, by the axis of travel.
     bow: [i32; 2],
@@ -164,13 +164,20 @@ impl Extra {
     pub(crate) fn standing_at(
         &self,
         sides: &Sides,
-        tables: (&SinCos, &[i32; 3]),
-        weights: (i32, i32),
+        ramp: &[i32; 3],
         nominal: [i32; 3],
         arm: [i32; 2],
     ) -> [i32; 2] {
-        let frozen = Self { ahead: [[0; 2]; 2], loss_q32: [0; 2], ..*self };
-        frozen.unsteady_at(&mut sides.clone(), tables, weights, nominal, arm)
+        let frozen = Self { loss_q32: [0; 2], ..*self };
+        frozen.unsteady_at(&mut sides.clone(), ramp, [0; 2], nominal, arm)
+    }
+
+    /// Indicators of the sense of X and Y. Asked for before anything branches: a product whose factors come from
+    /// another block of code costs four instructions instead of one.
+    #[inline(always)]
+    pub(crate) fn ahead_at(&self, c: i32, s: i32) -> [i32; 2] {
+        let [[xc, xs], [yc, ys]] = self.ahead;
+        [mulh_add(mulh(xc, c), xs, s), mulh_add(mulh(yc, c), ys, s)]
     }
 
     /// Everything but the linear terms of an arc, nm: X and Y.
@@ -178,20 +185,17 @@ impl Extra {
     pub(crate) fn unsteady_at(
         &self,
         sides: &mut Sides,
-        tables: (&SinCos, &[i32; 3]),
-        weights: (i32, i32),
+        ramp: &[i32; 3],
+        ahead: [i32; 2],
         nominal: [i32; 3],
         arm: [i32; 2],
     ) -> [i32; 2] {
-        let (c, s) = weights;
         let mut offset = [self.linear[0].constant_nm, self.linear[1].constant_nm];
         if self.sided {
             let mut sense = [0; 2];
             for (i, side) in sides.0.iter_mut().enumerate() {
-                let [p, q] = self.ahead[i];
-                let ahead = mulh_add(mulh(p, c), q, s);
                 let (value, pulse) =
-                    side.tick(tables.1, ahead, self.take_up_step, self.spike[i], self.loss_q32[i]);
+                    side.tick(ramp, ahead[i], self.take_up_step, self.spike[i], self.loss_q32[i]);
                 sense[i] = value;
                 offset[i] = offset[i].wrapping_add(pulse);
             }
@@ -205,7 +209,7 @@ impl Extra {
                     let at = if cyclic.on_y { nominal[1] } else { nominal[0] };
                     let fraction = (i64::from(at).wrapping_mul(i64::from(cyclic.per_nm_q32)) >> 32) as u32;
                     let phase = (at as u32).wrapping_mul(cyclic.per_nm).wrapping_add(fraction);
-                    let (_, sine) = sincos_with(tables.0, phase.wrapping_add(cyclic.phase));
+                    let (_, sine) = sincos(phase.wrapping_add(cyclic.phase));
                     let o = mulh(cyclic.amplitude, sine);
                     if cyclic.on_y {
                         offset[1] = offset[1].wrapping_add(o);
@@ -225,15 +229,20 @@ impl Extra {
 }
 
 impl Linear {
-    /// Offset on an arc in a ramp (`rate` is W in Q31, `turning` w⁴ in Q31 with the sign of the ramp), nm.
+    /// Offset on an arc in a ramp (`rate` and `rate2` are W and W² in Q31, `turning` w⁴ in Q31 with the sign of the ramp), nm.
     #[inline(always)]
-    pub(crate) fn on_arc(&self, rate: i32, turning: i32, c: i32, s: i32) -> i32 {
-        let rate2 = mulh(rate, rate).wrapping_mul(2);
+    pub(crate) fn on_arc(&self, rate: i32, rate2: i32, turning: i32, c: i32, s: i32) -> i32 {
         let at = |[k0, k1, k2, k3]: [i32; 4]| {
             let slow = mulh_add(mulh(k1, rate), k2, rate2);
             k0.wrapping_add(mulh_add(slow, k3, turning).wrapping_mul(2))
         };
         mulh_add(mulh(at(self.a), c), at(self.b), s)
+    }
+
+    /// Offset on an arc, nm, of what does not depend on the rate.
+    #[inline(always)]
+    pub(crate) fn at_rest(&self, c: i32, s: i32) -> i32 {
+        mulh_add(mulh(self.a[0], c), self.b[0], s)
     }
 
     /// Offset on a line, nm, without the constant.
@@ -266,8 +275,7 @@ const DEAD_NM: i32 = 16;
 impl Sides {
     /// Before a segment: an axis that never moved takes the side that the segment begins with.
     pub(crate) fn seed(&mut self, extra: &Extra, c: i32, s: i32) {
-        for (side, [p, q]) in self.0.iter_mut().zip(extra.ahead) {
-            let ahead = mulh_add(mulh(p, c), q, s);
+        for (side, ahead) in self.0.iter_mut().zip(extra.ahead_at(c, s)) {
             if side.value == 0 && !side.turning && ahead.unsigned_abs() > DEAD_NM as u32 {
                 side.forward = ahead > 0;
                 side.value = if side.forward { i32::MAX } else { -i32::MAX };
@@ -279,7 +287,7 @@ impl Sides {
 impl Side {
     /// (sense in Q31, pulse in nm) after one more tick.
     #[inline(always)]
-    fn tick(&mut self, p: &[i32; 3], ahead: i32, step: i64, spike: i32, loss_q32: i32) -> (i32, i32) {
+    fn tick(&mut self, p: &[i32; 3], ahead: i32, step: u64, spike: i32, loss_q32: i32) -> (i32, i32) {
         self.pulse = self.pulse.wrapping_sub(mulh(self.pulse, loss_q32));
         if self.turning {
             return self.turn(p, loss_q32);
@@ -304,7 +312,7 @@ impl Side {
     #[inline(never)]
     fn turn(&mut self, p: &[i32; 3], loss_q32: i32) -> (i32, i32) {
         self.before = self.before.wrapping_sub(mulh(self.before, loss_q32));
-        let (x, end) = self.clock.advance();
+        let (x, end) = self.clock.rise();
         if end {
             self.turning = false;
             self.value = if self.forward { i32::MAX } else { -i32::MAX };

@@ -9,6 +9,8 @@ pub(crate) struct Guard {
     easy_slew_nm: u32,
     offset_nm: i32,
     slew_nm: i32,
+    /// Ticks may have passed without `last_nm` being kept.
+    stale: bool,
 }
 
 /// The largest power of two not above a bound; 0 for 0.
@@ -29,12 +31,12 @@ impl Guard {
     /// Bounds in nm and nm per tick.
     pub(crate) const fn new(offset_nm: i32, slew_nm: i32) -> Self {
         let (easy_offset_nm, easy_slew_nm) = (easy(offset_nm), easy(slew_nm));
-        Self { last_nm: [0; 3], easy_offset_nm, easy_slew_nm, offset_nm, slew_nm }
+        Self { last_nm: [0; 3], easy_offset_nm, easy_slew_nm, offset_nm, slew_nm, stale: false }
     }
 
     /// New bounds; the offset stays where it is.
     pub(crate) fn set(&mut self, offset_nm: i32, slew_nm: i32) {
-        *self = Self { last_nm: self.last_nm, ..Self::new(offset_nm, slew_nm) };
+        *self = Self { last_nm: self.last_nm, stale: self.stale, ..Self::new(offset_nm, slew_nm) };
     }
 
     /// While watched, nothing passes easily.
@@ -48,16 +50,35 @@ impl Guard {
         self.last_nm
     }
 
+    /// From now on [`Self::small`] may be asked instead of [`Self::pass_easily`].
+    pub(crate) fn rely_on_plan(&mut self) {
+        self.stale = true;
+    }
+
+    /// [`Self::rely_on_plan`], unless watched.
+    pub(crate) fn rely_on_plan_if_easy(&mut self) {
+        self.stale = self.easy_offset_nm != 0;
+    }
+
+    /// The offset is easily seen to be within its bound. Enough for a segment whose change of offset the planner
+    /// proved to be within bounds.
+    #[inline(always)]
+    pub(crate) fn small(&self, [x, y, z]: [i32; 3]) -> bool {
+        // v or its ones' complement, whichever is not negative: below 2ⁿ if and only if −2ⁿ ≤ v < 2ⁿ.
+        let size = |v: i32| (v ^ (v >> 31)) as u32;
+        (size(x) | size(y) | size(z)) < self.easy_offset_nm
+    }
+
     /// Lets the offset pass unchanged if that is easily seen to be within the bounds.
     #[inline(always)]
     pub(crate) fn pass_easily(&mut self, wanted: [i32; 3]) -> bool {
         let ([x, y, z], [lx, ly, lz]) = (wanted, self.last_nm);
-        // v or its ones' complement, whichever is not negative: below 2ⁿ if and only if −2ⁿ ≤ v < 2ⁿ.
-        let size = |v: i32| (v ^ (v >> 31)) as u32;
-        let change = |now: i32, last: i32| size(now.wrapping_sub(last));
-        let offset = size(x) | size(y) | size(z);
-        let slew = change(x, lx) | change(y, ly) | change(z, lz);
-        let easy = offset < self.easy_offset_nm && slew < self.easy_slew_nm;
+        let size = |now: i32, last: i32| {
+            let change = now.wrapping_sub(last);
+            (change ^ (change >> 31)) as u32
+        };
+        let slew = size(x, lx) | size(y, ly) | size(z, lz);
+        let easy = self.small(wanted) && slew < self.easy_slew_nm;
         if easy {
             self.last_nm = wanted;
         }
@@ -66,6 +87,9 @@ impl Guard {
 
     /// The offset that may go out, axis by axis.
     pub(crate) fn pass(&mut self, wanted: [i32; 3]) -> ([i32; 3], Verdict) {
+        if self.stale {
+            (self.stale, self.last_nm) = (false, wanted);
+        }
         let mut verdict = Verdict::default();
         let mut passed = [0; 3];
         for ((out, want), last) in passed.iter_mut().zip(wanted).zip(self.last_nm) {

@@ -8,6 +8,7 @@
 //!
 //! Positions are `i32` nanometres in machine coordinates (±2.147 m), so that bypass equals the input bit for bit and
 //! nothing is lost at 1 m. Phases are integers: no drift however long a run.
+pub mod bench;
 mod config;
 mod engage;
 mod executor;

@@ -20,8 +20,8 @@ pub(crate) enum Kind {
 /// One coordinate of the curve and of its correction at constant rate; the tick loads it as a whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub(crate) struct Axis {
-    /// nm·2³² with half a nm added, so that the upper word of the sum is the position.
-    pub(crate) base: i64,
+    /// nm.
+    pub(crate) base: i32,
     /// nm·2 on arcs, nm on lines.
     pub(crate) u: i32,
     /// nm·2 on arcs, unit direction in Q31 on lines.
@@ -31,24 +31,20 @@ pub(crate) struct Axis {
     pub(crate) b: i32,
 }
 
-/// [`Axis::base`] of a position.
-pub(crate) const fn base(nm: i32) -> i64 {
-    ((nm as i64) << 32) + (1 << 31)
-}
-
 impl Axis {
-    /// Position on an arc, nm, at cosine and sine in Q31.
+    /// Position on an arc, nm (rounded down), at cosine and sine in Q31.
     #[inline(always)]
     pub(crate) fn on_arc(&self, c: i32, s: i32) -> i32 {
         let u = i64::from(self.u).wrapping_mul(i64::from(c));
         let v = i64::from(self.v).wrapping_mul(i64::from(s));
-        (self.base.wrapping_add(u).wrapping_add(v) >> 32) as i32
+        self.base.wrapping_add((u.wrapping_add(v) >> 32) as i32)
     }
 
-    /// Position on a line, nm.
+    /// Position on a line, nm (rounded down).
     #[inline(always)]
     pub(crate) fn on_line(&self, share_q32: u32) -> i32 {
-        (self.base.wrapping_add(i64::from(self.u).wrapping_mul(i64::from(share_q32))) >> 32) as i32
+        let way = i64::from(self.u).wrapping_mul(i64::from(share_q32)) >> 32;
+        self.base.wrapping_add(way as i32)
     }
 
     /// A vector of the plane turned and scaled by re + i·im (Q31), nm: its coordinate on this axis.
@@ -77,7 +73,7 @@ pub(crate) struct Timing {
     pub(crate) ramp_ticks: u32,
     pub(crate) cruise_ticks: u32,
     /// Q63 step of the ramp's x per tick.
-    pub(crate) clock_step: i64,
+    pub(crate) clock_step: u64,
 }
 
 /// The operator in a ramp, in fixed point. `W` is the share of the constant rate.
@@ -159,6 +155,8 @@ pub struct Planned {
     pub(crate) kind: Kind,
     /// A zone of the table applies.
     pub(crate) corrected: bool,
+    /// The planner proved that the change of the offset stays within its bound.
+    pub(crate) proven: bool,
     /// The zone has profile terms.
     pub(crate) extended: bool,
     /// Segments planned before a stop carry an older one.
@@ -169,7 +167,7 @@ pub struct Planned {
     pub(crate) offset_nm: i32,
     pub(crate) slew_nm: i32,
     /// Clock step of the ramp that moves the offset from what it is to what this segment starts with.
-    pub(crate) settle_step: i64,
+    pub(crate) settle_step: u64,
     pub(crate) start_nm: [i32; 3],
     pub(crate) end_nm: [i32; 3],
     pub(crate) extra: Extra,

@@ -1,7 +1,7 @@
 //! From what a program asks for to integers that the tick runs. Runs in the background, in `f64`.
 use super::config::{Config, MAX_POSITION_M, MAX_RADIUS_M, MAX_RAMP_TICKS, ticks};
 use super::extra::{Extra, Motion};
-use super::planned::{Axis, Kind, Law, Planned, Timing, base};
+use super::planned::{Axis, Kind, Law, Planned, Timing};
 use super::ramp::{FIRST, SECOND, THIRD, clock_step};
 use super::stream::{StreamNeeds, StreamPlan};
 use super::zones::{Asked, ZoneError, Zones};
@@ -218,7 +218,7 @@ impl Planner {
         // Rounding of centre and radius must not show as a gap at the start: move the arc by that nm or two.
         for (i, axis) in segment.axes.iter_mut().enumerate() {
             let gap = self.position_nm[i] - segment.start_nm[i];
-            axis.base += i64::from(gap) << 32;
+            axis.base += gap;
             segment.end_nm[i] += gap;
         }
         segment.start_nm = self.position_nm;
@@ -255,7 +255,7 @@ impl Planner {
         let mut segment = self.blank();
         segment.kind = Kind::Line;
         for (i, axis) in segment.axes.iter_mut().enumerate() {
-            *axis = Axis { base: base(from[i]), u: u_nm[i], v: to_fixed(direction[i], 31), a: 0, b: 0 };
+            *axis = Axis { base: from[i], u: u_nm[i], v: to_fixed(direction[i], 31), a: 0, b: 0 };
         }
         segment.timing = timing;
         segment.rise.end_term_q1 = end_term(&timing);
@@ -306,7 +306,7 @@ impl Planner {
         segment.rise_nm = scale(round.rise_per_turn, 1e9);
         for (i, axis) in segment.axes.iter_mut().enumerate() {
             let arm = |a: f64| to_fixed(a * round.radius * 1e9, 1);
-            *axis = Axis { base: base(centre_nm[i]), u: arm(round.u[i]), v: arm(round.v[i]), a: 0, b: 0 };
+            *axis = Axis { base: centre_nm[i], u: arm(round.u[i]), v: arm(round.v[i]), a: 0, b: 0 };
         }
         segment.timing = timing(ramp_ticks);
         let asked = Asked {
@@ -342,6 +342,11 @@ impl Planner {
                 ramp = ramp.saturating_mul(2).min(MAX_RAMP_TICKS);
             }
         }
+        segment.proven = match self.zones.choose(&asked) {
+            Some(zone) if segment.corrected => self.slew_proven(&zone.operator, &segment, round.radius),
+            // No correction, no change of it.
+            _ => true,
+        };
         segment.timing.clock_step = clock_step(segment.timing.ramp_ticks);
         segment.rise.end_term_q1 = end_term(&segment.timing);
         segment.fall = segment.rise.turned_round();
@@ -389,6 +394,28 @@ impl Planner {
         }
         let [k1, k2, k3, k4, k5, k6, k7, k8] = k.map(|(k, bits)| to_fixed(k, bits));
         Some((Law { k1, k2, k3, k4, k5, k6, k7, k8, end_term_q1: 0 }, steady.radial))
+    }
+
+    /// Whether offset and change of offset of the operator stay within their bounds all along, with a tenth to spare.
+    fn slew_proven(&self, operator: &Operator<f64>, segment: &Planned, radius: f64) -> bool {
+        let tick_s = self.config.tick_s();
+        let rate = segment.timing.step as f64 / TURN * TAU / tick_s;
+        let t = f64::from(segment.timing.ramp_ticks) * tick_s;
+        let ramp = FeedRamp { from_m_s: 0.0, to_m_s: rate, duration_s: t };
+        let gain = |i: u32| {
+            let [_, rate, acceleration, jerk, snap] = ramp.at(t * f64::from(i) / 128.0);
+            let gain = operator.gain(&AngularMotion { rate, acceleration, jerk, snap });
+            (rate, gain.radial, gain.tangential)
+        };
+        (0..=128).all(|i| {
+            // |d/dt (G − 1)e^{iθ}| = |G′ + iω(G − 1)|.
+            let ((_, a, b), (rate, c, d)) = (gain(i), gain(i + 1));
+            let per_s = 128.0 / t;
+            let slew = libm::hypot((c - a) * per_s - rate * d, (d - b) * per_s + rate * c);
+            let nm = 1.1e9 * radius;
+            nm * libm::hypot(c, d) <= f64::from(segment.offset_nm)
+                && nm * slew * tick_s <= f64::from(segment.slew_nm)
+        })
     }
 
     /// Ramp and constant-rate ticks for a length at no more than a feed.

@@ -13,8 +13,8 @@ pub(crate) const SECOND: f64 = 315.0 / 8.0;
 /// S‴ = `THIRD`·w²(1 − 7w/6).
 pub(crate) const THIRD: f64 = 945.0 / 2.0;
 
-/// Coefficients of w², w³ and w⁴ in (S − ½)/x: 3/16 (Q31), 5/32 (Q32), 35/256 (Q31). Kept in memory for the reason
-/// given at [`SinCos`](giotto_shared::angle::SinCos).
+/// Coefficients of w², w³ and w⁴ in (S − ½)/x: 3/16 (Q31), 5/32 (Q32), 35/256 (Q31). The tick keeps a copy in its own
+/// state: one multiple load brings them all, where immediate operands would cost two instructions each.
 pub(crate) const POLYNOMIAL: [i32; 3] =
     [to_fixed(3.0 / 16.0, 31), to_fixed(5.0 / 32.0, 32), to_fixed(35.0 / 256.0, 31)];
 
@@ -68,33 +68,33 @@ pub(crate) fn shapes(p: &[i32; 3], x: i32) -> Shapes {
     }
 }
 
-/// Where a ramp stands: x as Q63. It overflows in the very tick in which the ramp ends.
+/// Where a ramp stands: u as Q64, that is x as Q63 with its upper bit turned. It overflows in the very tick in which
+/// the ramp ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub(crate) struct Clock {
-    x: i64,
-    dx: i64,
+    u: u64,
+    du: u64,
 }
 
 impl Clock {
     /// At the start of a rising ramp.
-    pub(crate) const fn rising(step_q63: i64) -> Self {
-        Self { x: i64::MIN, dx: step_q63 }
+    pub(crate) const fn rising(step: u64) -> Self {
+        Self { u: 0, du: step }
     }
 
     /// At the start of a falling ramp.
-    pub(crate) const fn falling(step_q63: i64) -> Self {
-        Self { x: i64::MAX, dx: step_q63.wrapping_neg() }
+    pub(crate) const fn falling(step: u64) -> Self {
+        Self { u: u64::MAX, du: step }
     }
 
     /// The falling ramp that goes through the same values of 1 − S as this rising one goes on to.
     pub(crate) const fn mirrored(self) -> Self {
-        Self { x: !self.x, dx: self.dx.wrapping_neg() }
+        Self { u: !self.u, du: self.du }
     }
 
     /// Ticks since the start of a rising ramp. Not for the tick: it divides.
     pub(crate) const fn elapsed(self) -> u32 {
-        let way = self.x.wrapping_sub(i64::MIN) as u64;
-        match way.checked_div(self.dx as u64) {
+        match self.u.checked_div(self.du) {
             Some(ticks) => ticks as u32,
             None => 0,
         }
@@ -102,22 +102,30 @@ impl Clock {
 
     /// x now, Q31.
     pub(crate) const fn here(self) -> i32 {
-        (self.x >> 32) as i32
+        ((self.u >> 32) as u32 ^ (1 << 31)) as i32
     }
 
-    /// x after one more tick, Q31, and whether that is the end of the ramp.
+    /// x after one more tick of a rising ramp, Q31, and whether that is its end.
     #[inline(always)]
-    pub(crate) fn advance(&mut self) -> (i32, bool) {
-        let (x, end) = self.x.overflowing_add(self.dx);
-        self.x = x;
-        ((x >> 32) as i32, end)
+    pub(crate) fn rise(&mut self) -> (i32, bool) {
+        let (u, end) = self.u.overflowing_add(self.du);
+        self.u = u;
+        (self.here(), end)
+    }
+
+    /// x after one more tick of a falling ramp, Q31, and whether that is its end.
+    #[inline(always)]
+    pub(crate) fn fall(&mut self) -> (i32, bool) {
+        let (u, end) = self.u.overflowing_sub(self.du);
+        self.u = u;
+        (self.here(), end)
     }
 }
 
-/// Q63 step of x per tick for a ramp of so many ticks (at least 2): 2⁶⁴/ticks, rounded up.
-pub(crate) const fn clock_step(ticks: u32) -> i64 {
+/// Q64 step of u per tick for a ramp of so many ticks (at least 3): 2⁶⁴/ticks, rounded up.
+pub(crate) const fn clock_step(ticks: u32) -> u64 {
     let ticks = if ticks < 3 { 3 } else { ticks };
-    (u64::MAX / ticks as u64 + 1) as i64
+    u64::MAX / ticks as u64 + 1
 }
 
 #[cfg(test)]
@@ -151,14 +159,11 @@ mod tests {
     #[test]
     fn a_ramp_ends_in_its_last_tick() {
         for ticks in [3, 4, 5, 32, 33, 1000, 4096, 65_535, 1_000_003] {
-            for mut clock in [Clock::rising(clock_step(ticks)), Clock::falling(clock_step(ticks))] {
-                let rising = clock.dx > 0;
-                for n in 1..=ticks {
-                    assert_eq!(clock.advance().1, n == ticks, "tick {n} of {ticks}");
-                    if rising && n < ticks {
-                        assert_eq!(clock.elapsed(), n);
-                    }
-                }
+            let step = clock_step(ticks);
+            let (mut up, mut down) = (Clock::rising(step), Clock::falling(step));
+            for n in 1..=ticks {
+                assert_eq!((up.rise().1, down.fall().1), (n == ticks, n == ticks), "tick {n} of {ticks}");
+                assert!(n == ticks || up.elapsed() == n);
             }
         }
     }

@@ -14,7 +14,7 @@ use super::engage::Engage;
 use super::guard::Guard;
 use super::ramp::{Clock, POLYNOMIAL, clock_step, shapes};
 use super::{Counters, Output, flag};
-use giotto_shared::fixed::{mulh, mulh_add, to_fixed};
+use giotto_shared::fixed::to_fixed;
 use giotto_shared::law::Operator;
 
 /// Samples kept; a power of two.
@@ -53,7 +53,7 @@ pub enum StreamState {
 pub struct StreamPlan {
     /// Samples per mean, and ticks between the places: odd.
     stride: u32,
-    /// Weights of the inner and outer second difference, Q`32 − WEIGHT_SHIFT`.
+    /// Weights of the inner and outer second difference, Q28.
     inner: i32,
     outer: i32,
     /// Largest step of a set-point on one axis, nm.
@@ -67,8 +67,8 @@ pub struct StreamPlan {
     corrected: bool,
 }
 
-/// Spare bits of the weights: they may reach 1 in size, at the price of 4 nm of rounding.
-const WEIGHT_SHIFT: u32 = 1;
+/// Fraction bits of the weights: they may reach 8 in size.
+const WEIGHT_BITS: u32 = 28;
 
 /// What a plan is made from.
 pub(crate) struct StreamNeeds {
@@ -96,18 +96,17 @@ impl StreamPlan {
         let fourth = 12.0 * (operator.fourth_s4 - operator.second_s2 * variance / 2.0) / (m * h * h * h * h);
         let outer = (fourth - second) / 12.0;
         let inner = second - 4.0 * outer;
-        let most = f64::from(1u32 << (WEIGHT_SHIFT - 1)) * 0.99;
+        let most = 0.99 * f64::from(1u32 << (31 - WEIGHT_BITS));
         if !(libm::fabs(inner) < most && libm::fabs(outer) < most) {
             return None;
         }
-        let bits = 32 - WEIGHT_SHIFT;
         // v/2ᵏ per tick must be within the acceleration: 2ᵏ ≥ v/(a·T).
         let ratio = n.feed_m_s / (n.acceleration_m_s2 * n.tick_s);
         let brake_shift = libm::ceil(libm::log2(ratio.max(1.0))) as u32;
         Some(Self {
             stride,
-            inner: to_fixed(inner, bits),
-            outer: to_fixed(outer, bits),
+            inner: to_fixed(inner, WEIGHT_BITS),
+            outer: to_fixed(outer, WEIGHT_BITS),
             step_nm: to_fixed(n.feed_m_s * n.tick_s * 1.05e9, 0) as u32,
             hold_ticks: n.hold_ticks,
             brake_shift: brake_shift.min(20),
@@ -116,6 +115,16 @@ impl StreamPlan {
             slew_nm: n.slew_nm,
             corrected: n.operator.is_some(),
         })
+    }
+
+    /// The correction, nm, from five sums, newest first.
+    #[inline(always)]
+    const fn weigh(&self, newest: i32, near: i32, middle: i32, far: i32, oldest: i32) -> i32 {
+        let twice = middle.wrapping_mul(2);
+        let inner = near.wrapping_add(far).wrapping_sub(twice) as i64 * self.inner as i64;
+        let outer = newest.wrapping_add(oldest).wrapping_sub(twice) as i64 * self.outer as i64;
+        // Half a nm of rounding is not worth its instructions.
+        (inner.wrapping_add(outer) >> WEIGHT_BITS) as i32
     }
 
     /// Ticks from a set-point in to the same one out.
@@ -251,7 +260,9 @@ impl Stream {
     #[inline(always)]
     fn regular(&self, s: &StreamSample) -> bool {
         let ([x, y, z], [lx, ly, lz]) = (s.position_nm, self.last_nm);
-        let near = |now: i32, last: i32| now.wrapping_sub(last).unsigned_abs() <= self.plan.step_nm;
+        let most = self.plan.step_nm;
+        let near =
+            |now: i32, last: i32| (now.wrapping_sub(last) as u32).wrapping_add(most) <= most.wrapping_mul(2);
         self.state == StreamState::Running
             && !self.joining
             && s.sequence == self.sequence
@@ -278,17 +289,14 @@ impl Stream {
         ];
         self.total = newest;
         self.sum[slot(0)] = newest;
-        let near = self.sum[slot(stride)];
-        let middle = self.sum[slot(stride.wrapping_mul(2))];
-        let far = self.sum[slot(stride.wrapping_mul(3))];
-        let oldest = self.sum[slot(stride.wrapping_mul(4))];
-        let offset = |i: usize| {
-            let twice = middle[i].wrapping_mul(2);
-            let inner = near[i].wrapping_add(far[i]).wrapping_sub(twice);
-            let outer = newest[i].wrapping_add(oldest[i]).wrapping_sub(twice);
-            mulh_add(mulh(inner, self.plan.inner), outer, self.plan.outer).wrapping_mul(1 << WEIGHT_SHIFT)
-        };
-        let wanted = [offset(0), offset(1), offset(2)];
+        let [ax, ay, az, _] = self.sum[slot(stride)];
+        let [bx, by, bz, _] = self.sum[slot(stride.wrapping_mul(2))];
+        let [cx, cy, cz, _] = self.sum[slot(stride.wrapping_mul(3))];
+        let [dx, dy, dz, _] = self.sum[slot(stride.wrapping_mul(4))];
+        let [sx, sy, sz, _] = newest;
+        let plan = &self.plan;
+        let wanted =
+            [plan.weigh(sx, ax, bx, cx, dx), plan.weigh(sy, ay, by, cy, dy), plan.weigh(sz, az, bz, cz, dz)];
         let [nx, ny, nz, _] = self.position[slot(stride.wrapping_mul(2).wrapping_add(stride >> 1))];
         let nominal = [nx, ny, nz];
         if self.guard.pass_easily(wanted) {
@@ -357,7 +365,7 @@ impl Stream {
 
     /// A set-point on the way from where the gap was bridged to what comes in.
     fn joined(&mut self, position: [i32; 3]) -> [i32; 3] {
-        let (x, end) = self.join.advance();
+        let (x, end) = self.join.rise();
         self.joining = !end;
         let left = if end { 0 } else { u32::MAX - shapes(&POLYNOMIAL, x).s_q32 };
         let mut taken = position;

@@ -1,0 +1,198 @@
+//! The ticks whose instructions `giotto-hil ticks` counts, ready to be called one by one.
+//!
+//! Counted is the call alone, inputs prepared before it. All circles lie in a tilted plane ("in space"); the
+//! first tick with [`flag::MOVING`](super::flag::MOVING) begins what counts, ticks without it (rest, settling) do not.
+use super::planner::Planner;
+use super::{Config, Executor, Output, Planned, Stream, StreamSample};
+use giotto_shared::Axis;
+use giotto_shared::model::Cumulants;
+use giotto_shared::path::{Segment, smoothstep};
+use giotto_shared::table::{Limits, Table, Travel, Zone};
+use giotto_shared::term::Term;
+
+const TICK_S: f64 = 1e-3;
+const CENTRE_M: [f64; 3] = [0.1, -0.2, 0.3];
+const RADIUS_M: f64 = 0.1;
+const FEED_M_S: f64 = 0.5;
+/// The source paper's robot.
+const CUMULANTS: Cumulants<f32> = Cumulants { kappa2_s2: 46.58e-6, kappa4_s4: -5.5265e-6 };
+
+/// Eight profile terms, reversal pulses on both axes among them.
+pub const TERMS: [Term<f32>; 8] = [
+    Term::ScaleMismatch { relative: 100e-6 },
+    Term::Squareness { shear_rad: 80e-6 },
+    Term::ServoMismatch { delta_tau_s: 100e-6 },
+    Term::BandwidthMismatch { delta_kappa2_s2: 5e-6 },
+    Term::Backlash { axis: Axis::X, step_m: 10e-6 },
+    Term::Backlash { axis: Axis::Y, step_m: 12e-6 },
+    Term::ReversalSpike { axis: Axis::X, peak_m: 8e-6, decay_s: 0.05 },
+    Term::ReversalSpike { axis: Axis::Y, peak_m: 6e-6, decay_s: 0.04 },
+];
+
+/// A planned circle and the executor that runs it (first, where one load reaches two of its words).
+#[repr(C)]
+pub struct Arc {
+    executor: Executor,
+    queue: heapless::spsc::Queue<Planned, 2>,
+}
+
+impl Arc {
+    /// One and a half turns with the β model alone, or with [`TERMS`] as well.
+    pub fn new(extended: bool) -> Self {
+        let mut zone = Zone {
+            place_m: None,
+            radius_m: [0.001, 1.0],
+            feed_m_s: [0.001, 2.0],
+            travel: Travel::Both,
+            cumulants: CUMULANTS,
+            terms: heapless::Vec::new(),
+        };
+        if extended {
+            zone.terms = TERMS.iter().copied().collect();
+        }
+        let table = Table {
+            machine: heapless::String::new(),
+            zones: [zone].into_iter().collect(),
+            limits: Limits { offset_m: 0.02, slew_m_s: 0.2 },
+        };
+        let config = Config::robot(1000);
+        let start = [CENTRE_M[0] + RADIUS_M, CENTRE_M[1], CENTRE_M[2]].map(|m| (m * 1e9) as i32);
+        let mut planner = Planner::new(&config, start);
+        let mut queue = heapless::spsc::Queue::new();
+        let arc = Segment::Arc {
+            centre_m: CENTRE_M,
+            normal: [0.0, 0.5, 1.0],
+            sweep_rad: 3.0 * core::f64::consts::PI,
+            rise_m: 0.0,
+            feed_m_s: FEED_M_S,
+        };
+        if planner.set_table(Some(&table)).is_ok()
+            && let Ok(planned) = planner.segment(&arc)
+        {
+            // The queue is empty.
+            let _ = queue.enqueue(planned);
+        }
+        Self { executor: Executor::new(start, config.engage_ticks(), false), queue }
+    }
+
+    /// What is counted.
+    #[inline(never)]
+    pub fn tick(&mut self) -> Output {
+        self.executor.tick(&mut self.queue)
+    }
+
+    /// Nothing is left to count.
+    pub fn done(&self) -> bool {
+        self.executor.idle() && self.queue.is_empty()
+    }
+
+    /// The circle was planned and every tick stayed within its bounds.
+    pub fn sound(&self) -> bool {
+        let c = self.executor.counters();
+        c.segments == 1 && c.uncorrected == 0 && c.offset_cuts == 0 && c.slew_cuts == 0
+    }
+}
+
+/// A streamed circle.
+pub struct Streamed {
+    stream: Stream,
+    sequence: u16,
+}
+
+impl Streamed {
+    /// At rest at the start; `None` if the configuration were wrong.
+    pub fn new() -> Option<Self> {
+        let mut planner = Planner::new(&Config::robot(1000), position(0));
+        let zone = Zone {
+            place_m: None,
+            radius_m: [0.001, 1.0],
+            feed_m_s: [0.001, 2.0],
+            travel: Travel::Both,
+            cumulants: CUMULANTS,
+            terms: heapless::Vec::new(),
+        };
+        let table = Table {
+            machine: heapless::String::new(),
+            zones: [zone].into_iter().collect(),
+            limits: Limits { offset_m: 0.02, slew_m_s: 0.2 },
+        };
+        planner.set_table(Some(&table)).ok()?;
+        let plan = planner.stream(1.0).ok()?;
+        Some(Self { stream: Stream::new(&plan, position(0), 0, false), sequence: 0 })
+    }
+
+    /// The next set-point; not counted.
+    pub fn sample(&mut self) -> StreamSample {
+        let sample = StreamSample { sequence: self.sequence, position_nm: position(self.sequence) };
+        self.sequence = self.sequence.wrapping_add(1);
+        sample
+    }
+
+    /// What is counted.
+    #[inline(never)]
+    pub fn tick(&mut self, sample: Option<StreamSample>) -> Output {
+        self.stream.tick(sample)
+    }
+}
+
+/// Set-point `n` of a circle that starts smoothly, nm.
+fn position(n: u16) -> [i32; 3] {
+    let (t, start) = (f64::from(n) * TICK_S, 0.3);
+    let angle = FEED_M_S / RADIUS_M * (start * smoothstep(t / start).integral + (t - start).max(0.0));
+    let (s, c) = libm::sincos(angle);
+    [CENTRE_M[0] + RADIUS_M * c, CENTRE_M[1] + RADIUS_M * s, CENTRE_M[2]].map(|m| (m * 1e9) as i32)
+}
+
+/// The same arc tick as one would write it down: `f32`, libm, formulas as they stand.
+pub struct Plain {
+    tick: u32,
+    theta: f32,
+}
+
+impl Plain {
+    /// In the middle of a ramp of 400 ticks.
+    pub const fn new() -> Self {
+        Self { tick: 0, theta: 0.0 }
+    }
+
+    /// What is counted.
+    #[inline(never)]
+    pub fn tick(&mut self) -> Output {
+        const RAMP_S: f32 = 0.4;
+        let dt = TICK_S as f32;
+        self.tick = self.tick.wrapping_add(1);
+        let u = self.tick as f32 * dt / RAMP_S;
+        let s = smoothstep(u);
+        let full = (FEED_M_S / RADIUS_M) as f32;
+        let (w, a) = (full * s.value, full * s.first / RAMP_S);
+        let (j, n) = (full * s.second / (RAMP_S * RAMP_S), full * s.third / (RAMP_S * RAMP_S * RAMP_S));
+        self.theta += w * dt;
+        let (sin, cos) = libm::sincosf(self.theta);
+        let (k2, k4) = (CUMULANTS.kappa2_s2, CUMULANTS.kappa4_s4);
+        let fourth = k2 * k2 / 8.0 - k4 / 24.0;
+        let re = 1.0 + 0.5 * k2 * w * w + fourth * (w * w * w * w - 4.0 * w * j - 3.0 * a * a);
+        let im = -0.5 * k2 * a + fourth * (n - 6.0 * w * w * a);
+        let r = RADIUS_M as f32;
+        // A plane tilted as that of `Arc`.
+        let (up, along) = (0.447_213_6_f32, 0.894_427_2_f32);
+        let place = |c: f32, s: f32| [r * c, r * s * along, -r * s * up];
+        let nm = |p: [f32; 3]| {
+            let mut out = [0; 3];
+            for ((o, p), centre) in out.iter_mut().zip(p).zip(CENTRE_M) {
+                *o = ((p + centre as f32) * 1e9) as i32;
+            }
+            out
+        };
+        Output {
+            nominal_nm: nm(place(cos, sin)),
+            corrected_nm: nm(place(re * cos - im * sin, re * sin + im * cos)),
+            flags: 0,
+        }
+    }
+}
+
+impl Default for Plain {
+    fn default() -> Self {
+        Self::new()
+    }
+}
