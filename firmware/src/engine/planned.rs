@@ -40,10 +40,10 @@ impl Axis {
         self.base.wrapping_add((u.wrapping_add(v) >> 32) as i32)
     }
 
-    /// Position on a line, nm (rounded down).
+    /// Position on a line, nm (rounded down). The share is Q30 and signed: rounding may carry it past either end.
     #[inline(always)]
-    pub(crate) fn on_line(&self, share_q32: u32) -> i32 {
-        let way = i64::from(self.u).wrapping_mul(i64::from(share_q32)) >> 32;
+    pub(crate) fn on_line(&self, share_q30: i32) -> i32 {
+        let way = i64::from(self.u).wrapping_mul(i64::from(share_q30)) >> 30;
         self.base.wrapping_add(way as i32)
     }
 
@@ -60,7 +60,7 @@ impl Axis {
     }
 }
 
-/// Rising ramp, constant rate, falling ramp. Phases in turns (or shares of a line) of 2⁶⁴.
+/// Rising ramp, constant rate, falling ramp. Phases in turns of 2⁶⁴, or shares of a line of 2⁶².
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub(crate) struct Timing {
     pub(crate) start: u64,

@@ -250,7 +250,7 @@ impl Planner {
             *u = t.checked_sub(f).ok_or(Refused::OutOfBounds("length"))?;
         }
         let (ramp_ticks, cruise_ticks) = self.profile(length, feed)?;
-        let mut timing = share_out((1u128 << 64) - 1, ramp_ticks, cruise_ticks);
+        let mut timing = share_out(LINE as u128, ramp_ticks, cruise_ticks);
         timing.clock_step = clock_step(ramp_ticks);
         let mut segment = self.blank();
         segment.kind = Kind::Line;
@@ -264,7 +264,7 @@ impl Planner {
             self.zones.choose(&Asked { place_m: middle, radius_m: None, feed_m_s: feed, ccw: None })
         {
             let t = f64::from(ramp_ticks) * self.config.tick_s();
-            let speed = timing.step as f64 / TURN * length / self.config.tick_s();
+            let speed = timing.step as f64 / LINE * length / self.config.tick_s();
             let snap = zone.operator.fourth_s4 * speed * THIRD / (t * t * t) * 1e9;
             segment.rise.k5 = to_fixed(zone.operator.second_s2 * speed * FIRST / t * 1e9, 2);
             segment.rise.k7 = to_fixed(snap, 2);
@@ -277,7 +277,7 @@ impl Planner {
                     profile.position = [[0.0; 2]; 2];
                 }
                 let start = seen_from(metres(from), zone.reference_m.unwrap_or_default());
-                segment.extra = Extra::on_line(&profile, &self.motion(&timing, 1.0), span, start);
+                segment.extra = Extra::on_line(&profile, &self.motion(&timing, TURN / LINE), span, start);
                 segment.extended = true;
             }
         }
@@ -476,6 +476,8 @@ impl Planner {
 }
 
 const TURN: f64 = 18_446_744_073_709_551_616.0;
+/// Phase units of a whole line.
+const LINE: f64 = TURN / 4.0;
 
 /// ∫ of a ramp's rate exceeds its sum by T²/12 of the rate's derivative: step/N·S′/12, in units of 2⁻³² turn, Q1.
 fn end_term(timing: &Timing) -> i32 {
