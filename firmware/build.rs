@@ -19,8 +19,7 @@ const RAM: u32 = 32 * 1024;
 const BOARDS: [Memory; 2] = [
     // SSRAM1 as code memory, SSRAM2 as data memory (ARM DAI0386). The flash stand-in is at 0x0010_0000.
     Memory { feature: "CARGO_FEATURE_MPS2_AN386", flash: (0x0000_0000, TEXT), ram: (0x2000_0000, RAM) },
-    // Sectors 0 to 3 (RM0090 table 5), 64 KiB; the slots are in sectors 10 and 11.
-    Memory { feature: "CARGO_FEATURE_STM32F405", flash: (0x0800_0000, TEXT), ram: (0x2000_0000, RAM) },
+    Memory { feature: "CARGO_FEATURE_TICKS", flash: (0x0000_0000, 2 * TEXT), ram: (0x2000_0000, 4 * RAM) },
 ];
 
 fn main() {

@@ -1,2 +1,142 @@
-//! Hardware in the loop.
-fn main() {}
+//! Hardware in the loop: what a controller is made to stand, and what its tick costs.
+#![forbid(unsafe_code)]
+
+use clap::{Parser, Subcommand};
+use giotto::controller::flash::Verdict;
+use giotto::controller::virtual_controller::VirtualLink;
+use giotto::controller::{Controller, ControllerError};
+use giotto_hil::faults::FaultyLink;
+use giotto_hil::ticks::{self, Counts, TERMS};
+use serde_json::{Value, json};
+use std::process::ExitCode;
+
+/// Scenarios on the giotto controller.
+#[derive(Parser, Debug)]
+#[command(version, about)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Instructions of one engine tick on the M4F image under QEMU, and what the image takes.
+    Ticks {
+        /// One JSON document.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Flashes tables over a link that breaks a tenth of what passes; fails if a wrong one is ever in use.
+    Faults {
+        /// Frames to send.
+        #[arg(long, default_value_t = 100_000)]
+        frames: u64,
+        /// Share of pieces broken.
+        #[arg(long, default_value_t = 0.1)]
+        share: f64,
+        /// Seed of the faults.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+    },
+}
+
+fn main() -> ExitCode {
+    let done = match Cli::parse().command {
+        Command::Ticks { json } => run_ticks(json),
+        Command::Faults { frames, share, seed } => run_faults(frames, share, seed),
+    };
+    match done {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("error: {error}");
+            if let Some(help) = error.help() {
+                eprintln!(" help: {help}");
+            }
+            ExitCode::from(4)
+        }
+    }
+}
+
+fn range(counts: &Counts, name: &str) -> Value {
+    match counts.get(name) {
+        Some((min, max)) => json!({ "min": min, "max": max }),
+        None => Value::Null,
+    }
+}
+
+fn run_ticks(as_json: bool) -> Result<ExitCode, ControllerError> {
+    let mut note = |text: &str| eprintln!("{text}");
+    let counts = ticks::count(&mut note)?;
+    let image = ticks::image_size(&mut note)?;
+    if as_json {
+        let mut extended = range(&counts, "arc_extended");
+        extended["terms"] = json!(TERMS);
+        let document = json!({
+            "arc_beta": range(&counts, "arc_beta"),
+            "arc_beta_steady": range(&counts, "arc_beta_steady"),
+            "arc_extended": extended,
+            "arc_extended_steady": range(&counts, "arc_extended_steady"),
+            "stream": range(&counts, "stream"),
+            "naive_libm": range(&counts, "naive_libm"),
+            "image": { "text_bytes": image.text, "ram_bytes": image.ram, "stack_bytes": image.stack },
+        });
+        println!("{document:#}");
+        return Ok(ExitCode::SUCCESS);
+    }
+    println!("instructions of one tick, compute only (emulated Cortex-M4F)");
+    for (name, (min, max)) in &counts {
+        println!("  {name:20} {min:5} to {max:5}");
+    }
+    println!("image: {} bytes text, {} RAM with a stack of {}", image.text, image.ram, image.stack);
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The table with `count` in its name.
+fn table(count: u64) -> Vec<u8> {
+    let mut image = ticks::largest_table();
+    let Ok(mut table) = giotto_shared::table::decode(&image) else { return image };
+    table.machine = heapless_name(count);
+    image.resize(giotto_shared::table::MAX_IMAGE_BYTES, 0);
+    let length = giotto_shared::table::encode(&table, &mut image).unwrap_or(0);
+    image.truncate(length);
+    image
+}
+
+fn heapless_name(count: u64) -> giotto_shared::table::Name {
+    let mut name = giotto_shared::table::Name::new();
+    // Twenty digits fit.
+    let _ = name.push_str(&count.to_string());
+    name
+}
+
+fn run_faults(frames: u64, share: f64, seed: u64) -> Result<ExitCode, ControllerError> {
+    let link = FaultyLink::new(VirtualLink::new(), seed, share);
+    let mut controller = Controller::connect(Box::new(link), "sim with faults", 1)?;
+    let (mut sent, mut flashes, mut retries, mut wrong) = (0_u64, 0_u64, 0_u64, 0_u64);
+    let mut good: Option<Vec<u8>> = None;
+    while sent < frames {
+        let new = table(flashes);
+        match controller.flash(&new, &mut |_| {}) {
+            Ok(_) => {
+                flashes += 1;
+                good = Some(new.clone());
+            }
+            Err(_) => retries += 1,
+        }
+        // Requests of a flash: begin, chunks, end, read back, commit, confirm, status.
+        sent += 5 + 2 * (new.len() as u64).div_ceil(128);
+        let expected = good.iter().chain([&new]);
+        let verdicts = expected.map(|image| controller.verify(image)).collect::<Vec<_>>();
+        let same = verdicts.iter().any(|verdict| matches!(verdict, Ok(Verdict::Same { .. })));
+        let unknown = verdicts.iter().all(Result::is_err);
+        let nothing_yet = good.is_none();
+        wrong += u64::from(!(same || unknown || nothing_yet));
+    }
+    println!(
+        "seed {seed}: {sent} frames with {:.0} % of pieces broken, {flashes} tables flashed, {retries} tried again, \
+         {} requests repeated, {wrong} wrong tables in use",
+        share * 100.0,
+        controller.repeats()
+    );
+    Ok(if wrong == 0 && flashes > 0 { ExitCode::SUCCESS } else { ExitCode::from(5) })
+}

@@ -12,7 +12,7 @@ use std::time::Duration;
 use tempfile::TempDir;
 
 /// Name of the emulator's program; `GIOTTO_QEMU` names another.
-const PROGRAM: &str = "qemu-system-arm";
+pub const PROGRAM: &str = "qemu-system-arm";
 /// How long it may take to say where its pty is.
 const START_TIME: Duration = Duration::from_secs(10);
 
@@ -38,7 +38,8 @@ pub struct Emulator {
     folder: TempDir,
 }
 
-fn program() -> String {
+/// The emulator to run.
+pub fn program() -> String {
     std::env::var("GIOTTO_QEMU").unwrap_or_else(|_| PROGRAM.to_owned())
 }
 

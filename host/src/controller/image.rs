@@ -16,8 +16,8 @@ pub const PROFILE: &str = "firmware";
 pub enum Board {
     /// QEMU's mps2-an386.
     Mps2An386,
-    /// STM32F405 boards; QEMU's netduinoplus2.
-    Stm32f405,
+    /// Not a controller: counts the instructions of a tick, on the mps2-an386.
+    Ticks,
 }
 
 impl Board {
@@ -25,15 +25,14 @@ impl Board {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Mps2An386 => "mps2_an386",
-            Self::Stm32f405 => "stm32f405",
+            Self::Ticks => "ticks",
         }
     }
 
     /// QEMU's machine that the image runs on.
     pub const fn machine(self) -> &'static str {
         match self {
-            Self::Mps2An386 => "mps2-an386",
-            Self::Stm32f405 => "netduinoplus2",
+            Self::Mps2An386 | Self::Ticks => "mps2-an386",
         }
     }
 }

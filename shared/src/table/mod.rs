@@ -16,6 +16,11 @@ pub const MAX_ZONES: usize = 8;
 /// Most profile terms in one zone.
 pub const MAX_TERMS: usize = 8;
 
+/// Profile terms of a zone.
+pub type Terms = heapless::Vec<Term<f32>, MAX_TERMS>;
+/// Name of a machine.
+pub type Name = heapless::String<32>;
+
 /// Directions of travel a zone holds for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Travel {
@@ -41,7 +46,7 @@ pub struct Zone {
     /// κ2, κ4 of the chain: the operator of `law`.
     pub cumulants: Cumulants<f32>,
     /// Profile terms.
-    pub terms: heapless::Vec<Term<f32>, MAX_TERMS>,
+    pub terms: Terms,
 }
 
 /// Bounds on what the table may do; the image holds harder ones.
@@ -57,7 +62,7 @@ pub struct Limits {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Table {
     /// Name of the machine it was made for, as the campaign gives it (cut to fit).
-    pub machine: heapless::String<32>,
+    pub machine: Name,
     /// First zone that fits is used; none: no correction.
     pub zones: heapless::Vec<Zone, MAX_ZONES>,
     /// Bounds.

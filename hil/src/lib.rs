@@ -1,0 +1,6 @@
+//! Scenarios on the giotto controller: the image under QEMU, the virtual controller, or a real port.
+#![forbid(unsafe_code)]
+
+pub mod elf;
+pub mod faults;
+pub mod ticks;
