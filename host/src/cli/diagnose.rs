@@ -94,6 +94,9 @@ pub(super) fn show(name: &str, d: &Diagnosis, out: &Output) {
                 "{}: {}. Usually {}. Remedy: {}.",
                 words.name, words.what, words.usual, words.adjust
             ));
+            if let Some(note) = &f.note {
+                out.say(format_args!("  {note}."));
+            }
             if !f.indistinguishable_from.is_empty() {
                 out.say(format_args!(
                     "  Not to be told from: {}. Measure: {}.",

@@ -35,6 +35,8 @@ pub struct Finding {
     pub compensable: bool,
     /// The measurement that would make sure.
     pub next_measurement: String,
+    /// What else the data say of it, in words.
+    pub note: Option<String>,
     /// Further parameters (pitch, time constants), units in the names.
     pub params: BTreeMap<String, f64>,
     /// The same as entries of a model.

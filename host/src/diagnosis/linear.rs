@@ -65,3 +65,34 @@ pub fn residual_variance(columns: &[Vec<f64>], values: &[f64]) -> f64 {
     let degrees = values.len().saturating_sub(basis.len());
     if degrees == 0 { 0.0 } else { dot(&left, &left) / degrees as f64 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn solves_a_line_through_the_origin_as_nist_certifies_it() {
+        // NoInt1: y = 130…140 on x = 60…70, b 2.07438016528926, RSS 127.272727272727.
+        let x: Vec<f64> = (60..=70).map(f64::from).collect();
+        let y: Vec<f64> = (130..=140).map(f64::from).collect();
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let products = DMatrix::from_row_slice(2, 2, &[dot(&y, &y), dot(&y, &x), dot(&x, &y), dot(&x, &x)]);
+        let solution = solve(&products, &[1]).unwrap();
+        assert!((solution.coefficients[0] / 2.074_380_165_289_26 - 1.0).abs() < 1e-12);
+        assert!(((dot(&y, &y) - solution.gain) / 127.272_727_272_727 - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn dependent_columns_are_refused() {
+        let products = DMatrix::from_row_slice(3, 3, &[4.0, 2.0, 4.0, 2.0, 1.0, 2.0, 4.0, 2.0, 4.0]);
+        assert!(solve(&products, &[1, 2]).is_none());
+    }
+
+    #[test]
+    fn residual_variance_counts_only_independent_columns() {
+        let ones = vec![1.0; 8];
+        let values: Vec<f64> = (0..8).map(|i| if i % 2 == 0 { 1.0 } else { 3.0 }).collect();
+        // Mean 2, eight deviations of 1, seven degrees of freedom, though the column comes twice.
+        assert!((residual_variance(&[ones.clone(), ones], &values) - 8.0 / 7.0).abs() < 1e-12);
+    }
+}

@@ -118,3 +118,50 @@ pub fn select(
 fn without(set: &[usize], at: usize) -> Vec<usize> {
     set.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, v)| *v).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::causes::Cause;
+
+    /// Products of the data and three columns: the first explains it, the second nearly does, the third not at all.
+    fn products() -> DMatrix<f64> {
+        let columns: [Vec<f64>; 4] = [
+            (0..60).map(|i| 2.0 * f64::from(i % 7) + 0.3 * f64::from((i * 13) % 5)).collect(),
+            (0..60).map(|i| f64::from(i % 7)).collect(),
+            (0..60).map(|i| f64::from(i % 7) + f64::from(i % 3)).collect(),
+            (0..60).map(|i| f64::from((i * 31) % 11) - 5.0).collect(),
+        ];
+        DMatrix::from_fn(4, 4, |i, j| columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum())
+    }
+
+    fn items(price: f64) -> Vec<Item> {
+        [Cause::ScaleError, Cause::RadiusOffset, Cause::Squareness]
+            .into_iter()
+            .enumerate()
+            .map(|(i, cause)| Item {
+                kind: Kind::Cause { cause, axis: None, shape: Vec::new() },
+                columns: vec![i + 1],
+                price,
+                fitted_beside: None,
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_best_column_is_chosen_and_its_neighbour_exchanged_for_it() {
+        let (products, items) = (products(), items(60.0));
+        assert_eq!(select(&products, &[], &items, &[], &[]), vec![0]);
+        assert_eq!(select(&products, &[], &items, &[1], &[]), vec![0], "from the wrong start");
+        assert_eq!(
+            select(&products, &[], &items, &[], &[0]),
+            vec![1],
+            "the neighbour stands in when it is barred"
+        );
+    }
+
+    #[test]
+    fn nothing_is_chosen_above_its_worth() {
+        assert!(select(&products(), &[], &items(1e9), &[], &[]).is_empty());
+    }
+}

@@ -2,6 +2,7 @@
 use super::duration::Clamp;
 use super::explain::{Explained, energies};
 use super::finding::{Estimate, Finding};
+use super::linear::solve;
 use super::search::{Kind, columns_of, evidence, select};
 use super::tone::{Amplitude, Tone};
 use crate::causes::{Cause, Effect};
@@ -54,6 +55,7 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
             indistinguishable_from: look_alikes(found, &weights, at),
             compensable: compensable(&effect),
             next_measurement: words.next.to_string(),
+            note: (*cause == Cause::HigherOrderDynamics).then(|| dynamics_note(found, &weights, at)),
             params,
             effects: vec![effect],
         });
@@ -151,6 +153,7 @@ fn plain(
         indistinguishable_from: words.never_told_from.iter().map(|s| (*s).to_string()).collect(),
         compensable: compensable(&effect),
         next_measurement: words.next.to_string(),
+        note: None,
         params,
         effects: vec![effect],
     }
@@ -241,6 +244,31 @@ fn robust_variances(found: &Explained, columns: &[usize]) -> Vec<f64> {
     let bread = &found.solution.covariance;
     let sandwich = bread * meat * bread * small;
     (0..n).map(|i| sandwich[(i, i)]).collect()
+}
+
+/// Partial F of the fourth-order term beside all others (variances as estimated between runs), and what kind of
+/// chain has such a response.
+fn dynamics_note(found: &Explained, weights: &[f64], at: usize) -> String {
+    let products = found.ledger.white(weights);
+    let gain = |set: &[usize]| {
+        solve(&products, &columns_of(&found.nuisance, &found.items, set))
+            .map_or(0.0, |solution| solution.gain)
+    };
+    let rest: Vec<usize> =
+        found.chosen.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, c)| *c).collect();
+    let partial_f = gain(&found.chosen) - gain(&rest);
+    let dof = found.runs.len().saturating_sub(columns_of(&found.nuisance, &found.items, &found.chosen).len());
+    let (a, b) = (found.response.a_s2, found.response.b_s4);
+    // κ4 = 24β2 − 3κ2² with β2 = 3κ2²/8 − b/2.
+    let ratio = (6.0 * a * a - 12.0 * b) / (a * a);
+    let class = if b > 0.0 {
+        let omega_n2 = b.powf(-0.5);
+        let zeta = (0.5 + 0.25 * a * omega_n2).max(0.0).sqrt();
+        format!("a second-order response with ωn = {:.1} rad/s, ζ = {zeta:.2}", omega_n2.sqrt())
+    } else {
+        "a lag with feed-forward, or friction".to_string()
+    };
+    format!("partial F = {partial_f:.1} (1, {dof}); κ4/κ2² = {ratio:.0}: {class}")
 }
 
 /// Probability of a chosen explanation against the best set that does without it.
