@@ -10,7 +10,7 @@ use giotto_tests::study::sheet::{Row, page};
 use giotto_tests::study::{Job, Outcome, judge, schedule};
 use rayon::prelude::*;
 use std::path::PathBuf;
-use std::process::{Command, ExitCode};
+use std::process::ExitCode;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
@@ -35,33 +35,19 @@ struct Args {
     /// Other grids, instruments and spreads than the paper's.
     #[arg(long)]
     broad: bool,
-    /// The program to ask.
-    #[arg(long, default_value = "target/release/giotto")]
-    giotto: PathBuf,
     /// Where the page goes.
     #[arg(short, long, default_value = "tests/POWER.md")]
     output: PathBuf,
 }
 
-/// Draws the campaign of `job`, has it diagnosed, judges the answer.
-fn ask(job: &Job, args: &Args, variety: Variety) -> Result<Row, String> {
+/// Draws the campaign of `job`, has it diagnosed as a user would from its files, judges the answer.
+fn ask(job: &Job, variety: Variety) -> Result<Row, String> {
     let case = Case::new(&job.kind, job.strength, job.seed, variety).ok_or("no such effect")?;
     let dir = tempfile::tempdir().map_err(|e| e.to_string())?;
     files::write(&case, dir.path()).map_err(|e| e.to_string())?;
-    let mut command = Command::new(&args.giotto);
-    command.arg("diagnose").arg(dir.path()).arg("--json").args(["--seed", "1"]);
-    if case.model.is_some() {
-        command.arg("--model").arg(dir.path().join("model.toml"));
-    }
     let start = Instant::now();
-    let answer = command.output().map_err(|e| format!("{}: {e}", args.giotto.display()))?;
-    let seconds = start.elapsed().as_secs_f64();
-    if !answer.status.success() {
-        return Err(String::from_utf8_lossy(&answer.stderr).into_owned());
-    }
-    let json = serde_json::from_slice(&answer.stdout).map_err(|e| e.to_string())?;
-    let outcome = Outcome::from_json(&json).ok_or("the answer is not as the contract has it")?;
-    Ok(Row { job: job.clone(), verdict: judge(&case, &outcome), seconds })
+    let outcome = Outcome::of(dir.path())?;
+    Ok(Row { job: job.clone(), verdict: judge(&case, &outcome), seconds: start.elapsed().as_secs_f64() })
 }
 
 fn main() -> ExitCode {
@@ -74,7 +60,7 @@ fn main() -> ExitCode {
     let answers: Vec<Result<Row, String>> = jobs
         .par_iter()
         .map(|job| {
-            let row = ask(job, &args, variety)
+            let row = ask(job, variety)
                 .map_err(|e| format!("{} at {}×, seed {}: {e}", job.kind, job.strength, job.seed));
             let n = done.fetch_add(1, Ordering::Relaxed) + 1;
             if n.is_multiple_of(50) {

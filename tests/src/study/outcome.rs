@@ -1,5 +1,8 @@
 //! What `diagnose` said, in the words of the contract's JSON.
+use giotto::diagnosis::{Options, diagnose};
+use giotto::model_file::ModelFile;
 use serde_json::Value;
+use std::path::Path;
 
 /// One entry of `findings`.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,6 +37,17 @@ pub struct Outcome {
 }
 
 impl Outcome {
+    /// Diagnoses the campaign in `dir`, with its `model.toml` if there is one, through the contract's JSON.
+    pub fn of(dir: &Path) -> Result<Self, String> {
+        let campaign = giotto::campaign::read(dir).map_err(|e| e.to_string())?;
+        let model = dir.join("model.toml");
+        let model =
+            if model.exists() { Some(ModelFile::load(&model).map_err(|e| e.to_string())?) } else { None };
+        let diagnosis = diagnose(&campaign, &Options { model, seed: 1 }).map_err(|e| e.to_string())?;
+        let json = serde_json::to_value(&diagnosis).map_err(|e| e.to_string())?;
+        Self::from_json(&json).ok_or_else(|| format!("not as the contract has it: {json}"))
+    }
+
     /// Reads the contract's JSON; `None` where a field is missing or of another kind.
     pub fn from_json(json: &Value) -> Option<Self> {
         let findings = json.get("findings")?.as_array()?.iter().map(finding).collect::<Option<Vec<_>>>()?;

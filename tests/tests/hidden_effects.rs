@@ -1,0 +1,107 @@
+//! The fast part of the study of hidden effects: fixed seeds, small campaigns, one of each kind.
+//! `cargo run --release -p giotto-tests --bin power` runs the rest.
+use giotto_tests::effects::{Case, Keep, Kind, Null};
+use giotto_tests::files;
+use giotto_tests::machine::base::Variety;
+use giotto_tests::study::{Outcome, Verdict, judge};
+use rayon::prelude::*;
+
+fn answer(case: &Case) -> Outcome {
+    let dir = tempfile::tempdir().unwrap();
+    files::write(case, dir.path()).unwrap();
+    Outcome::of(dir.path()).unwrap()
+}
+
+fn ask(kind: &Kind, strength: f64, seed: u64) -> (Case, Verdict) {
+    let case = Case::new(kind, strength, seed, Variety::Small).unwrap();
+    let verdict = judge(&case, &answer(&case));
+    (case, verdict)
+}
+
+fn effects(names: &[&str]) -> Kind {
+    Kind::Effects(names.iter().map(|s| (*s).to_owned()).collect())
+}
+
+fn all_exact(kinds: &[Kind]) {
+    let wrong: Vec<String> = kinds
+        .par_iter()
+        .zip(100_u64..)
+        .filter_map(|(kind, seed)| {
+            let (_, v) = ask(kind, 3.0, seed);
+            (!v.exact || !v.false_findings.is_empty()).then(|| format!("{kind}, seed {seed}: {}", v.said))
+        })
+        .collect();
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn single_effects_at_three_times_the_noise_are_named() {
+    let kinds: Vec<Kind> = giotto_tests::effects::LISTED.iter().map(|n| effects(&[n])).collect();
+    all_exact(&kinds);
+}
+
+#[test]
+fn pairs_and_triples_are_taken_apart() {
+    all_exact(&[
+        effects(&["servo_mismatch", "backlash"]),
+        effects(&["squareness", "scale_mismatch"]),
+        effects(&["higher_order_dynamics", "scale_mismatch", "squareness"]),
+    ]);
+}
+
+#[test]
+fn nothing_is_found_where_nothing_is() {
+    all_exact(&[Null::Noise, Null::Spread, Null::Lag, Null::Model].map(Kind::Null));
+}
+
+#[test]
+fn what_has_no_name_is_left_unexplained() {
+    all_exact(&[effects(&["unknown_third"]), effects(&["unknown_bump"]), effects(&["unknown_four_lobes"])]);
+}
+
+#[test]
+fn the_papers_machine_shows_its_higher_order() {
+    let (case, v) = ask(&effects(&["higher_order_dynamics"]), 30.0, 3);
+    assert!(v.top_right && v.exact, "{}", v.said);
+    assert!(case.truth[0].value < 0.0, "κ4/24 − κ2²/4 of a well damped second order is negative");
+}
+
+#[test]
+fn campaigns_too_poor_to_tell_get_no_guess() {
+    for keep in [Keep::OneRun, Keep::OneFeed, Keep::OneRadius] {
+        let mut case = Case::new(&Kind::Null(Null::Lag), 0.0, 7, Variety::Small).unwrap();
+        keep.thin(&mut case.campaign);
+        let outcome = answer(&case);
+        assert!(outcome.findings.is_empty(), "{keep:?}: {:?}", outcome.findings);
+    }
+}
+
+/// The six open campaigns, where `GIOTTO_CAMPAIGNS` says they are.
+#[test]
+fn open_campaigns_come_out_as_their_truth_says() {
+    let Some(root) = std::env::var_os("GIOTTO_CAMPAIGNS").map(std::path::PathBuf::from) else { return };
+    let mut seen = 0;
+    for entry in std::fs::read_dir(&root).unwrap().filter_map(Result::ok) {
+        let Ok(truth) = std::fs::read_to_string(entry.path().join("truth.json")) else { continue };
+        let truth: serde_json::Value = serde_json::from_str(&truth).unwrap();
+        let outcome = Outcome::of(&entry.path()).unwrap();
+        let said: Vec<&str> = outcome.findings.iter().map(|f| f.cause.as_str()).collect();
+        let truths = truth["truth"].as_array().unwrap();
+        let accepts = |t: &serde_json::Value| -> Vec<String> {
+            t["accept"].as_array().unwrap().iter().filter_map(|a| a.as_str().map(str::to_owned)).collect()
+        };
+        let allowed: Vec<String> = truths.iter().flat_map(&accepts).collect();
+        for cause in &said {
+            let known = allowed.iter().any(|a| a.trim_start_matches('~') == *cause);
+            assert!(known, "{}: {cause} is not there", entry.path().display());
+        }
+        for t in truths {
+            let any = accepts(t);
+            let found =
+                any.iter().any(|a| said.contains(&a.as_str())) || (any.is_empty() && outcome.unexplained);
+            assert!(found, "{}: {t} not found among {said:?}", entry.path().display());
+        }
+        seen += 1;
+    }
+    assert!(seen > 0, "{}: no campaigns", root.display());
+}
