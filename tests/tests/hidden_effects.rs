@@ -25,8 +25,9 @@ fn effects(names: &[&str]) -> Kind {
 fn all_exact(kinds: &[Kind]) {
     let wrong: Vec<String> = kinds
         .par_iter()
-        .zip(100_u64..)
-        .filter_map(|(kind, seed)| {
+        .enumerate()
+        .filter_map(|(row, kind)| {
+            let seed = 100 + row as u64;
             let (_, v) = ask(kind, 3.0, seed);
             (!v.exact || !v.false_findings.is_empty()).then(|| format!("{kind}, seed {seed}: {}", v.said))
         })
