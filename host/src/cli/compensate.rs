@@ -130,7 +130,7 @@ fn document(result: &Compensated, model: &ModelFile) -> Document {
         corrected: arcs.iter().filter(|a| a.left.is_none()).count(),
         left: arcs.iter().filter(|a| a.left.is_some()).count(),
         largest_change_um: arcs.iter().filter_map(|a| a.change_um).fold(0.0, |m, c| f64::max(m, c.abs())),
-        not_applied: model.effects.iter().map(|e| format!("{:?}", e.cause)).collect(),
+        not_applied: model.effects.iter().map(|e| e.cause.id().to_owned()).collect(),
         arcs,
     }
 }
