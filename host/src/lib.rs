@@ -6,6 +6,7 @@ pub mod campaign;
 pub mod causes;
 pub mod cli;
 pub mod controller;
+pub mod demo;
 pub mod diagnosis;
 pub mod fit;
 pub mod gcode;

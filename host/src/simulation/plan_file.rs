@@ -162,6 +162,15 @@ impl Plan {
         Self::of_text(&text, |model| ModelFile::load(&dir.join(model)))
     }
 
+    /// As [`Self::load`], of a text; `file` is the name it goes by in errors and what a model is relative to.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn parse(text: &str, file: &Path) -> Result<Self, TomlFileError> {
+        let dir = file.parent().unwrap_or(Path::new("."));
+        Self::of_text(&TomlText::new(file, text, EXPECTED), |model| ModelFile::load(&dir.join(model)))
+    }
+
     fn of_text(
         text: &TomlText,
         load: impl Fn(&Path) -> Result<ModelFile, TomlFileError>,
