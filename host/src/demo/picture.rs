@@ -51,11 +51,8 @@ pub fn picture(proof: &Proof) -> String {
         radius_m * 1e3,
         feed_m_s * 1e3,
     );
-    let panels: [(&str, f64, fn(&Pair) -> &Measured); 3] = [
-        ("before", 1.0, |p| &p.before),
-        ("after", 1.0, |p| &p.after),
-        ("after", CLOSER, |p| &p.after),
-    ];
+    let panels: [(&str, f64, fn(&Pair) -> &Measured); 3] =
+        [("before", 1.0, |p| &p.before), ("after", 1.0, |p| &p.after), ("after", CLOSER, |p| &p.after)];
     for (index, (title, closer, of)) in panels.into_iter().enumerate() {
         let x = PANEL * (index as f64 + 0.5);
         let magnification = scale * closer * radius_m / NOMINAL;
@@ -87,9 +84,17 @@ fn colour(direction: Direction) -> &'static str {
 /// One panel: `scale` is picture units a metre of deviation.
 fn panel(svg: &mut String, x: f64, title: &str, runs: &[&Measured], scale: f64, magnification: f64) {
     let ring_m = ring(scale);
-    let _ = writeln!(svg, r##"<g transform="translate({x} {MIDDLE})"><text y="-160" text-anchor="middle" font-weight="bold">{title}</text>"##);
-    let _ = writeln!(svg, r##"<text y="-142" text-anchor="middle" fill="#666">deviation × {magnification:.0}</text>"##);
-    for (radius, dash) in [(NOMINAL, ""), (NOMINAL - ring_m * scale, "3 4"), (NOMINAL + ring_m * scale, "3 4")] {
+    let _ = writeln!(
+        svg,
+        r##"<g transform="translate({x} {MIDDLE})"><text y="-160" text-anchor="middle" font-weight="bold">{title}</text>"##
+    );
+    let _ = writeln!(
+        svg,
+        r##"<text y="-142" text-anchor="middle" fill="#666">deviation × {magnification:.0}</text>"##
+    );
+    for (radius, dash) in
+        [(NOMINAL, ""), (NOMINAL - ring_m * scale, "3 4"), (NOMINAL + ring_m * scale, "3 4")]
+    {
         let _ = writeln!(
             svg,
             r##"<circle r="{radius:.1}" fill="none" stroke="#999" stroke-dasharray="{dash}"/>"##
@@ -103,7 +108,8 @@ fn panel(svg: &mut String, x: f64, title: &str, runs: &[&Measured], scale: f64, 
             colour(run.analysis.direction)
         );
     }
-    let mean = |of: fn(&Measured) -> f64| runs.iter().map(|r| of(r)).sum::<f64>() / runs.len().max(1) as f64 * 1e6;
+    let mean =
+        |of: fn(&Measured) -> f64| runs.iter().map(|r| of(r)).sum::<f64>() / runs.len().max(1) as f64 * 1e6;
     let _ = writeln!(
         svg,
         r##"<text y="-6" text-anchor="middle">radius {:+.2} µm</text><text y="12" text-anchor="middle">form {:.1} µm</text><text y="150" text-anchor="middle" fill="#666">dashed: ±{:.0} µm</text></g>"##,

@@ -157,12 +157,12 @@ fn run(
     stream: u64,
 ) -> Result<Measured, DemoError> {
     let every = (controller.identity().tick_hz / RATE_HZ).clamp(1, u32::from(u16::MAX)) as u16;
-    let recording = controller.run_circle(&circle(test.radius_m, test.feed_m_s, test.direction, LAPS), every)?;
-    let turn = last_turn(&recording, test).ok_or(DemoError::NoSteadyTurn {
-        radius_mm: test.radius_m * 1e3,
-        feed_mm_s: test.feed_m_s * 1e3,
-    })?;
-    let position_m: Vec<[f64; 2]> = recording.points.iter().map(|p| [p.corrected_m[0], p.corrected_m[1]]).collect();
+    let recording =
+        controller.run_circle(&circle(test.radius_m, test.feed_m_s, test.direction, LAPS), every)?;
+    let turn = last_turn(&recording, test)
+        .ok_or(DemoError::NoSteadyTurn { radius_mm: test.radius_m * 1e3, feed_mm_s: test.feed_m_s * 1e3 })?;
+    let position_m: Vec<[f64; 2]> =
+        recording.points.iter().map(|p| [p.corrected_m[0], p.corrected_m[1]]).collect();
     let path = drive(
         &plan.machine,
         &SetPoints {
@@ -206,8 +206,11 @@ fn last_turn(recording: &Recording, test: &CircleTest) -> Option<Turn> {
     let rate = sign * test.feed_m_s / test.radius_m;
     let due = rate * recording.dt_s;
     let tolerance = STEADY * due.abs() + ROUNDING_M / test.radius_m;
-    let polar: Vec<[f64; 2]> =
-        recording.points.iter().map(|p| [p.programmed_m[0].hypot(p.programmed_m[1]), p.programmed_m[1].atan2(p.programmed_m[0])]).collect();
+    let polar: Vec<[f64; 2]> = recording
+        .points
+        .iter()
+        .map(|p| [p.programmed_m[0].hypot(p.programmed_m[1]), p.programmed_m[1].atan2(p.programmed_m[0])])
+        .collect();
     let steady = |i: usize| {
         let step = (polar[i][1] - polar[i - 1][1] - due + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0;
         let on = |p: [f64; 2]| (p[0] - test.radius_m).abs() < ON_CIRCLE_M;
