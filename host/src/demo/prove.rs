@@ -226,3 +226,50 @@ fn last_turn(recording: &Recording, test: &CircleTest) -> Option<Turn> {
     let start_s = last as f64 * recording.dt_s - turn_s;
     (span_s > turn_s).then_some(Turn { start_s, turn_s, angle_rad: polar[last][1] })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::controller::SetPointRecord;
+
+    /// Set-points that gain speed over half a turn, hold it for two turns and lose it again, at 1 kHz.
+    fn recording(radius_m: f64, feed_m_s: f64, sign: f64) -> Recording {
+        let (dt_s, rate) = (1e-3, feed_m_s / radius_m);
+        let (ramp_s, cruise_s) = (0.4, 2.0 * TAU / rate);
+        let travelled = |t: f64| {
+            let up = t.min(ramp_s).powi(2) / (2.0 * ramp_s);
+            let cruise = (t - ramp_s).clamp(0.0, cruise_s);
+            let down = (t - ramp_s - cruise_s).max(0.0);
+            up + cruise + down - down.powi(2) / (2.0 * ramp_s)
+        };
+        let nm = |v: f64| (v * 1e9).round() * 1e-9;
+        let point = |i: usize| {
+            let angle = sign * rate * (travelled(i as f64 * dt_s) - 0.5 * ramp_s);
+            let at = [nm(radius_m * angle.cos()), nm(radius_m * angle.sin()), 0.0];
+            SetPointRecord { time_s: i as f64 * dt_s, programmed_m: at, corrected_m: at }
+        };
+        Recording { dt_s, points: (0..((2.0 * ramp_s + cruise_s) / dt_s) as usize).map(point).collect() }
+    }
+
+    #[test]
+    fn last_steady_turn_is_found_in_the_set_points() {
+        for direction in [Direction::Ccw, Direction::Cw] {
+            let test = CircleTest::new(0.11, 0.68, direction);
+            let sign = f64::from(direction.sign());
+            let turn = last_turn(&recording(0.11, 0.68, sign), &test).unwrap();
+            let whole_s = TAU * 0.11 / 0.68;
+            assert!((turn.turn_s - whole_s).abs() < 1e-6, "{turn:?}");
+            // It ends when the speed is taken away: at 0.4 s + two turns, where the angle is that of the start.
+            assert!((turn.start_s - (0.4 + whole_s)).abs() < 5e-3, "{turn:?}");
+            let since = turn.start_s - 0.4 - whole_s;
+            let off = turn.angle_rad - sign * 0.68 / 0.11 * since;
+            assert!((off / TAU - (off / TAU).round()).abs() < 1e-5, "{turn:?}");
+        }
+    }
+
+    #[test]
+    fn a_circle_that_never_runs_at_its_feed_has_no_steady_turn() {
+        let slower = recording(0.11, 0.6, 1.0);
+        assert_eq!(last_turn(&slower, &CircleTest::new(0.11, 0.68, Direction::Ccw)), None);
+    }
+}
