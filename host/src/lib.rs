@@ -11,6 +11,7 @@ pub mod diagnosis;
 pub mod fit;
 pub mod gcode;
 pub mod model_file;
+pub mod planning;
 pub mod report;
 pub mod simulation;
 pub mod table_from_model;

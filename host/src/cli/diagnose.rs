@@ -38,7 +38,7 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         out.note(format_args!("wrote {}", path.display()));
     }
     if let Some(path) = &args.report {
-        let html = crate::report::html(&campaign, &diagnosis);
+        let html = crate::report::html(&campaign, &diagnosis).map_err(Failure::input)?;
         std::fs::write(path, html).map_err(|e| cannot_write(path, &e))?;
         out.note(format_args!("wrote {}", path.display()));
     }

@@ -1,11 +1,142 @@
 //! `giotto plan`: the next runs that would best separate what cannot be told apart yet.
+use super::source::length;
 use super::{Failure, Output};
+use crate::campaign::Direction;
+use crate::causes::Cause;
+use crate::diagnosis::{Options, diagnose};
+use crate::model_file::ModelFile;
+use crate::planning::{self, Limits, Plan, Purpose};
+use comfy_table::{Table, presets};
+use std::path::PathBuf;
 
 /// Arguments of `giotto plan`.
 #[derive(clap::Args, Debug)]
-pub struct Args {}
+pub struct Args {
+    /// Directory with campaign.toml.
+    campaign: PathBuf,
+    /// Write the runs as a plan that `giotto simulate` reads.
+    #[arg(short, long, value_name = "PLAN.toml")]
+    output: Option<PathBuf>,
+    /// Simulation to start from; without it one servo lag with fitted kv.
+    #[arg(long, value_name = "MODEL.toml")]
+    model: Option<PathBuf>,
+    /// Radii that the instrument has, separated by commas; without it half to three times those measured.
+    #[arg(long, value_name = "MM,MM", value_delimiter = ',', value_parser = length)]
+    radii: Vec<f64>,
+    /// Highest feed; without it the highest of the campaign.
+    #[arg(long, value_name = "MM_S", value_parser = length)]
+    max_feed: Option<f64>,
+    /// Highest centripetal acceleration; without it the highest of the campaign.
+    #[arg(long, value_name = "MM_S2", value_parser = length)]
+    max_acceleration: Option<f64>,
+    /// Most runs beside the three reference runs.
+    #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u8).range(1..=60))]
+    runs: u8,
+    /// Seed of the order of the runs and of the diagnosis.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+}
 
 /// Runs the command.
-pub fn run(_args: Args, _out: Output) -> Result<(), Failure> {
-    Err(Failure::usage("giotto plan is not in this build"))
+pub fn run(args: Args, out: Output) -> Result<(), Failure> {
+    let campaign = crate::campaign::read(&args.campaign)?;
+    let model = args
+        .model
+        .as_deref()
+        .map(ModelFile::load)
+        .transpose()
+        .map_err(|e| Failure::input(&e).help(e.help()))?;
+    let diagnosis = diagnose(&campaign, &Options { model, seed: args.seed })
+        .map_err(|e| Failure::input(format_args!("{}: {e}", args.campaign.display())))?;
+    let options = planning::Options {
+        limits: Limits {
+            radii_m: args.radii.iter().map(|mm| mm * 1e-3).collect(),
+            highest_feed_m_s: args.max_feed.map(|mm| mm * 1e-3),
+            highest_acceleration_m_s2: args.max_acceleration.map(|mm| mm * 1e-3),
+        },
+        most_runs: usize::from(args.runs),
+        seed: args.seed,
+    };
+    let plan = planning::propose(&campaign, &diagnosis, &options);
+    if let Some(path) = &args.output {
+        if plan.runs.is_empty() {
+            let why = "no runs to plan: circles have nothing more to tell apart";
+            return Err(Failure::check(why).help("leave out -o to see what the campaign tells"));
+        }
+        let text = toml::to_string(&plan.file(&campaign))
+            .map_err(|e| Failure::input(format_args!("{}: {e}", path.display())))?;
+        let text = format!(
+            "# The next measurement, in this order. Warm up before it: {} turns of the first circle.\n# To simulate it, name the machine here: model = \"MODEL.toml\"\n{text}",
+            plan.warm_up_turns
+        );
+        crate::campaign::replace(path, &text)?;
+        out.note(format_args!("wrote {}", path.display()));
+    }
+    if out.json {
+        return out.document(&plan);
+    }
+    show(&plan, out);
+    Ok(())
+}
+
+fn name(id: &str) -> String {
+    Cause::from_id(id).map_or_else(|| id.replace('_', " "), |cause| cause.model().words().name.to_string())
+}
+
+fn show(plan: &Plan, out: Output) {
+    for class in &plan.open {
+        let members: Vec<String> = class.members.iter().map(|cause| name(cause.id())).collect();
+        out.say(format_args!("Open: any of {}: {}.", members.join(", "), class.why));
+    }
+    for line in &plan.line_tests {
+        let [a, b] = &line.pair;
+        out.say(format_args!(
+            "No circle can tell {} from {} ({}); do a line test: {}.",
+            name(a),
+            name(b),
+            line.why,
+            line.test
+        ));
+    }
+    if plan.runs.is_empty() {
+        out.say("No runs to plan: circles have nothing more to tell apart here.");
+        return;
+    }
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_HORIZONTAL_ONLY).set_header(["run", "R mm", "f mm/s", "direction", "for"]);
+    for (i, step) in plan.runs.iter().enumerate() {
+        table.add_row([
+            (i + 1).to_string(),
+            step.radius_mm.to_string(),
+            step.feed_mm_s.to_string(),
+            match step.direction {
+                Direction::Ccw => "ccw",
+                Direction::Cw => "cw",
+            }
+            .to_string(),
+            match step.purpose {
+                Purpose::Test => "",
+                Purpose::Reference => "reference",
+            }
+            .to_string(),
+        ]);
+    }
+    out.say(&table);
+    for s in &plan.separations {
+        let [a, b] = &s.pair;
+        out.say(format_args!(
+            "{} or {}: χ² {:.0} now, {:.0} with these runs{}.",
+            name(a),
+            name(b),
+            s.expected_chi2_before,
+            s.expected_chi2_after,
+            if s.told() { "" } else { ", not enough" }
+        ));
+    }
+    out.say(format_args!(
+        "Warm up with {} turns of the first circle, then measure in this order: {:.0} min in all; seed {}.",
+        plan.warm_up_turns,
+        (plan.duration_s / 60.0).ceil(),
+        plan.seed
+    ));
 }

@@ -14,6 +14,7 @@ pub mod ledger;
 pub mod linear;
 pub mod misfit;
 pub mod pattern;
+pub mod picture;
 pub mod roughness;
 pub mod search;
 pub mod shape;
@@ -95,6 +96,9 @@ pub struct Diagnosis {
     /// The extended model.
     #[serde(skip)]
     pub model: ModelFile,
+    /// Run by run, what the plots of a report draw.
+    #[serde(skip)]
+    pub picture: Vec<picture::RunPicture>,
 }
 
 /// Why a campaign cannot be diagnosed.
@@ -191,6 +195,7 @@ pub fn diagnose(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Dia
         gain,
         cannot_tell,
         seed: options.seed,
+        picture: picture::draw(campaign, campaign_seen, &found),
         model: gain::extended_model(campaign, &found, effects),
         findings,
     })

@@ -1,0 +1,150 @@
+//! Run by run, what was measured and what the simulation leaves of it, before and after: what plots draw.
+use super::basis::dot;
+use super::explain::{Explained, residual};
+use crate::campaign::Campaign;
+use std::f64::consts::TAU;
+
+/// Sectors of a turn that a profile is averaged over: 2° each.
+pub const SECTORS: usize = 180;
+
+/// One run, with the centre of the circle taken out of every profile.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunPicture {
+    /// Index of the run in the campaign.
+    pub index: usize,
+    /// ω of the feed that the duration of the turn shows, rad/s.
+    pub omega_rad_s: f64,
+    /// Mean over the turn, m: measured deviation, and what the baseline and the extended model leave of it.
+    pub size_m: [f64; 3],
+    /// Root mean square, m: what the baseline and the extended model leave.
+    pub rms_m: [f64; 2],
+    /// The same three over the turn, m: mean of each sector of the recorded angle, nothing where there are no
+    /// samples (or none that were read: stick-slip teeth are not simulated).
+    pub profile_m: [Vec<Option<f64>>; 3],
+}
+
+/// Draws every run. `seen` is the campaign without the effects of a given model.
+pub fn draw(campaign: &Campaign, seen: &Campaign, found: &Explained) -> Vec<RunPicture> {
+    let data = found.ledger.samples(0);
+    let own = found.ledger.samples(found.nuisance[0]);
+    // The baseline with its own coefficient fitted, as in `misfit`.
+    let (mut up, mut down) = (0.0, 0.0);
+    for (y, x) in data.iter().zip(own) {
+        up += dot(y, x);
+        down += dot(x, x);
+    }
+    let amount = if down > 0.0 { up / down } else { 0.0 };
+    let left = residual(found);
+    found
+        .runs
+        .iter()
+        .enumerate()
+        .map(|(at, run)| {
+            let theta = &seen.runs[run.index].samples.angle_rad;
+            let raw = &seen.runs[run.index].samples.deviation_m;
+            let visible = |i: usize| !run.hidden.get(i).copied().unwrap_or(false);
+            let radius = run.view.radius_m;
+            // The baseline is a size: the same at every sample of the run. It knows the programmed feed only.
+            let size = (0..raw.len()).find(|&i| visible(i)).map_or(0.0, |i| {
+                let slowed = found.response.gain(run.programmed_m_s / radius) - run.view.gain;
+                run.deviation_m[i] - data[at][i] + amount * own[at][i] + radius * slowed
+            });
+            let centred = |samples: Vec<f64>| -> (f64, Vec<f64>) {
+                let mut read = samples.clone();
+                run.mask(&mut read);
+                let harmonics = run.basis.harmonics(&read);
+                let [c, s] = harmonics[1];
+                let free = samples.iter().zip(theta).map(|(y, a)| y - c * a.cos() - s * a.sin()).collect();
+                (harmonics[0][0], free)
+            };
+            let measured = centred(campaign.runs[run.index].samples.deviation_m.clone());
+            let before = centred(raw.iter().map(|y| y - size).collect());
+            let after = centred(left[at].clone());
+            let everywhere = |_: usize| true;
+            RunPicture {
+                index: run.index,
+                omega_rad_s: run.view.omega_rad_s,
+                size_m: [measured.0, before.0, after.0],
+                rms_m: [rms(&before.1, everywhere), rms(&after.1, visible)],
+                profile_m: [
+                    sectors(theta, &measured.1, everywhere),
+                    sectors(theta, &before.1, everywhere),
+                    sectors(theta, &after.1, visible),
+                ],
+            }
+        })
+        .collect()
+}
+
+fn rms(samples: &[f64], read: impl Fn(usize) -> bool) -> f64 {
+    let (sum, count) = samples
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| read(*i))
+        .fold((0.0, 0.0), |(sum, count), (_, y)| (sum + y * y, count + 1.0));
+    (sum / f64::max(count, 1.0)).sqrt()
+}
+
+fn sectors(theta: &[f64], samples: &[f64], read: impl Fn(usize) -> bool) -> Vec<Option<f64>> {
+    let mut sums = vec![(0.0, 0.0); SECTORS];
+    for (_, (angle, y)) in theta.iter().zip(samples).enumerate().filter(|(i, _)| read(*i)) {
+        let at = (angle.rem_euclid(TAU) / TAU * SECTORS as f64) as usize;
+        let slot = &mut sums[at.min(SECTORS - 1)];
+        slot.0 += y;
+        slot.1 += 1.0;
+    }
+    sums.into_iter().map(|(sum, count)| (count > 0.0).then(|| sum / count)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::diagnosis::{Options, diagnose};
+    use crate::simulation::machine::PositionLoop;
+    use crate::simulation::{CircleTest, Instrument, Machine, Plan, PlannedTest, campaign};
+    use giotto_shared::Direction;
+
+    /// A square machine with a squareness error: measured is an oval, before keeps it, after does not, and the
+    /// size of the lag is in none but the measured one.
+    #[test]
+    fn before_keeps_what_the_baseline_cannot_and_after_does_not() {
+        let mut tests = Vec::new();
+        for radius_m in [0.1, 0.2] {
+            for feed_m_s in [0.02, 0.1, 0.2] {
+                for direction in [Direction::Ccw, Direction::Cw] {
+                    tests.push(PlannedTest {
+                        test: CircleTest::new(radius_m, feed_m_s, direction),
+                        timed: false,
+                    });
+                }
+            }
+        }
+        let plan = Plan {
+            name: "oval".into(),
+            machine_name: "simulated".into(),
+            machine: Machine {
+                servo: [PositionLoop { kv_per_s: 40.0, feed_forward: 0.0 }; 2],
+                squareness_rad: 200e-6,
+                ..Machine::default()
+            },
+            instrument: Instrument { setup_m: [30e-6, -20e-6], ..Instrument::ballbar() },
+            tests,
+            shuffle: true,
+        };
+        let campaign = campaign(&plan, 3);
+        let diagnosis = diagnose(&campaign, &Options::default()).unwrap();
+        for picture in &diagnosis.picture {
+            let run = &campaign.runs[picture.index];
+            // ½εR·sin2θ has an rms of ½εR/√2.
+            let oval = 0.5 * 200e-6 * run.radius_m / std::f64::consts::SQRT_2;
+            assert!((picture.rms_m[0] / oval - 1.0).abs() < 0.05, "{} {oval}", picture.rms_m[0]);
+            assert!(picture.rms_m[1] < 2e-6, "{}", picture.rms_m[1]);
+            // ΔR = −½ω²/kv²·R
+            let shrink = -0.5 * (run.omega_rad_s() / 40.0).powi(2) * run.radius_m;
+            assert!((picture.size_m[0] - shrink).abs() < 2.5e-6, "{} {shrink}", picture.size_m[0]);
+            assert!(picture.size_m[1].abs() < 2.5e-6 && picture.size_m[2].abs() < 2.5e-6);
+            // At 45° the oval is at its largest whatever the direction; the set-up offset is not in it.
+            let there = picture.profile_m[0][22].unwrap() - picture.size_m[0];
+            assert!((there.abs() / (0.5 * 200e-6 * run.radius_m) - 1.0).abs() < 0.25, "{there}");
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! The next measurement: the few runs that would best tell apart what a diagnosis could not.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `question` | which explanations compete, and which of them no circle can tell apart |
+//! | `grid` | the circles that may be run |
+//! | `information` | what a circle would tell of every explanation, by the causes' own signatures |
+//! | `design` | the choice: Ds-optimality, greedy and then by exchange; what it is worth |
+//! | `sequence` | the order: shuffled, a reference run repeated, a warm-up before |
+mod design;
+mod grid;
+mod information;
+mod question;
+mod sequence;
+#[cfg(test)]
+mod tests;
+
+pub use design::Separation;
+pub use grid::Limits;
+pub use question::{Class, LineTest};
+pub use sequence::{Purpose, Step};
+
+use crate::campaign::Campaign;
+use crate::diagnosis::Diagnosis;
+use crate::simulation::plan_file::{Names, PlanFile, RunSpec};
+use serde::Serialize;
+
+/// What the planner may be told.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// What the machine and the instrument allow.
+    pub limits: Limits,
+    /// Most runs beside the reference runs.
+    pub most_runs: usize,
+    /// Seed of the order.
+    pub seed: u64,
+}
+
+/// A plan, in the form of `giotto plan --json`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Plan {
+    /// Classes of explanations that these runs cannot tell apart.
+    pub open: Vec<Class>,
+    /// What no circle can tell, with the test that can.
+    pub line_tests: Vec<LineTest>,
+    /// The runs in the order to be run; empty where circles have nothing more to tell.
+    pub runs: Vec<Step>,
+    /// What the runs are expected to be worth, pair by pair.
+    pub separations: Vec<Separation>,
+    /// Turns of the reference circle to run before the first measurement.
+    pub warm_up_turns: usize,
+    /// Expected duration with feed-in, feed-out and a pause of 20 s a run, s.
+    pub duration_s: f64,
+    /// Seed of the order.
+    pub seed: u64,
+}
+
+/// Plans the next measurement.
+pub fn propose(campaign: &Campaign, diagnosis: &Diagnosis, options: &Options) -> Plan {
+    let question = question::of(diagnosis);
+    let chosen = if question.classes.is_empty() {
+        design::Chosen::default()
+    } else {
+        let circles = grid::circles(campaign, &options.limits);
+        design::choose(campaign, diagnosis, &question, &circles, options.most_runs)
+    };
+    let mut line_tests = question.line_tests;
+    line_tests.extend(chosen.separations.iter().filter(|s| !s.told()).map(|s| LineTest {
+        pair: s.pair.clone(),
+        test: s.test.clone(),
+        why: "no circle within the limits of radius and feed tells them apart".into(),
+    }));
+    let (runs, warm_up_turns, duration_s) = sequence::sequence(campaign, &chosen.circles, options.seed);
+    Plan {
+        open: question.classes,
+        line_tests,
+        runs,
+        separations: chosen.separations,
+        warm_up_turns,
+        duration_s,
+        seed: options.seed,
+    }
+}
+
+impl Plan {
+    /// The runs as a file that `giotto simulate` reads and a person can follow. The machine in it is perfect:
+    /// put `model = "…"` or a `[machine]` there to simulate another.
+    pub fn file(&self, campaign: &Campaign) -> PlanFile {
+        PlanFile {
+            campaign: Names { name: format!("{}, next", campaign.name), machine: campaign.machine.clone() },
+            runs: self
+                .runs
+                .iter()
+                .map(|step| RunSpec {
+                    radius_mm: step.radius_mm,
+                    feed_mm_s: step.feed_mm_s,
+                    direction: step.direction,
+                    start_angle_deg: 0.0,
+                    started_s: None,
+                    centre_mm: None,
+                })
+                .collect(),
+            ..PlanFile::default()
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! The report in a real browser: no word on the console, and every control does what it says. Skipped, with a
+//! message, where there is no Chromium. `GIOTTO_CAMPAIGNS=DIR` tries every campaign in DIR as well.
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+const GIOTTO: &str = env!("CARGO_BIN_EXE_giotto");
+
+const PLAN: &str = r#"[campaign]
+name = "browser <b>&amp;</b>"
+machine = "simulated mill"
+[machine]
+squareness_um_per_m = 60.0
+both = { kv_per_s = 40.0 }
+x = { backlash_um = 6.0 }
+[grid]
+radii_mm = [100.0, 200.0]
+feeds_mm_s = [20.0, 100.0, 200.0]
+"#;
+
+/// Drives the controls and says what came of it.
+const DRIVER: &str = r##"<script>
+(() => {
+  const said = [];
+  const check = (what, ok) => said.push((ok ? "ok " : "FAILED ") + what);
+  const $ = (id) => document.getElementById(id);
+  const change = (e) => e.dispatchEvent(new Event("change", { bubbles: true }));
+  const paths = () => [...document.querySelectorAll("#polar .polar-line")].map((p) => p.getAttribute("d")).join();
+  const lines = (way) => document.querySelectorAll("#polar .polar-line" + way).length;
+  check("curves are drawn", lines("") > 0);
+  check("both directions", lines(".CCW") > 0 && lines(".CW") > 0);
+  let before = paths();
+  $("magnification").value = "50"; change($("magnification"));
+  check("magnification", paths() !== before && document.querySelector("#polar").textContent.includes("× 50"));
+  before = paths();
+  $("circle").selectedIndex = ($("circle").selectedIndex + 1) % $("circle").length; change($("circle"));
+  check("another circle", $("circle").length < 2 || paths() !== before);
+  const box = (v) => document.querySelector(`input[value=${v}]`);
+  box("CW").checked = false; change(box("CW"));
+  check("without CW", lines(".CW") === 0 && lines(".CCW") > 0);
+  const n = lines("");
+  box("before").checked = true; change(box("before"));
+  check("with before", lines("") > n && lines(".before") > 0);
+  const at = () => $("polar").getAttribute("aria-valuenow");
+  const key = (k) => $("polar").dispatchEvent(new KeyboardEvent("keydown", { key: k, bubbles: true, cancelable: true }));
+  key("ArrowRight"); key("PageUp");
+  check("keys", at() === "32");
+  check("words for a screen reader", $("polar").getAttribute("aria-valuetext").includes("measured"));
+  const r = $("polar").getBoundingClientRect();
+  $("polar").dispatchEvent(new PointerEvent("pointermove", { clientX: r.left + r.width / 2, clientY: r.top + 5, bubbles: true }));
+  check("hover", Math.abs(Number(at()) - 90) <= 2 && /left after [+−]/.test($("readout").textContent));
+  check("focus by keyboard", $("polar").tabIndex === 0);
+  dispatchEvent(new Event("beforeprint"));
+  check("everything is open on paper", [...document.querySelectorAll("details")].every((d) => d.open));
+  check("nothing fetched", performance.getEntriesByType("resource").length === 0);
+  check("no script failed", window.failures.length === 0);
+  const out = document.createElement("pre");
+  out.id = "probe"; out.textContent = said.concat(window.failures).join("\n"); document.body.append(out);
+})();
+</script>"##;
+
+fn chromium() -> Option<&'static str> {
+    ["chromium", "chromium-browser", "google-chrome"]
+        .into_iter()
+        .find(|name| Command::new(name).arg("--version").output().is_ok_and(|o| o.status.success()))
+}
+
+fn giotto(arguments: &[&str]) -> Output {
+    let output = Command::new(GIOTTO).args(arguments).output().unwrap();
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    output
+}
+
+fn browse(browser: &str, page: &Path, profile: &Path) -> (String, String) {
+    let output = Command::new(browser)
+        .args([
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--disable-background-networking",
+            "--no-first-run",
+            "--enable-logging=stderr",
+            "--virtual-time-budget=2000",
+            "--dump-dom",
+        ])
+        .arg(format!("--user-data-dir={}", profile.display()))
+        .arg(format!("file://{}", page.display()))
+        .output()
+        .unwrap();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (text(&output.stdout), text(&output.stderr))
+}
+
+#[test]
+fn the_controls_work_and_the_console_is_silent() {
+    let Some(browser) = chromium() else {
+        eprintln!("skipped: no chromium on this machine (apt-get install chromium)");
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("plan.toml"), PLAN).unwrap();
+    let text = |path: &PathBuf| path.to_str().unwrap().to_owned();
+    giotto(&["simulate", &text(&at("plan.toml")), "-o", &text(&at("campaign"))]);
+    let mut campaigns = vec![at("campaign")];
+    if let Some(more) = std::env::var_os("GIOTTO_CAMPAIGNS") {
+        let all = std::fs::read_dir(more).unwrap().map(|entry| entry.unwrap().path());
+        campaigns.extend(all.filter(|path| path.join("campaign.toml").exists()));
+    }
+    for (i, campaign) in campaigns.iter().enumerate() {
+        let page = at(&format!("{i}.html"));
+        giotto(&["report", &text(campaign), "-o", &text(&page)]);
+        let html = std::fs::read_to_string(&page).unwrap();
+        assert!(html.len() < 3_000_000, "{}: {} bytes", campaign.display(), html.len());
+        let catcher = "<head><script>window.failures=[];addEventListener('error',(e)=>failures.push(e.message))</script>";
+        let driven = html.replacen("<head>", catcher, 1).replacen("</body>", &format!("{DRIVER}</body>"), 1);
+        std::fs::write(&page, driven).unwrap();
+        let (dom, log) = browse(browser, &page, &at(&format!("profile{i}")));
+        assert!(!log.contains("CONSOLE"), "{}: {log}", campaign.display());
+        let probe =
+            dom.split("<pre id=\"probe\">").nth(1).unwrap_or_else(|| unreachable!("no answer: {log}"));
+        let probe = probe.split("</pre>").next().unwrap();
+        assert_eq!(probe.lines().count(), 13, "{probe}");
+        assert!(probe.lines().all(|line| line.starts_with("ok ")), "{}:\n{probe}", campaign.display());
+    }
+}
