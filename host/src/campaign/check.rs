@@ -7,8 +7,12 @@ use super::table::place;
 use giotto_shared::Direction;
 use std::f64::consts::TAU;
 
-/// Largest deviation that still is one, share of the radius.
-const LARGEST_DEVIATION: f64 = 0.1;
+/// Largest mean deviation that still is one, share of the radius: a slow loop at full feed draws circles a tenth too small.
+pub(super) const LARGEST_SIZE_ERROR: f64 = 0.3;
+/// Largest departure of a reading from the mean of its run, share of the radius.
+const LARGEST_FORM: f64 = 0.05;
+/// Largest sample noise, share of the radius: trackers and encoders are ten times better.
+const LARGEST_NOISE: f64 = 0.003;
 /// A sample that far from both neighbours is no motion of a machine: the larger of 1 mm and 1 % of the radius.
 const SPIKE_M: f64 = 1e-3;
 /// Readings this far out that do not move any more stand at the end of a ballbar's range (±1 mm).
@@ -98,7 +102,8 @@ pub(super) fn deviation(
     column: &str,
 ) -> Result<(), CampaignError> {
     let radius = entry.radius_m;
-    let limit = LARGEST_DEVIATION * radius;
+    let mean = deviation.iter().sum::<f64>() / deviation.len() as f64;
+    let far = |v: &f64| (v - mean).abs() > LARGEST_FORM * radius;
     let refuse = |row: usize, hint: String, expected: String| {
         let value = if column == "radius_mm" {
             format!("{:.6} mm", (deviation[row] + radius) * 1e3)
@@ -108,18 +113,27 @@ pub(super) fn deviation(
         let (column, radius_mm) = (column.to_owned(), tidy(radius * 1e3));
         Err(err(entry, row, field, Problem::Implausible { column, value, radius_mm, hint, expected }))
     };
-    if let Some(row) = deviation.iter().position(|v| v.abs() > limit) {
-        let mean = deviation.iter().sum::<f64>() / deviation.len() as f64;
+    if mean.abs() > LARGEST_SIZE_ERROR * radius {
         let hint = if column == "radius_mm" {
             unit_hint((mean + radius) / radius)
         } else if (mean / radius - 1.0).abs() < 0.1 {
             "these look like radii, not deviations".to_owned()
-        } else if deviation.iter().filter(|v| v.abs() > limit).count() * 2 < deviation.len() {
-            "an outlier".to_owned()
         } else {
             "the unit may be wrong".to_owned()
         };
-        return refuse(row, hint, format!("within ±{} mm", tidy(limit * 1e3)));
+        let row = deviation.iter().position(|v| v.abs() > LARGEST_SIZE_ERROR * radius).unwrap_or(0);
+        return refuse(row, hint, format!("a mean within ±{} mm", tidy(LARGEST_SIZE_ERROR * radius * 1e3)));
+    }
+    if let Some(row) = deviation.iter().position(far) {
+        let few = deviation.iter().filter(|v| far(v)).count() * 20 < deviation.len();
+        let hint = if few { "an outlier" } else { "the unit may be wrong" };
+        let expected = format!("within {} mm of the mean", tidy(LARGEST_FORM * radius * 1e3));
+        return refuse(row, hint.to_owned(), expected);
+    }
+    if sample_noise(deviation) > LARGEST_NOISE * radius {
+        let noise_mm = (sample_noise(deviation) * 1e5).round() / 1e2;
+        let hint = format!("neighbours scatter by {noise_mm} mm, the unit may be wrong");
+        return refuse(0, hint, format!("noise below {} mm", tidy(LARGEST_NOISE * radius * 1e3)));
     }
     let spike = SPIKE_M.max(0.01 * radius);
     let lone = |w: &[f64]| (w[1] - w[0]).abs().min((w[1] - w[2]).abs()) > spike;

@@ -210,7 +210,7 @@ fn polar(
     let fit = Xy::new(&x, &y).and_then(|points| circle::fit(&points)).map_err(no_circle)?;
     let Circle { centre, radius } = fit.circle;
     let relative = radius / entry.radius_m;
-    if !(0.9..=1.1).contains(&relative) {
+    if (relative - 1.0).abs() > check::LARGEST_SIZE_ERROR {
         let problem = Problem::WrongRadius {
             fitted_mm: radius * 1e3,
             programmed_mm: entry.radius_m * 1e3,
