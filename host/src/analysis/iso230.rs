@@ -5,7 +5,7 @@
 //! centre): a set-up offset is in F and not in G. D is the radius of the least-squares circle of both
 //! directions minus the nominal one. What needs both directions is `None` where one is missing.
 use super::points::Polar;
-use super::run::RunAnalysis;
+use super::run::{RunAnalysis, SECTORS};
 use crate::campaign::Direction;
 use giotto_shared::circle::{self, Merge};
 
@@ -39,15 +39,11 @@ pub(super) struct Kept {
     extremes: Option<(Vec<f64>, Vec<f64>)>,
 }
 
-/// Runs longer than this keep sector means and extremes only.
-const KEEP_ALL: usize = 1 << 17;
-/// Sectors a turn: within one an offset of 1 mm moves the distance by 0.05 µm.
-const SECTORS: usize = 1 << 17;
-
 impl Kept {
-    /// Keeps what a pair needs of a run.
+    /// Keeps what a pair needs of a run: of a long one sector means and extremes only. Within a sector an offset
+    /// of 1 mm moves the distance by 0.05 µm.
     pub(super) fn of(angle: Vec<f64>, deviation: Vec<f64>) -> Self {
-        if angle.len() <= KEEP_ALL {
+        if angle.len() <= SECTORS {
             return Self { angle, deviation, extremes: None };
         }
         let size = angle.len().div_ceil(SECTORS);

@@ -21,6 +21,18 @@ impl<'a> Polar<'a> {
         Self { radius_m, parts: vec![(angle_rad, deviation_m)] }
     }
 
+    /// Means of equal numbers of neighbours, at most `sectors` of them; `None` if there are no more samples than that.
+    pub(super) fn sector_means(&self, sectors: usize) -> Option<(Vec<f64>, Vec<f64>)> {
+        let [(angle, deviation)] = self.parts.as_slice() else { return None };
+        if angle.len() <= sectors {
+            return None;
+        }
+        let size = angle.len().div_ceil(sectors);
+        let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+        let means = |v: &[f64]| v.par_chunks(size).map(mean).collect();
+        Some((means(angle), means(deviation)))
+    }
+
     fn block<S>(&self, angle: &[f64], deviation: &[f64], part: &impl Fn(&[f64], &[f64]) -> S) -> S {
         let (mut x, mut y) = ([0.0; BLOCK], [0.0; BLOCK]);
         let n = angle.len();

@@ -5,6 +5,9 @@ use crate::campaign::{self, Direction, Run};
 use giotto_shared::circle::{self, CircleError, Merge};
 use std::f64::consts::TAU;
 
+/// Sectors whose means stand for the samples of a long run.
+pub(super) const SECTORS: usize = 1 << 17;
+
 /// What one run shows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunAnalysis {
@@ -75,7 +78,14 @@ impl Merge for Residuals {
 pub fn of_run(run: &Run, turn_s: Option<f64>) -> Result<RunAnalysis, CircleError> {
     let samples = &run.samples;
     let points = Polar::new(run.radius_m, &samples.angle_rad, &samples.deviation_m);
-    let fit = circle::fit(&points)?;
+    // Circle and form of a long run follow from the means of neighbours: over a sector of 2π/2¹⁷ the averaging
+    // takes 2e-8 off the highest order.
+    let sectors = points.sector_means(SECTORS);
+    let smooth = match &sectors {
+        Some((angle, deviation)) => Polar::new(run.radius_m, angle, deviation),
+        None => points.clone(),
+    };
+    let fit = circle::fit(&smooth)?;
     let (centre, radius) = (fit.circle.centre, fit.circle.radius);
     let distance = |a: f64, v: f64| {
         let ((sin, cos), r) = (a.sin_cos(), run.radius_m + v);
@@ -83,9 +93,11 @@ pub fn of_run(run: &Run, turn_s: Option<f64>) -> Result<RunAnalysis, CircleError
     };
     let arc_rad = samples.arc_rad();
     let form = match arc_rad {
-        None => harmonics::solve(&points, |a, v| distance(a, v) - radius),
+        None => harmonics::solve(&smooth, |a, v| distance(a, v) - radius),
         Some(_) => Vec::new(),
     };
+    let table = sectors.is_some().then(|| harmonics::Tabulated::of(&form));
+    let form_at = |a: f64| table.as_ref().map_or_else(|| harmonics::evaluate(&form, a), |t| t.at(a));
     let seen: Residuals = points.fold(|angle, deviation| {
         let mut sums = Residuals::default();
         let mut before = None;
@@ -93,7 +105,7 @@ pub fn of_run(run: &Run, turn_s: Option<f64>) -> Result<RunAnalysis, CircleError
             let d = distance(a, v);
             sums.distance = [sums.distance[0].min(d), sums.distance[1].max(d)];
             sums.deviation = [sums.deviation[0].min(v), sums.deviation[1].max(v)];
-            let e = d - radius - harmonics::evaluate(&form, a);
+            let e = d - radius - form_at(a);
             sums.squares += e * e;
             if let Some(b) = before {
                 sums.products += e * b;
@@ -112,7 +124,7 @@ pub fn of_run(run: &Run, turn_s: Option<f64>) -> Result<RunAnalysis, CircleError
         measured_feed_m_s: turn_s.map(|t| TAU * run.radius_m / t),
         centre_m: centre,
         radius_error_m: radius - run.radius_m,
-        radius_error_se_m: radius_se(&fit, &seen, form.len()),
+        radius_error_se_m: radius_se(&fit, &seen, form.len(), samples.deviation_m.len() as f64),
         out_of_roundness_m: seen.distance[1] - seen.distance[0],
         harmonics: form.into_iter().filter(|h| h.order >= 2).collect(),
         noise_m: campaign::sample_noise(&samples.deviation_m),
@@ -124,9 +136,10 @@ pub fn of_run(run: &Run, turn_s: Option<f64>) -> Result<RunAnalysis, CircleError
 
 /// Standard error of the radius: the covariance of the fit, with the scatter that is left when the form is
 /// taken out, and with fewer independent samples where neighbours are alike (AR(1): n(1−ρ)/(1+ρ)).
-fn radius_se(fit: &circle::CircleFit, seen: &Residuals, orders: usize) -> f64 {
-    let (Some(covariance), n) = (fit.covariance, fit.points as f64) else { return 0.0 };
-    let free = (n - 3.0).max(1.0);
+/// `n` is the number of samples, of which the fit may have seen the means of sectors.
+fn radius_se(fit: &circle::CircleFit, seen: &Residuals, orders: usize, n: f64) -> f64 {
+    let (Some(covariance), fitted) = (fit.covariance, fit.points as f64) else { return 0.0 };
+    let free = (fitted - 3.0).max(1.0);
     if fit.rss <= 0.0 || seen.squares <= 0.0 {
         return 0.0;
     }
@@ -136,5 +149,5 @@ fn radius_se(fit: &circle::CircleFit, seen: &Residuals, orders: usize) -> f64 {
     let rho = (seen.products / seen.pairs.max(1.0)) / (seen.squares / n);
     let rho = rho.clamp(0.0, 1.0 - 1.0 / n);
     let inflation = (1.0 + rho) / (1.0 - rho);
-    (covariance[2][2] * variance / (fit.rss / free) * inflation).max(0.0).sqrt()
+    (covariance[2][2] * variance / (fit.rss / free) * inflation * fitted / n).max(0.0).sqrt()
 }

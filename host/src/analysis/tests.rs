@@ -219,6 +219,14 @@ fn files_and_memory_give_the_same_figures() {
                 .map(|(a, v)| [(R + v) * a.cos(), (R + v) * a.sin()])
         })
         .collect();
+    // A long run by its sectors against all its samples.
+    for (run, found) in runs.iter().zip(&files.runs) {
+        let points = Polar::new(R, &run.samples.angle_rad, &run.samples.deviation_m);
+        let all = giotto_shared::circle::fit(&points).unwrap();
+        near(found.radius_error_m, all.circle.radius - R, 1e-11);
+        // Without the oval, which is not noise, the standard error is 1 µm/√n.
+        near(found.radius_error_se_m * (n as f64).sqrt(), 1e-6, 0.02e-6);
+    }
     let fit = giotto_shared::circle::fit(both.as_slice()).unwrap();
     let distance = |p: &[f64; 2]| (p[0] - fit.circle.centre[0]).hypot(p[1] - fit.circle.centre[1]);
     let range = both.iter().map(distance).fold(f64::MIN, f64::max)
