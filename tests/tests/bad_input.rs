@@ -240,7 +240,20 @@ const CASES: &[(&str, Break, &[&str])] = &[
     ("feed in mm/min", Toml("200.0", "12000"), &["a.csv:", "60 times as long", "mm/min"]),
     ("radius in m", Toml("100.0", "0.1"), &["a.csv:", "1000 times as long", "radius in m"]),
     ("deviation in µm called mm", Line(1, "time_s,deviation_mm"), &["a.csv:2:9", "unit may be wrong"]),
-    ("noise in µm called mm", Csv(|| bytes(csv("time_s,deviation_mm", &rows(1.0, turn).iter().enumerate().map(|(k, [t, _])| [*t, ((k * 7919 + 13) % 17) as f64 / 10.0 - 0.8]).collect::<Vec<_>>()))), &["a.csv:2:9", "scatter"]),
+    (
+        "noise in µm called mm",
+        Csv(|| {
+            bytes(csv(
+                "time_s,deviation_mm",
+                &rows(1.0, turn)
+                    .iter()
+                    .enumerate()
+                    .map(|(k, [t, _])| [*t, ((k * 7919 + 13) % 17) as f64 / 10.0 - 0.8])
+                    .collect::<Vec<_>>(),
+            ))
+        }),
+        &["a.csv:2:9", "scatter"],
+    ),
     (
         "radius called deviation",
         Csv(|| {

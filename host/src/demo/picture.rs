@@ -51,6 +51,7 @@ pub fn picture(proof: &Proof) -> String {
         radius_m * 1e3,
         feed_m_s * 1e3,
     );
+    #[allow(clippy::type_complexity, reason = "a table of panels, read once")]
     let panels: [(&str, f64, fn(&Pair) -> &Measured); 3] =
         [("before", 1.0, |p| &p.before), ("after", 1.0, |p| &p.after), ("after", CLOSER, |p| &p.after)];
     for (index, (title, closer, of)) in panels.into_iter().enumerate() {
