@@ -507,7 +507,10 @@ impl Executor {
             // Without profile terms nothing is wanted at rest.
             self.mode = Mode::Rest;
             (self.rest_nm, self.rest_offset_nm) = (self.segment.end_nm, [0; 3]);
-            return self.finish(self.rest_nm, self.rest_offset_nm, flag::MOVING);
+            if self.guard.rest() {
+                return Output::new(self.rest_nm, [0; 3], flag::MOVING);
+            }
+            return self.finish(self.rest_nm, [0; 3], flag::MOVING);
         }
         self.set_phase(self.end);
         self.mode = Mode::Rest;

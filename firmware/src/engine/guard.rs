@@ -60,6 +60,15 @@ impl Guard {
         self.stale = self.easy_offset_nm != 0;
     }
 
+    /// Comes to rest without an offset after a plan that was relied on; `false` (and no effect) while watched.
+    pub(crate) fn rest(&mut self) -> bool {
+        let relied = self.stale && self.easy_offset_nm != 0;
+        if relied {
+            (self.stale, self.last_nm) = (false, [0; 3]);
+        }
+        relied
+    }
+
     /// The offset is easily seen to be within its bound. Enough for a segment whose change of offset the planner
     /// proved to be within bounds.
     #[inline(always)]

@@ -67,6 +67,16 @@ pub struct StreamPlan {
     corrected: bool,
 }
 
+/// Where in the ring the filter looks: the places of the means, and the middle of them all.
+struct Places {
+    now: usize,
+    one: usize,
+    two: usize,
+    three: usize,
+    four: usize,
+    centre: usize,
+}
+
 /// Fraction bits of the weights: they may reach 8 in size.
 const WEIGHT_BITS: u32 = 28;
 
@@ -117,14 +127,27 @@ impl StreamPlan {
         })
     }
 
-    /// The correction, nm, from five sums, newest first.
+    /// Takes one axis' set-point in; nominal position and correction, nm.
     #[inline(always)]
-    const fn weigh(&self, newest: i32, near: i32, middle: i32, far: i32, oldest: i32) -> i32 {
-        let twice = middle.wrapping_mul(2);
-        let inner = near.wrapping_add(far).wrapping_sub(twice) as i64 * self.inner as i64;
-        let outer = newest.wrapping_add(oldest).wrapping_sub(twice) as i64 * self.outer as i64;
+    fn axis(
+        &self,
+        position: &mut [i32; RING],
+        sum: &mut [i32; RING],
+        total: &mut i32,
+        input: i32,
+        at: &Places,
+    ) -> (i32, i32) {
+        let newest = total.wrapping_add(input).wrapping_sub(position[at.one]);
+        *total = newest;
+        position[at.now] = input;
+        sum[at.now] = newest;
+        let twice = sum[at.two].wrapping_mul(2);
+        let inner = sum[at.one].wrapping_add(sum[at.three]).wrapping_sub(twice);
+        let outer = newest.wrapping_add(sum[at.four]).wrapping_sub(twice);
+        let inner = i64::from(inner).wrapping_mul(i64::from(self.inner));
+        let outer = i64::from(outer).wrapping_mul(i64::from(self.outer));
         // Half a nm of rounding is not worth its instructions.
-        (inner.wrapping_add(outer) >> WEIGHT_BITS) as i32
+        (position[at.centre], (inner.wrapping_add(outer) >> WEIGHT_BITS) as i32)
     }
 
     /// Ticks from a set-point in to the same one out.
@@ -147,11 +170,12 @@ impl StreamPlan {
 #[derive(Clone, Debug)]
 pub struct Stream {
     plan: StreamPlan,
-    /// Positions and running sums over `stride` of them (both wrap; only differences matter), newest at `head`.
-    position: [[i32; 4]; RING],
-    sum: [[i32; 4]; RING],
+    /// By axis: positions and running sums over `stride` of them (sums wrap; only differences matter), newest at
+    /// `head`. One index serves all axes.
+    position: [[i32; RING]; 3],
+    sum: [[i32; RING]; 3],
+    total: [i32; 3],
     head: u32,
-    total: [i32; 4],
     /// Taken as the input before, and its velocity per tick.
     last_nm: [i32; 3],
     velocity: [i32; 3],
@@ -185,18 +209,16 @@ pub struct StreamCounters {
 impl Stream {
     /// At rest at a position; the first set-point expected is number `sequence`, there.
     pub fn new(plan: &StreamPlan, position_nm: [i32; 3], sequence: u16, bypass: bool) -> Self {
-        let [x, y, z] = position_nm;
-        let sums = position_nm.map(|p| p.wrapping_mul(plan.stride as i32));
-        let [sx, sy, sz] = sums;
+        let total = position_nm.map(|p| p.wrapping_mul(plan.stride as i32));
         let engage = Engage::new(plan.engage_ticks, !bypass);
         let mut guard = Guard::new(plan.offset_nm, plan.slew_nm);
         guard.watch(bypass);
         Self {
             plan: *plan,
-            position: [[x, y, z, 0]; RING],
-            sum: [[sx, sy, sz, 0]; RING],
+            position: position_nm.map(|p| [p; RING]),
+            sum: total.map(|t| [t; RING]),
+            total,
             head: 0,
-            total: [sx, sy, sz, 0],
             last_nm: position_nm,
             velocity: [0; 3],
             state: StreamState::Running,
@@ -277,28 +299,20 @@ impl Stream {
         const MASK: u32 = RING as u32 - 1;
         let (stride, head) = (self.plan.stride, self.head.wrapping_add(1));
         self.head = head;
-        let slot = |back: u32| (head.wrapping_sub(back) & MASK) as usize;
-        let [ox, oy, oz, _] = self.position[slot(stride)];
-        self.position[slot(0)] = [x, y, z, 0];
-        let [tx, ty, tz, _] = self.total;
-        let newest = [
-            tx.wrapping_add(x).wrapping_sub(ox),
-            ty.wrapping_add(y).wrapping_sub(oy),
-            tz.wrapping_add(z).wrapping_sub(oz),
-            0,
-        ];
-        self.total = newest;
-        self.sum[slot(0)] = newest;
-        let [ax, ay, az, _] = self.sum[slot(stride)];
-        let [bx, by, bz, _] = self.sum[slot(stride.wrapping_mul(2))];
-        let [cx, cy, cz, _] = self.sum[slot(stride.wrapping_mul(3))];
-        let [dx, dy, dz, _] = self.sum[slot(stride.wrapping_mul(4))];
-        let [sx, sy, sz, _] = newest;
-        let plan = &self.plan;
-        let wanted =
-            [plan.weigh(sx, ax, bx, cx, dx), plan.weigh(sy, ay, by, cy, dy), plan.weigh(sz, az, bz, cz, dz)];
-        let [nx, ny, nz, _] = self.position[slot(stride.wrapping_mul(2).wrapping_add(stride >> 1))];
-        let nominal = [nx, ny, nz];
+        let back = |ticks: u32| (head.wrapping_sub(ticks) & MASK) as usize;
+        let at = Places {
+            now: back(0),
+            one: back(stride),
+            two: back(stride.wrapping_mul(2)),
+            three: back(stride.wrapping_mul(3)),
+            four: back(stride.wrapping_mul(4)),
+            centre: back(stride.wrapping_mul(2).wrapping_add(stride >> 1)),
+        };
+        let ([px, py, pz], [sx, sy, sz], [tx, ty, tz]) = (&mut self.position, &mut self.sum, &mut self.total);
+        let (nx, wx) = self.plan.axis(px, sx, tx, x, &at);
+        let (ny, wy) = self.plan.axis(py, sy, ty, y, &at);
+        let (nz, wz) = self.plan.axis(pz, sz, tz, z, &at);
+        let (nominal, wanted) = ([nx, ny, nz], [wx, wy, wz]);
         if self.guard.pass_easily(wanted) {
             return Output::new(nominal, wanted, flag::MOVING);
         }

@@ -1,5 +1,6 @@
 //! Set-points against an independent `f64` statement of the law.
 extern crate std;
+mod contour;
 mod motion;
 mod terms;
 
