@@ -87,6 +87,7 @@ where
         self.shared.bypass.store(on, Relaxed);
     }
 
+    #[inline(never)]
     fn run_circle(&mut self, run: &CircleRun) -> Result<(), MotionRefusal> {
         let now = self.snapshot();
         match now.state {

@@ -97,6 +97,7 @@ impl Planner {
     }
 
     /// The positioning move to where a circle starts (`None` if already there), and the circle.
+    #[inline(never)]
     pub fn circle(&mut self, run: &CircleRun) -> Result<(Option<Planned>, Planned), Refused> {
         finite(&run.centre_m, "centre")?;
         positive(run.radius_m, "radius")?;

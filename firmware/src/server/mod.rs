@@ -1,5 +1,8 @@
 //! The protocol state machine: bytes in, bytes out, over a flash and an engine. No clock, no registers.
 //!
+//! What a request does is never inlined into the loop that waits for it: its frame would lie under all others, and
+//! the stack is the half of a controller's memory.
+//!
 //! Tables live in three places: the [`Store`] (what boots), the engine (what corrects), and in between the
 //! buffer of an upload. The order of an update is `WriteBegin`, `WriteChunk`…, `WriteEnd` (the table is
 //! checked in memory, only then is the slot not in use programmed and compared), `Commit` (the engine, at
@@ -216,6 +219,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
         wire::encode(&FromController::SetPoints(batch), &mut self.buffers.frame).ok().map(|frame| &*frame)
     }
 
+    #[inline(never)]
     fn execute(&mut self, command: Command) -> Result<Reply, Refusal> {
         match command {
             Command::Hello => return Ok(Reply::Identity(self.identity())),
@@ -269,6 +273,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
         self.motion.bypass(self.bypassed());
     }
 
+    #[inline(never)]
     fn read_back(&mut self, slot: u8, offset: u16, length: u8) -> Result<Reply, Refusal> {
         let length = usize::from(length);
         if slot > 1 || length > CHUNK {
@@ -280,6 +285,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
         Ok(Reply::Data { offset, data })
     }
 
+    #[inline(never)]
     fn run_circle(&mut self, run: &CircleRun) -> Result<(), Refusal> {
         self.idle()?;
         check_run(run).map_err(Refusal::Motion)?;
@@ -293,6 +299,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
         Ok(())
     }
 
+    #[inline(never)]
     fn identity(&self) -> Identity {
         Identity {
             board: cut(self.board.name),
@@ -306,6 +313,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
         }
     }
 
+    #[inline(never)]
     fn status(&self) -> Status {
         let now = self.motion.snapshot();
         let frames = self.buffers.accumulator.counts();

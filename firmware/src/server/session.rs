@@ -13,6 +13,7 @@ pub(super) struct Head {
 pub(super) struct NotUnderstood;
 
 /// Reads a request; `None` if not even its head can be read.
+#[inline(never)]
 pub(super) fn read(payload: &[u8]) -> Option<(Head, Result<Command, NotUnderstood>)> {
     let (session, rest) = postcard::take_from_bytes::<u16>(payload).ok()?;
     let (seq, rest) = postcard::take_from_bytes::<u16>(rest).ok()?;
@@ -85,6 +86,7 @@ impl Session {
 }
 
 /// Frames a reply.
+#[inline(never)]
 pub(super) fn frame(head: Head, reply: Reply, out: &mut [u8; MAX_FRAME]) -> Option<&[u8]> {
     let Head { session, seq } = head;
     let message = FromController::Reply { session, seq, reply };

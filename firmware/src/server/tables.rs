@@ -7,6 +7,7 @@ use giotto_shared::wire::{MotionRefusal, Probation, Refusal};
 
 impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     /// Gives the table in `slot` to the engine.
+    #[inline(never)]
     fn install(&mut self, slot: u8) -> Result<(), Refusal> {
         self.upload.abort();
         let image = self.store.load(slot, &mut self.buffers.image).map_err(Refusal::Flash)?;
@@ -43,6 +44,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     }
 
     /// Checks the uploaded table and programs the slot that does not boot.
+    #[inline(never)]
     pub(super) fn program(&mut self) -> Result<u8, Refusal> {
         self.idle()?;
         let length = self.upload.end(&self.buffers.image)?;
@@ -65,6 +67,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     }
 
     /// Hands the written table to the engine, on probation.
+    #[inline(never)]
     pub(super) fn commit(&mut self) -> Result<(), Refusal> {
         self.idle()?;
         let slot = self.written.ok_or(Refusal::NothingToCommit)?;
@@ -78,6 +81,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     }
 
     /// Makes the table on probation the one that boots.
+    #[inline(never)]
     pub(super) fn confirm(&mut self) -> Result<(), Refusal> {
         let slot = match self.probation {
             Probation::None => None,
@@ -91,6 +95,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     }
 
     /// Ends a probation, or else makes the other confirmed table the one that boots.
+    #[inline(never)]
     pub(super) fn roll_back(&mut self) -> Result<(), Refusal> {
         self.idle()?;
         if self.probation != Probation::None {
