@@ -14,7 +14,7 @@ fn document(seed: &str) -> Value {
 }
 
 fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+    value.as_f64().expect("a number")
 }
 
 fn meets_the_bar(seed: &str) -> Value {
