@@ -161,7 +161,7 @@ pub enum Problem {
     #[error("{column} is {value}, far from a circle of {radius_mm} mm: {hint}; expected {expected}")]
     Implausible { column: String, value: String, radius_mm: f64, hint: String, expected: String },
     #[error(
-        "the points fit a circle of radius {fitted_mm:.6} mm, the campaign says {programmed_mm} mm: {hint}; expected them to agree within 30 %"
+        "the points fit a circle of radius {fitted_mm:.6} mm, the campaign says {programmed_mm} mm: {hint}; expected them to agree within 25 %"
     )]
     WrongRadius { fitted_mm: f64, programmed_mm: f64, hint: String },
     #[error("no circle through the points: {reason}; expected points on a circle")]
