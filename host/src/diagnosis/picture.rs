@@ -1,6 +1,8 @@
 //! Run by run, what was measured and what the simulation leaves of it, before and after: what plots draw.
-use super::basis::dot;
+use super::basis::{axpy, dot};
 use super::explain::{Explained, residual};
+use super::ledger::Samples;
+use super::search::{Kind, columns_of};
 use crate::campaign::Campaign;
 use std::f64::consts::TAU;
 
@@ -34,7 +36,7 @@ pub fn draw(campaign: &Campaign, seen: &Campaign, found: &Explained) -> Vec<RunP
         down += dot(x, x);
     }
     let amount = if down > 0.0 { up / down } else { 0.0 };
-    let left = residual(found);
+    let left = left_by_simulation(found);
     found
         .runs
         .iter()
@@ -74,6 +76,24 @@ pub fn draw(campaign: &Campaign, seen: &Campaign, found: &Explained) -> Vec<RunP
             }
         })
         .collect()
+}
+
+/// What the extended simulation leaves: the residual of the search, and what has no name, which no simulation
+/// holds.
+fn left_by_simulation(found: &Explained) -> Samples {
+    let mut left = residual(found);
+    let columns = columns_of(&found.nuisance, &found.items, &found.chosen);
+    for &item in &found.chosen {
+        let Kind::Pattern(_) = found.items[item].kind else { continue };
+        for own in &found.items[item].columns {
+            let Some(at) = columns.iter().position(|column| column == own) else { continue };
+            let amount = found.solution.coefficients[at];
+            for (left, samples) in left.iter_mut().zip(found.ledger.samples(*own)) {
+                axpy(amount, samples, left);
+            }
+        }
+    }
+    left
 }
 
 fn rms(samples: &[f64], read: impl Fn(usize) -> bool) -> f64 {
