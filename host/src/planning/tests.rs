@@ -90,8 +90,9 @@ fn the_order_is_shuffled_by_the_seed_with_a_reference_first_in_the_middle_and_la
     let (first, last) = (plan.runs[0], plan.runs[plan.runs.len() - 1]);
     assert!(first == last && first.purpose == Purpose::Reference && first.radius_mm == 100.0);
     assert_eq!(plan, propose(&old, &diagnosis, &options()));
-    let other = propose(&old, &diagnosis, &Options { seed: 8, ..options() });
-    assert_ne!(other.runs, plan.runs);
+    // Two seeds may shuffle few runs alike; twenty do not.
+    let shuffled = |seed| propose(&old, &diagnosis, &Options { seed, ..options() }).runs;
+    assert!((8..28).any(|seed| shuffled(seed) != plan.runs));
     // Nothing faster or harder than what the machine has shown.
     for step in &plan.runs {
         assert!(step.feed_mm_s <= 300.0 + 1e-9);

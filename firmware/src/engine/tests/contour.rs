@@ -219,6 +219,7 @@ fn streamed(curve: &dyn Fn(f64) -> [f64; 2], rate: f64) -> Vec<Output> {
 fn streamed_ellipse_and_figure_of_eight() {
     let ellipse = |u: f64| [0.05 * u.cos(), 0.03 * u.sin()];
     let eight = |u: f64| [0.05 * u.sin(), 0.03 * (2.0 * u).sin()];
+    #[allow(clippy::type_complexity, reason = "a table of curves, read once")]
     let shapes: [(&str, &dyn Fn(f64) -> [f64; 2], f64, f64); 2] =
         [("ellipse", &ellipse, 5.0, 0.02), ("figure of eight", &eight, 4.0, 0.05)];
     for (name, curve, rate, bar) in shapes {
