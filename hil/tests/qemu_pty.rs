@@ -1,4 +1,5 @@
 //! The image in QEMU over a real pty, opened with the serialport crate. Needs the emulator: `.ci/setup` brings it.
+#![allow(clippy::unwrap_used, reason = "helpers of a test fail as the test does")]
 use giotto::controller::emulator::{Emulator, Pace};
 use giotto::controller::flash::Verdict;
 use giotto::controller::port::BAUD;
