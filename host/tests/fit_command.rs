@@ -1,4 +1,5 @@
 //! `giotto fit` as its user runs it: JSON by the contract, model file, figures, exit codes.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of a test fail as the test does")]
 use giotto::campaign::{Campaign, Direction, Run, Samples, write};
 use giotto::model_file::{ModelFile, Servo};
 use giotto_shared::model::RadiusModel;

@@ -1,5 +1,6 @@
 //! The report in a real browser: no word on the console, and every control does what it says. Skipped, with a
 //! message, where there is no Chromium. `GIOTTO_CAMPAIGNS=DIR` tries every campaign in DIR as well.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of a test fail as the test does")]
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 

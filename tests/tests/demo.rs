@@ -1,4 +1,5 @@
 //! `giotto demo`: the bar of the whole ring, and that it is missed when the correction is wrong.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of a test fail as the test does")]
 use giotto::controller::{OpenOptions, Port, open};
 use giotto::demo::{CIRCLES, Learned, Proof, bundled, learn, picture, prove};
 use giotto_shared::table::Table;

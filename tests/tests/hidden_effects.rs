@@ -1,5 +1,6 @@
 //! The fast part of the study of hidden effects: fixed seeds, small campaigns, one of each kind.
 //! `cargo run --release -p giotto-tests --bin power` runs the rest.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of a test fail as the test does")]
 use giotto_tests::effects::{Case, Keep, Kind, Null};
 use giotto_tests::files;
 use giotto_tests::machine::base::Variety;

@@ -1,5 +1,6 @@
 //! The machine of the hidden-effect tests against the closed forms: sign, size, parity of every effect.
 //! `diagnose` relies on these conventions, so they are checked on a machine that knows none of them.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of a test fail as the test does")]
 use giotto::campaign::Direction;
 use giotto_tests::machine::run::simulate;
 use giotto_tests::machine::{AxisChain, Cyclic, Friction, Machine, Test, Thermal, Vibration};

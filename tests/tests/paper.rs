@@ -1,5 +1,6 @@
 //! The paper's claims on simulated campaigns with its coefficients.
 //! The full study, sample by sample with 1000 samples a turn: `cargo run --release -p giotto-tests --bin paper`.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of a test fail as the test does")]
 use giotto::fit::{Offset, critical_f};
 use giotto_tests::paper::Measurement;
 use giotto_tests::paper::printed::{F1, F2, F21, HALF_BETA1, HALF_BETA2, follows};
