@@ -136,8 +136,22 @@ fn circle_with_entry_and_exit() {
     report("circle R50 f300", (error(&path(&|o| o.corrected_nm)), error(&path(&|o| o.nominal_nm))), 0.01);
 }
 
+/// The bar of both paths with joints, as a share of the uncorrected error.
+const JOINTS: f64 = 0.05;
+
 #[test]
-fn arc_between_lines_and_rounded_rectangle() {
+#[ignore = "known to fail: 9 % and 13 % of the error are left where 5 % may be"]
+fn arc_between_lines_and_rounded_rectangle_meet_the_bar() {
+    arcs_with_joints(JOINTS, JOINTS);
+}
+
+/// No proof of the bar, which is [`JOINTS`]: what is reached without look-ahead must not get worse.
+#[test]
+fn arcs_with_joints_get_no_worse() {
+    arcs_with_joints(0.1, 0.15);
+}
+
+fn arcs_with_joints(arc_bar: f64, rectangle_bar: f64) {
     let mut engine = engine(0.5, 5.0);
     let feed_m_s = 0.2;
     let quarter = |centre: [f64; 2]| Segment::Arc {
@@ -163,7 +177,7 @@ fn arc_between_lines_and_rounded_rectangle() {
         }
     };
     // Every arc here is ramps from end to end, so κ3 shows: 5 % would need the feed to be held through the joints.
-    report("arc between lines", both(&out, &distance), 0.1);
+    report("arc between lines", both(&out, &distance), arc_bar);
 
     let (w, h, r) = (0.1, 0.06, 0.015);
     let mut engine = self::engine(0.5, 5.0);
@@ -188,7 +202,7 @@ fn arc_between_lines_and_rounded_rectangle() {
         let dy = (p[1] - h / 2.0).abs() - (h / 2.0 - r);
         if dx > 0.0 && dy > 0.0 { dx.hypot(dy) - r } else { dx.max(dy) - r }
     };
-    report("rounded rectangle", both(&out, &distance), 0.15);
+    report("rounded rectangle", both(&out, &distance), rectangle_bar);
 }
 
 /// A closed curve streamed twice round, started and ended smoothly.
