@@ -53,6 +53,20 @@ impl Response {
         }
     }
 
+    /// Phase of the simplest chain with this gain, to third order in ω: one lag (b ≤ 0), or a second-order
+    /// response, φ = 2ζr + (2ζ − 8ζ³/3)r³, r = ω/ωn. What a radius alone says of the delay: dead time is not in it.
+    pub fn own_lag(&self) -> Lag {
+        if self.b_s4 > 0.0 {
+            let omega_n = self.b_s4.powf(-0.25);
+            let zeta = (0.5 + 0.25 * self.a_s2 * omega_n * omega_n).max(0.0).sqrt();
+            let tau3_s3 = (8.0 / 3.0 * zeta.powi(3) - 2.0 * zeta) / omega_n.powi(3);
+            Lag { tau_s: 2.0 * zeta / omega_n, tau3_s3, measured: false }
+        } else {
+            let tau_s = self.a_s2.max(0.0).sqrt();
+            Lag { tau_s, tau3_s3: tau_s.powi(3) / 3.0, measured: false }
+        }
+    }
+
     /// |G(jω)|.
     pub fn gain(&self, omega_rad_s: f64) -> f64 {
         let w2 = omega_rad_s * omega_rad_s;
@@ -166,8 +180,11 @@ pub fn prepare(campaign: &Campaign, response: &Response) -> (Vec<Prepared>, Lag)
     };
     for run in &mut runs {
         // An angle that was measured holds no lag, but the servo's own phase still turns its signatures.
-        run.view.lag_rad =
-            if inferred { lag.phase(run.view.omega_rad_s) } else { servo_phase(response, &run.view) };
+        run.view.lag_rad = if inferred {
+            lag.phase(run.view.omega_rad_s)
+        } else {
+            response.own_lag().phase(run.view.omega_rad_s)
+        };
         if inferred {
             let turn = run.view.sign * run.view.lag_rad;
             run.turned_rad = turn;
@@ -176,11 +193,6 @@ pub fn prepare(campaign: &Campaign, response: &Response) -> (Vec<Prepared>, Lag)
         run.view.place(psi);
     }
     (runs, lag)
-}
-
-/// Phase of a lag with this response.
-fn servo_phase(response: &Response, view: &RunView) -> f64 {
-    (response.a_s2.max(0.0).sqrt() * view.omega_rad_s).atan()
 }
 
 /// Least eccentricity that shows its turn clearly against a micrometre of noise, m.
@@ -195,8 +207,8 @@ fn measure_lag(runs: &[Prepared], response: &Response) -> Lag {
             Some((run.view.sign, run.view.omega_rad_s, first))
         })
         .collect();
-    let guess = response.a_s2.max(0.0).sqrt();
-    let unmeasured = Lag { tau_s: guess, tau3_s3: 0.0, measured: false };
+    let unmeasured = response.own_lag();
+    let guess = unmeasured.tau_s;
     let cost = |tau: f64, tau3: f64| -> (f64, f64) {
         let (mut re, mut im) = (0.0, 0.0);
         for (sign, omega, [c, s]) in &points {
@@ -248,4 +260,21 @@ fn measure_lag(runs: &[Prepared], response: &Response) -> Lag {
         return unmeasured;
     }
     Lag { tau_s: tau, tau3_s3: tau3, measured: true }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn own_lag_is_the_phase_of_the_chain() {
+        let (omega_n, zeta) = (38.0_f64, 0.72_f64);
+        let second = Response::of(&Servo::SecondOrder { omega_n_rad_s: omega_n, zeta });
+        let lag = Response::of(&Servo::Lag { kv_per_s: 90.0 });
+        for omega in [0.5, 3.0, 7.0] {
+            let exact = (2.0 * zeta * omega / omega_n).atan2(1.0 - (omega / omega_n).powi(2));
+            assert!((second.own_lag().phase(omega) - exact).abs() < 2e-4, "{omega}: {exact}");
+            assert!((lag.own_lag().phase(omega) - (omega / 90.0).atan()).abs() < 1e-6, "{omega}");
+        }
+    }
 }
