@@ -42,14 +42,12 @@ fn meets_the_bar(seed: &str) -> Value {
     demo
 }
 
-/// Not met on this tree: 28 µm become 26 µm. The ovals that the diagnosis finds in the demo's machine are not yet
-/// taken out by the controller; the size is.
+/// Noise of 1 µm makes 7 to 8 µm of out-of-roundness by itself; the rest were ovals and reversals.
 #[test]
-#[ignore = "known to fail: the demo's out-of-roundness does not fall by 30 % yet"]
 fn the_circles_become_rounder() {
     let demo = meets_the_bar("1");
     let [before, after] = ["before", "after"].map(|when| number(&demo[when]["out_of_roundness_um"]));
-    assert!(after < 0.7 * before, "{before} um to {after} um");
+    assert!(after < 0.5 * before, "{before} um to {after} um");
 }
 
 #[test]
