@@ -3,4 +3,5 @@
 
 pub mod elf;
 pub mod faults;
+pub mod size;
 pub mod ticks;

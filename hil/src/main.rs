@@ -3,9 +3,11 @@
 
 use clap::{Parser, Subcommand};
 use giotto::controller::flash::Verdict;
+use giotto::controller::image::Board;
 use giotto::controller::virtual_controller::VirtualLink;
 use giotto::controller::{Controller, ControllerError};
 use giotto_hil::faults::FaultyLink;
+use giotto_hil::size;
 use giotto_hil::ticks::{self, Counts, TERMS};
 use serde_json::{Value, json};
 use std::process::ExitCode;
@@ -26,6 +28,15 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// What an image takes in flash and RAM, its deepest stack, and whether its tick can panic.
+    Size {
+        /// One JSON document.
+        #[arg(long)]
+        json: bool,
+        /// Exit code 5 unless every bar is met.
+        #[arg(long)]
+        check: bool,
+    },
     /// Flashes tables over a link that breaks a tenth of what passes; fails if a wrong one is ever in use.
     Faults {
         /// Frames to send.
@@ -43,6 +54,7 @@ enum Command {
 fn main() -> ExitCode {
     let done = match Cli::parse().command {
         Command::Ticks { json } => run_ticks(json),
+        Command::Size { json, check } => run_size(json, check),
         Command::Faults { frames, share, seed } => run_faults(frames, share, seed),
     };
     match done {
@@ -89,6 +101,32 @@ fn run_ticks(as_json: bool) -> Result<ExitCode, ControllerError> {
     }
     println!("image: {} bytes text, {} RAM with a stack of {}", image.text, image.ram, image.stack);
     Ok(ExitCode::SUCCESS)
+}
+
+fn run_size(as_json: bool, check: bool) -> Result<ExitCode, ControllerError> {
+    let report = size::measure(Board::Mps2An386, &mut |text: &str| eprintln!("{text}"))?;
+    if as_json {
+        println!("{:#}", report.document());
+    } else {
+        println!("image {}", report.board.name());
+        println!("  text      {:6} bytes of {}", report.text, size::TEXT_BAR);
+        println!(
+            "  RAM       {:6} bytes of {}: {} of variables, {} of stack at the deepest",
+            report.ram(),
+            size::RAM_BAR,
+            report.variables,
+            report.stack
+        );
+        println!("  panics in the image: {}", names(report.panics.iter()));
+        println!("  panics that the tick can reach: {}", names(report.panics_in_tick().iter()));
+        println!("  calls of the tick through pointers: {}", names(report.tick.indirect.iter()));
+    }
+    Ok(if check && !report.meets_bars() { ExitCode::from(5) } else { ExitCode::SUCCESS })
+}
+
+fn names(names: impl Iterator<Item = impl std::fmt::Display>) -> String {
+    let names: Vec<String> = names.map(|name| name.to_string()).collect();
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 
 /// The table with `count` in its name.

@@ -95,6 +95,10 @@ where
             MotionState::Running | MotionState::Stopping => return Err(MotionRefusal::Busy),
             MotionState::Fault => return Err(MotionRefusal::Fault),
         }
+        if now.stop_input {
+            return Err(MotionRefusal::StopInput);
+        }
+        self.shared.hold.store(false, Relaxed);
         self.planner.resync(now.raw_nm, self.shared.epoch());
         let (approach, circle) = self.planner.circle(run).map_err(in_words)?;
         // At rest the queue is empty, and it has room for both.
@@ -108,6 +112,10 @@ where
 
     fn stop(&mut self) {
         self.shared.stop.store(true, Relaxed);
+    }
+
+    fn hold(&mut self) {
+        self.shared.hold.store(true, Relaxed);
     }
 
     fn subscribe(&mut self, every: u16) {

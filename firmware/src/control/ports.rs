@@ -21,7 +21,7 @@ pub trait Receiver<T> {
     fn waiting(&self) -> usize;
 }
 
-impl<T> Sender<T> for heapless::spsc::Producer<'_, T> {
+impl<T, const N: usize> Sender<T> for heapless_spsc::spsc::Producer<'_, T, N> {
     #[inline]
     fn send(&mut self, thing: T) -> Result<(), T> {
         self.enqueue(thing)
@@ -32,7 +32,7 @@ impl<T> Sender<T> for heapless::spsc::Producer<'_, T> {
     }
 }
 
-impl<T> Receiver<T> for heapless::spsc::Consumer<'_, T> {
+impl<T, const N: usize> Receiver<T> for heapless_spsc::spsc::Consumer<'_, T, N> {
     #[inline]
     fn receive(&mut self) -> Option<T> {
         self.dequeue()

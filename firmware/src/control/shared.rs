@@ -1,9 +1,9 @@
 //! Words that the tick writes and the background reads, and the other way round.
-use crate::engine::{Counters, Output};
+use crate::engine::{Counters, Fault, Output};
 use crate::server::Snapshot;
 use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU8, AtomicU16, AtomicU32, Ordering::Relaxed};
 use core::sync::atomic::{Ordering, compiler_fence};
-use giotto_shared::wire::MotionState;
+use giotto_shared::wire::{FaultCause, MotionState};
 
 /// State of the engine as the tick leaves it, and wishes of the background. On one core, so that a
 /// compiler fence orders what the interrupt writes.
@@ -19,8 +19,14 @@ pub struct Shared {
     offset_cuts: AtomicU32,
     slew_cuts: AtomicU32,
     dropped: AtomicU32,
+    fault: AtomicU8,
+    dropped_segments: AtomicU32,
+    uncorrected: AtomicU32,
+    stops: AtomicU32,
     // Written by the background.
     pub(super) bypass: AtomicBool,
+    pub(super) hold: AtomicBool,
+    /// Raised by the background, lowered by the tick that obeys.
     pub(super) stop: AtomicBool,
     pub(super) every: AtomicU16,
     // Written by the board.
@@ -38,6 +44,10 @@ const RUNNING: u8 = 1;
 const STOPPING: u8 = 2;
 const FAULT: u8 = 3;
 
+const NO_FAULT: u8 = 0;
+const OVERRUN: u8 = 1;
+const DISCONTINUITY: u8 = 2;
+
 impl Shared {
     /// At rest at the origin, bypassed.
     pub const fn new() -> Self {
@@ -51,16 +61,22 @@ impl Shared {
             offset_cuts: AtomicU32::new(0),
             slew_cuts: AtomicU32::new(0),
             dropped: AtomicU32::new(0),
+            fault: AtomicU8::new(NO_FAULT),
+            dropped_segments: AtomicU32::new(0),
+            uncorrected: AtomicU32::new(0),
+            stops: AtomicU32::new(0),
             bypass: AtomicBool::new(true),
+            hold: AtomicBool::new(false),
             stop: AtomicBool::new(false),
             every: AtomicU16::new(0),
             stop_input: AtomicBool::new(false),
         }
     }
 
-    /// The board's stop input: a run under way stops within limits, from the next tick on.
-    pub fn press_stop(&self) {
-        self.stop_input.store(true, Relaxed);
+    /// The board's stop input: while it is active a run under way stops within limits, from the next tick on, and
+    /// nothing starts.
+    pub fn set_stop_input(&self, active: bool) {
+        self.stop_input.store(active, Relaxed);
     }
 
     /// Publishes a tick.
@@ -69,6 +85,7 @@ impl Shared {
         tick: u32,
         state: MotionState,
         epoch: u8,
+        fault: Option<Fault>,
         output: &Output,
         counters: &Counters,
     ) {
@@ -89,6 +106,15 @@ impl Shared {
         self.overruns.store(counters.overruns, Relaxed);
         self.offset_cuts.store(counters.offset_cuts, Relaxed);
         self.slew_cuts.store(counters.slew_cuts, Relaxed);
+        self.dropped_segments.store(counters.dropped, Relaxed);
+        self.uncorrected.store(counters.uncorrected, Relaxed);
+        self.stops.store(counters.stops, Relaxed);
+        let fault = match fault {
+            None => NO_FAULT,
+            Some(Fault::Overrun) => OVERRUN,
+            Some(Fault::Discontinuity) => DISCONTINUITY,
+        };
+        self.fault.store(fault, Relaxed);
         compiler_fence(Ordering::Release);
         self.tick.store(tick, Relaxed);
     }
@@ -132,6 +158,15 @@ impl Shared {
             offset_clamps: self.offset_cuts.load(Relaxed),
             slew_clamps: self.slew_cuts.load(Relaxed),
             dropped_set_points: self.dropped.load(Relaxed),
+            dropped_segments: self.dropped_segments.load(Relaxed),
+            uncorrected_segments: self.uncorrected.load(Relaxed),
+            stops: self.stops.load(Relaxed),
+            fault: match self.fault.load(Relaxed) {
+                NO_FAULT => None,
+                OVERRUN => Some(FaultCause::Overrun),
+                _ => Some(FaultCause::Discontinuity),
+            },
+            stop_input: self.stop_input.load(Relaxed),
         }
     }
 }

@@ -15,18 +15,29 @@ pub struct Tick<S, I, O> {
     set_points: O,
     now: u32,
     bypass: bool,
+    stop_input: bool,
     /// Ticks to the next set-point of the record; 0: none is being made.
     until_next: u16,
     recording: bool,
 }
 
 /// The queue, as the executor wants it.
-struct Segments<I>(I);
+struct Segments<I> {
+    queue: I,
+    /// What waits is thrown away.
+    closed: bool,
+    dropped: u32,
+}
 
 impl<I: Receiver<Planned>> Inbox for Segments<I> {
     #[inline]
     fn take(&mut self) -> Option<Planned> {
-        self.0.receive()
+        let next = self.queue.receive();
+        if !self.closed {
+            return next;
+        }
+        self.dropped = self.dropped.wrapping_add(u32::from(next.is_some()));
+        None
     }
 }
 
@@ -38,8 +49,17 @@ where
 {
     /// At rest at the origin, bypassed.
     pub fn new(executor: Executor, shared: S, segments: I, set_points: O) -> Self {
-        let segments = Segments(segments);
-        Self { executor, shared, segments, set_points, now: 0, bypass: true, until_next: 1, recording: false }
+        Self {
+            executor,
+            shared,
+            segments: Segments { queue: segments, closed: false, dropped: 0 },
+            set_points,
+            now: 0,
+            bypass: true,
+            stop_input: false,
+            until_next: 1,
+            recording: false,
+        }
     }
 
     /// Once a period. Takes the wishes of the background, lets the executor make one set-point and reports it;
@@ -51,7 +71,10 @@ where
         self.now = self.now.wrapping_add(1);
         let state = self.state();
         self.record(&output, state);
-        self.shared.publish(self.now, state, self.executor.epoch(), &output, self.executor.counters());
+        let mut counters = *self.executor.counters();
+        counters.dropped = counters.dropped.wrapping_add(self.segments.dropped);
+        let (epoch, fault) = (self.executor.epoch(), self.executor.fault());
+        self.shared.publish(self.now, state, epoch, fault, &output, &counters);
         output
     }
 
@@ -60,11 +83,14 @@ where
         if late {
             self.executor.overrun();
         }
-        if self.shared.stop.load(Relaxed) || self.shared.stop_input.load(Relaxed) {
+        let active = self.shared.stop_input.load(Relaxed);
+        let pressed = active && !(self.stop_input && self.executor.idle());
+        self.stop_input = active;
+        if pressed || self.shared.stop.load(Relaxed) {
             self.shared.stop.store(false, Relaxed);
-            self.shared.stop_input.store(false, Relaxed);
             self.executor.stop();
         }
+        self.segments.closed = active || self.shared.hold.load(Relaxed);
         let bypass = self.shared.bypass.load(Relaxed);
         if bypass != self.bypass {
             self.bypass = bypass;
@@ -74,7 +100,7 @@ where
 
     #[inline]
     fn state(&self) -> MotionState {
-        let at_rest = self.executor.idle() && self.segments.0.waiting() == 0;
+        let at_rest = self.executor.idle() && self.segments.queue.waiting() == 0;
         if !at_rest {
             if self.executor.stopping() { MotionState::Stopping } else { MotionState::Running }
         } else if self.executor.fault().is_some() {

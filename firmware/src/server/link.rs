@@ -14,6 +14,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     /// # Errors
     /// Those of the port; what was being sent is then lost, and asked for again by the host.
     pub fn serve<L: Read + ReadReady + Write>(&mut self, link: &mut L) -> Result<(), L::Error> {
+        self.supervise();
         while link.read_ready()? && !self.reset_requested() {
             let mut bytes = [0; PIECE];
             let count = link.read(&mut bytes)?;

@@ -9,6 +9,7 @@
 //! rest, takes it over on probation), `Confirm` (it is what boots from now on).
 mod motion;
 mod session;
+mod supervision;
 mod tables;
 mod upload;
 
@@ -24,10 +25,11 @@ use embedded_storage::nor_flash::NorFlash;
 use giotto_shared::table::{FORMAT_VERSION, MAX_IMAGE_BYTES, SCHEMA_HASH, bounds};
 use giotto_shared::wire::{
     self, Accumulator, CHUNK, Chunk, CircleRun, Command, Counters, FromController, Identity, MAX_FRAME,
-    MotionRefusal, MotionState, PROTOCOL_VERSION, Probation, Refusal, Reply, RunField, SET_POINTS, SetPoints,
-    Status,
+    MotionRefusal, MotionState, PROTOCOL_VERSION, Probation, Refusal, Reply, RunField, SET_POINTS,
+    SUPERVISE_MS, SetPoints, Status,
 };
 use session::{Session, Turn};
+use supervision::Supervision;
 use upload::Upload;
 
 /// Most turns of one run.
@@ -96,6 +98,7 @@ pub struct Server<F, M, B> {
     on_link: bool,
     /// A set-point that does not continue the batch before it.
     held: Option<TimedSetPoint>,
+    supervision: Supervision,
     lost_bytes: u32,
     stack_bytes: u32,
     reset: bool,
@@ -119,6 +122,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             every: 0,
             on_link: false,
             held: None,
+            supervision: Supervision::new(board.tick_hz),
             lost_bytes: 0,
             stack_bytes: 0,
             reset: false,
@@ -162,6 +166,13 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
         self.stack_bytes = bytes;
     }
 
+    /// Looks whether the link is still alive; to be called again and again.
+    pub fn supervise(&mut self) {
+        if self.supervision.dead(&self.motion.snapshot()) {
+            self.motion.hold();
+        }
+    }
+
     /// Takes a byte from the link; returns the frame to send if it completed a request.
     pub fn receive(&mut self, byte: u8) -> Option<&[u8]> {
         let payload = self.buffers.accumulator.push(byte)?;
@@ -172,6 +183,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
                 return None;
             }
         };
+        self.supervision.heard(self.motion.snapshot().tick);
         let opens = matches!(command, Ok(Command::Hello));
         match self.session.turn(head, opens) {
             Turn::Repeated => {}
@@ -222,7 +234,10 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     #[inline(never)]
     fn execute(&mut self, command: Command) -> Result<Reply, Refusal> {
         match command {
-            Command::Hello => return Ok(Reply::Identity(self.identity())),
+            Command::Hello => {
+                self.supervision.set(SUPERVISE_MS);
+                return Ok(Reply::Identity(self.identity()));
+            }
             Command::Status => return Ok(Reply::Status(self.status())),
             Command::WriteBegin { length, crc } => self.upload.begin(length, crc)?,
             Command::WriteChunk { offset, data } => {
@@ -247,6 +262,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
                 self.idle()?;
                 self.reset = true;
             }
+            Command::Supervise { after_ms } => self.supervision.set(after_ms),
             Command::Provision { .. } => return Err(Refusal::NoSignatures),
         }
         Ok(Reply::Done)
@@ -319,6 +335,8 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
         let frames = self.buffers.accumulator.counts();
         Status {
             motion: now.state,
+            fault: now.fault,
+            stop_input: now.stop_input,
             bypass: self.bypassed(),
             active: self.active,
             slots: [self.store.state(0), self.store.state(1)],
@@ -337,6 +355,10 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
                 overlong_frames: frames.overlong,
                 repeated_requests: self.session.repeated(),
                 lost_bytes: self.lost_bytes,
+                dropped_segments: now.dropped_segments,
+                uncorrected_segments: now.uncorrected_segments,
+                stops: now.stops,
+                link_losses: self.supervision.losses(),
             },
         }
     }

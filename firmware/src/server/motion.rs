@@ -1,5 +1,5 @@
 //! What the server needs of an engine.
-use giotto_shared::wire::{CircleRun, MotionRefusal, MotionState, Pose, Refusal, SetPoint};
+use giotto_shared::wire::{CircleRun, FaultCause, MotionRefusal, MotionState, Pose, Refusal, SetPoint};
 
 /// The engine as its tick last left it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,6 +20,16 @@ pub struct Snapshot {
     pub slew_clamps: u32,
     /// Set-points that found no room on their way out.
     pub dropped_set_points: u32,
+    /// Segments thrown away.
+    pub dropped_segments: u32,
+    /// Segments begun for which no zone of the table holds.
+    pub uncorrected_segments: u32,
+    /// Stops.
+    pub stops: u32,
+    /// Why nothing runs, if so.
+    pub fault: Option<FaultCause>,
+    /// The stop input is active.
+    pub stop_input: bool,
 }
 
 /// A set-point with its time.
@@ -56,6 +66,9 @@ pub trait Motion {
 
     /// Stops within limits.
     fn stop(&mut self);
+
+    /// The segment in hand finishes; what waits is thrown away. Until the next program is accepted.
+    fn hold(&mut self);
 
     /// Gives every so many ticks' set-point of a run to [`Motion::next_set_point`]; 0: none.
     fn subscribe(&mut self, every: u16);

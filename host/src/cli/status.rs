@@ -57,6 +57,8 @@ fn document(controller: &Controller, status: &Status) -> Value {
         "tick_hz": tick_hz,
         "signed_only": signed_only,
         "motion": format!("{:?}", status.motion).to_lowercase(),
+        "fault": status.fault.map(|cause| format!("{cause:?}").to_lowercase()),
+        "stop_input": status.stop_input,
         "bypass": status.bypass,
         "active_slot": status.active,
         "probation": probation,
@@ -110,7 +112,10 @@ pub(super) fn words(controller: &Controller, status: &Status) -> Table {
             if identity.signed_only { ", signed tables only" } else { "" }
         ),
     );
-    row("motion", format!("{:?}", status.motion).to_lowercase());
+    let motion = format!("{:?}", status.motion).to_lowercase();
+    let cause = status.fault.map(|cause| format!(" ({cause:?})").to_lowercase()).unwrap_or_default();
+    let stop = if status.stop_input { ", stop input active" } else { "" };
+    row("motion", format!("{motion}{cause}{stop}"));
     let correction = match (status.active, status.bypass) {
         (None, _) => "bypass: no confirmed table".to_owned(),
         (Some(slot), true) => format!("bypass; table in slot {slot}"),
@@ -134,6 +139,13 @@ pub(super) fn words(controller: &Controller, status: &Status) -> Table {
     let counts = &status.counters;
     row("ticks", format!("{} since boot, {} overrun", status.tick, counts.tick_overruns));
     row("clamps", format!("offset {}, rate {}", counts.offset_clamps, counts.slew_clamps));
+    row(
+        "segments",
+        format!(
+            "{} dropped, {} uncorrected; {} stops, {} runs without a host",
+            counts.dropped_segments, counts.uncorrected_segments, counts.stops, counts.link_losses
+        ),
+    );
     row(
         "link",
         format!(

@@ -99,6 +99,21 @@ impl Controller {
         &self.name
     }
 
+    /// The link's clock.
+    pub(super) fn now(&self) -> Duration {
+        self.link.now()
+    }
+
+    /// How long the controller may not hear from us during a run before it finishes the segment in hand and starts
+    /// nothing else; `None`: for ever.
+    ///
+    /// # Errors
+    /// Those of the link.
+    pub fn supervise(&mut self, after: Option<Duration>) -> Result<(), ControllerError> {
+        let after_ms = after.map_or(0, |after| u16::try_from(after.as_millis()).unwrap_or(u16::MAX));
+        self.command(Command::Supervise { after_ms })
+    }
+
     /// Requests that had to be sent again, so far.
     pub const fn repeats(&self) -> u32 {
         self.repeats

@@ -149,6 +149,8 @@ fn refusal_help(refusal: &Refusal) -> Option<&'static str> {
         Refusal::NoTable => "flash a table first",
         Refusal::Motion(MotionRefusal::OutOfBounds { .. }) => "choose a radius and feed inside the bounds",
         Refusal::Flash(_) => "the table in use is untouched; flash again, and replace worn flash",
+        Refusal::Motion(MotionRefusal::StopInput) => "release the stop input",
+        Refusal::Motion(MotionRefusal::Fault) => "`giotto status` names the fault; reset the controller",
         Refusal::NotUnderstood => "use the giotto and the firmware of the same release",
         _ => return None,
     })

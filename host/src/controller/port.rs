@@ -62,7 +62,10 @@ pub fn open(
         Port::Sim => Controller::connect(Box::new(VirtualLink::new()), "sim", 1),
         Port::Qemu => {
             let emulator = Emulator::start(options.image.as_deref(), Pace::Fast, note)?;
-            Controller::connect(Box::new(emulator.into_link()?), "qemu", 1)
+            let mut controller = Controller::connect(Box::new(emulator.into_link()?), "qemu", 1)?;
+            // Its time does not wait for ours: a second of silence there may be a moment here.
+            controller.supervise(None)?;
+            Ok(controller)
         }
         Port::Device(path) => {
             let link = SerialLink::open(path, options.baud)?;

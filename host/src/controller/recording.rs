@@ -2,11 +2,11 @@
 use super::client::Controller;
 use super::error::ControllerError;
 use giotto_shared::Direction;
-use giotto_shared::wire::{CircleRun, Command, MotionState, Pose};
+use giotto_shared::wire::{CircleRun, Command, MotionState, Pose, SUPERVISE_MS};
 use std::time::Duration;
 
-/// After so long without a set-point the controller is asked whether it still runs.
-const SILENCE: Duration = Duration::from_millis(500);
+/// How often the controller hears from us during a run, by the link's clock, so that it does not take us for dead.
+const KEEP_ALIVE: Duration = Duration::from_millis(SUPERVISE_MS as u64 / 4);
 
 /// `laps` turns about the origin from polar angle 0; SI.
 pub const fn circle(radius_m: f64, feed_m_s: f64, direction: Direction, laps: u32) -> CircleRun {
@@ -55,13 +55,18 @@ impl Controller {
         self.command(Command::Subscribe { every, on_link: true })?;
         self.set_points.clear();
         self.start_circle(circle)?;
+        let mut spoke_at = self.now();
         while !self.set_points.last().is_some_and(|batch| batch.last) {
-            if !self.wait_for_set_points(SILENCE)? {
-                let running = matches!(self.status()?.motion, MotionState::Running | MotionState::Stopping);
-                // The last batch may have come while the status was asked for.
-                if !running && !self.set_points.last().is_some_and(|batch| batch.last) {
-                    return Err(ControllerError::SetPointsLost { lost: 1 });
-                }
+            let came = self.wait_for_set_points(KEEP_ALIVE)?;
+            if came && self.now() < spoke_at + KEEP_ALIVE {
+                continue;
+            }
+            spoke_at = self.now();
+            let running = matches!(self.status()?.motion, MotionState::Running | MotionState::Stopping);
+            // The last batch may have come while the status was asked for, or be on its way.
+            let over = self.set_points.last().is_some_and(|batch| batch.last);
+            if !running && !came && !over {
+                return Err(ControllerError::SetPointsLost { lost: 1 });
             }
         }
         self.command(Command::Subscribe { every: 0, on_link: true })?;

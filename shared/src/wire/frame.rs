@@ -1,6 +1,7 @@
 //! Frames: `COBS(payload · CRC-32) · 00`. Bytes may be lost, changed or joined anywhere; whatever arrives,
 //! [`Accumulator`] finds the next whole frame after the next zero.
 use super::CRC;
+use cobs::{DecodeResult, DecoderState};
 use serde::Serialize;
 
 /// Longest payload: the largest message is a batch of set-points.
@@ -111,10 +112,19 @@ impl Accumulator {
         Some(payload)
     }
 
-    /// Undoes COBS in place; the length of the content, if there is one with room for a CRC.
+    /// Undoes COBS in place; the length of the content, if there is one with room for a CRC. Byte by byte, because
+    /// the decoder of whole slices can panic as far as a compiler can see.
     fn unframe(&mut self, length: usize) -> Option<usize> {
-        let end = cobs::decode_in_place(self.bytes.get_mut(..length)?).ok()?;
-        (end >= CRC_BYTES).then_some(end)
+        let mut decoder = DecoderState::Idle;
+        let mut end = 0;
+        for at in 0..length {
+            if let DecodeResult::DataContinue(byte) = decoder.feed(*self.bytes.get(at)?).ok()? {
+                *self.bytes.get_mut(end)? = byte;
+                end += 1;
+            }
+        }
+        let whole = matches!(decoder.feed(0), Ok(DecodeResult::DataComplete));
+        (whole && end >= CRC_BYTES).then_some(end)
     }
 }
 

@@ -4,12 +4,16 @@ use crate::path::CircleRun;
 use serde::{Deserialize, Serialize};
 
 /// Version of the messages of this build; both sides must have the same.
-pub const PROTOCOL_VERSION: u16 = 1;
+pub const PROTOCOL_VERSION: u16 = 2;
 
 /// Most bytes of a table in one message.
 pub const CHUNK: usize = 128;
 /// Most set-points in one message.
 pub const SET_POINTS: usize = 6;
+
+/// A link that is silent for so long during a run counts as dead, unless the host asks otherwise, ms: four times the
+/// host's longest silence.
+pub const SUPERVISE_MS: u16 = 1000;
 
 /// A piece of a table.
 pub type Chunk = heapless::Vec<u8, CHUNK>;
@@ -85,6 +89,12 @@ pub enum Command {
     Provision {
         /// Ed25519 public key.
         key: [u8; 32],
+    },
+    /// After so long without a request the link counts as dead: the segment in hand finishes, nothing else starts.
+    /// 0: never. A hello sets [`SUPERVISE_MS`].
+    Supervise {
+        /// ms.
+        after_ms: u16,
     },
 }
 
@@ -203,6 +213,15 @@ pub enum MotionState {
     Fault,
 }
 
+/// Why the engine is in fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum FaultCause {
+    /// A tick was not finished when the next was due.
+    Overrun,
+    /// A segment did not start where the machine stood.
+    Discontinuity,
+}
+
 /// Everything that went wrong and was survived; all count from boot and wrap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counters {
@@ -224,6 +243,14 @@ pub struct Counters {
     pub repeated_requests: u32,
     /// Bytes lost before they were read.
     pub lost_bytes: u32,
+    /// Segments thrown away: after a stop, in a fault, or because the link was dead.
+    pub dropped_segments: u32,
+    /// Segments begun for which no zone of the table holds.
+    pub uncorrected_segments: u32,
+    /// Stops, by command or input.
+    pub stops: u32,
+    /// Runs during which the link died.
+    pub link_losses: u32,
 }
 
 /// A position, nm: whole numbers, so that a set-point is on the host what it was in the tick.
@@ -234,6 +261,10 @@ pub type Pose = [i32; 3];
 pub struct Status {
     /// The engine.
     pub motion: MotionState,
+    /// Why it is in fault, or will be when it has come to rest.
+    pub fault: Option<FaultCause>,
+    /// The stop input is active: nothing starts.
+    pub stop_input: bool,
     /// Correction off.
     pub bypass: bool,
     /// Slot of the table in use, if one is.

@@ -24,8 +24,9 @@ pub mod refusal;
 pub use crate::path::CircleRun;
 pub use frame::{Accumulator, FrameCounts, MAX_FRAME, MAX_PAYLOAD, encode};
 pub use message::{
-    CHUNK, Chunk, Command, Counters, FromController, Identity, MotionState, PROTOCOL_VERSION, Pose,
-    Probation, Reply, Request, SET_POINTS, SetPoint, SetPoints, SlotState, Status, TableInfo,
+    CHUNK, Chunk, Command, Counters, FaultCause, FromController, Identity, MotionState, PROTOCOL_VERSION,
+    Pose, Probation, Reply, Request, SET_POINTS, SUPERVISE_MS, SetPoint, SetPoints, SlotState, Status,
+    TableInfo,
 };
 pub use refusal::{FlashFault, MotionRefusal, Refusal, RunField};
 

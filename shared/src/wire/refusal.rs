@@ -140,4 +140,7 @@ pub enum MotionRefusal {
         "a zone of the table has more cyclic terms, or more reversal spikes on one axis, than can be undone at once"
     )]
     Terms,
+    /// The stop input is active.
+    #[error("the stop input is active")]
+    StopInput,
 }

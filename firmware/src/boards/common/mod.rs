@@ -14,7 +14,7 @@ pub mod flash;
 pub mod log;
 pub mod stack;
 
-use core::cell::RefCell;
+use core::cell::Cell;
 use cortex_m::peripheral::scb::SystemHandler;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{SCB, SYST};
@@ -27,7 +27,7 @@ use giotto_firmware::control::{self, Desk, Shared, Tick};
 use giotto_firmware::engine::{Config, Executor, Planned, Planner};
 use giotto_firmware::server::{Board, Buffers, Server, TimedSetPoint};
 use giotto_firmware::store::Layout;
-use heapless::spsc::{Consumer, Producer, Queue};
+use heapless_spsc::spsc::{Consumer, Producer, Queue};
 
 /// Ticks a second.
 pub const TICK_HZ: u32 = 1000;
@@ -36,21 +36,31 @@ pub const LINK_PRIORITY: u8 = 0x40;
 /// Bytes that arrive while the background is busy with the flash: three requests and their repetition.
 pub const RECEIVED: usize = 1024;
 
-type BoardTick = Tick<&'static Shared, Consumer<'static, Planned>, Producer<'static, TimedSetPoint>>;
-type BoardDesk =
-    Desk<&'static mut Planner, &'static Shared, Producer<'static, Planned>, Consumer<'static, TimedSetPoint>>;
+/// Places in a queue; one always stays free.
+const SEGMENTS: usize = control::SEGMENTS + 1;
+const SET_POINTS: usize = control::SET_POINTS + 1;
+
+type BoardTick =
+    Tick<&'static Shared, Consumer<'static, Planned, SEGMENTS>, Producer<'static, TimedSetPoint, SET_POINTS>>;
+type BoardDesk = Desk<
+    &'static mut Planner,
+    &'static Shared,
+    Producer<'static, Planned, SEGMENTS>,
+    Consumer<'static, TimedSetPoint, SET_POINTS>,
+>;
 
 static SHARED: Shared = Shared::new();
-static HAND_OVER: Mutex<RefCell<Option<BoardTick>>> = Mutex::new(RefCell::new(None));
+/// Where the tick is made; the interrupt keeps a reference to it.
+static TICK: Mutex<Cell<Option<&'static mut BoardTick>>> = Mutex::new(Cell::new(None));
 
 /// The tick's owner once it has begun. See the table above for its contract; the late flag is the next tick's
 /// own request, already pending.
 #[exception]
 fn SysTick() {
-    static mut TICK: Option<BoardTick> = None;
+    static mut OWNED: Option<&'static mut BoardTick> = None;
     static mut LATE: bool = false;
-    let Some(tick) = TICK else {
-        *TICK = critical_section::with(|token| HAND_OVER.borrow(token).take());
+    let Some(tick) = OWNED else {
+        *OWNED = critical_section::with(|token| TICK.borrow(token).take());
         return;
     };
     tick.tick(*LATE);
@@ -66,14 +76,15 @@ pub fn buffers() -> Option<&'static mut Buffers> {
 #[inline(never)] // Its frame would stay below that of the loop that never returns.
 pub fn start(syst: &mut SYST, scb: &mut SCB, clock_hz: u32) -> Option<BoardDesk> {
     let config = Config::robot(TICK_HZ);
-    let segments = singleton!(: Queue<Planned, { control::SEGMENTS + 1 }> = Queue::new())?;
-    let set_points = singleton!(: Queue<TimedSetPoint, { control::SET_POINTS + 1 }> = Queue::new())?;
+    let segments = singleton!(: Queue<Planned, SEGMENTS> = Queue::new())?;
+    let set_points = singleton!(: Queue<TimedSetPoint, SET_POINTS> = Queue::new())?;
     let planner = singleton!(: Planner = Planner::new(&config, [0; 3]))?;
     let (segments_in, segments_out) = segments.split();
     let (points_in, points_out) = set_points.split();
-    let executor = Executor::new([0; 3], config.engage_ticks(), true);
-    let tick = Tick::new(executor, &SHARED, segments_out, points_in);
-    critical_section::with(|token| HAND_OVER.borrow(token).replace(Some(tick)));
+    let tick = singleton!(: BoardTick = Tick::new(
+        Executor::new([0; 3], config.engage_ticks(), true), &SHARED, segments_out, points_in
+    ))?;
+    critical_section::with(|token| TICK.borrow(token).set(Some(tick)));
     // SAFETY: the priority of SysTick guards no critical section that is based on priorities; there is none.
     #[allow(unsafe_code, reason = "cortex-m has no safe way to set a priority")]
     unsafe {

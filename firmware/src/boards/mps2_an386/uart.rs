@@ -1,13 +1,13 @@
 //! CMSDK APB UARTs (DDI0479 4.3): polled out, interrupt in on UART0.
 use super::common::RECEIVED;
-use core::cell::RefCell;
+use core::cell::Cell;
 use core::convert::Infallible;
 use core::ptr;
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use cortex_m::singleton;
 use critical_section::Mutex;
 use embedded_io::{ErrorType, Read, ReadReady, Write};
-use heapless::spsc::{Consumer, Producer, Queue};
+use heapless_spsc::spsc::{Consumer, Producer, Queue};
 
 /// Registers of one UART.
 #[repr(C)]
@@ -32,7 +32,7 @@ const INTERRUPT_RX: u32 = 1 << 1;
 /// 25 MHz / 460,800 Hz.
 const DIVIDER: u32 = 54;
 
-static RECEIVER: Mutex<RefCell<Option<Producer<'static, u8>>>> = Mutex::new(RefCell::new(None));
+static RECEIVER: Mutex<Cell<Option<Producer<'static, u8, RECEIVED>>>> = Mutex::new(Cell::new(None));
 static LOST: AtomicU32 = AtomicU32::new(0);
 
 /// Bytes lost since last asked, because the background was busy for too long.
@@ -74,7 +74,7 @@ macro_rules! register {
 /// One UART.
 pub struct Uart {
     registers: *mut Registers,
-    received: Option<Consumer<'static, u8>>,
+    received: Option<Consumer<'static, u8, RECEIVED>>,
 }
 
 impl Uart {
@@ -88,7 +88,7 @@ impl Uart {
     pub fn link() -> Option<Self> {
         let queue = singleton!(: Queue<u8, RECEIVED> = Queue::new())?;
         let (producer, consumer) = queue.split();
-        critical_section::with(|token| RECEIVER.borrow(token).replace(Some(producer)));
+        critical_section::with(|token| RECEIVER.borrow(token).set(Some(producer)));
         let mut uart = Self::open(UART0, CONTROL_TX | CONTROL_RX | CONTROL_RX_INTERRUPT);
         uart.received = Some(consumer);
         Some(uart)
@@ -107,21 +107,18 @@ impl Uart {
 
 /// UART0's receive interrupt: one byte into the queue.
 pub extern "C" fn received() {
-    static OWNED: Mutex<RefCell<Option<Producer<'static, u8>>>> = Mutex::new(RefCell::new(None));
     write(register!(UART0, interrupt), INTERRUPT_RX);
-    while read(register!(UART0, state)) & STATE_RX_FULL != 0 {
-        let byte = read(register!(UART0, data)) as u8;
-        critical_section::with(|token| {
-            let mut owned = OWNED.borrow(token).borrow_mut();
-            if owned.is_none() {
-                *owned = RECEIVER.borrow(token).take();
-            }
-            let kept = owned.as_mut().is_some_and(|queue| queue.enqueue(byte).is_ok());
+    critical_section::with(|token| {
+        let mut receiver = RECEIVER.borrow(token).take();
+        while read(register!(UART0, state)) & STATE_RX_FULL != 0 {
+            let byte = read(register!(UART0, data)) as u8;
+            let kept = receiver.as_mut().is_some_and(|queue| queue.enqueue(byte).is_ok());
             if !kept {
                 LOST.store(LOST.load(Relaxed).wrapping_add(1), Relaxed);
             }
-        });
-    }
+        }
+        RECEIVER.borrow(token).set(receiver);
+    });
 }
 
 impl ErrorType for Uart {

@@ -29,19 +29,32 @@ struct Bench {
     bypass: bool,
     state: MotionState,
     runs: u32,
+    tick: u32,
+    held: u32,
+}
+
+impl Bench {
+    fn new() -> Self {
+        Self { table: None, bypass: true, state: MotionState::Idle, runs: 0, tick: 0, held: 0 }
+    }
 }
 
 impl Motion for Bench {
     fn snapshot(&self) -> Snapshot {
         Snapshot {
             state: self.state,
-            tick: 0,
+            tick: self.tick,
             raw_nm: [0; 3],
             corrected_nm: [0; 3],
             tick_overruns: 0,
             offset_clamps: 0,
             slew_clamps: 0,
             dropped_set_points: 0,
+            dropped_segments: 0,
+            uncorrected_segments: 0,
+            stops: 0,
+            fault: None,
+            stop_input: false,
         }
     }
 
@@ -67,6 +80,10 @@ impl Motion for Bench {
         self.state = MotionState::Idle;
     }
 
+    fn hold(&mut self) {
+        self.held += 1;
+    }
+
     fn subscribe(&mut self, _: u16) {}
 
     fn set_points_waiting(&self) -> usize {
@@ -86,8 +103,7 @@ struct Desk {
 
 /// Boots a controller whose flash has these cells.
 fn boot(cells: Cells, after: Option<u32>, tear: Tear) -> Desk {
-    let bench = Bench { table: None, bypass: true, state: MotionState::Idle, runs: 0 };
-    let server = Server::boot(BOARD, Flash::new(cells, after, tear), LAYOUT, bench, Box::default());
+    let server = Server::boot(BOARD, Flash::new(cells, after, tear), LAYOUT, Bench::new(), Box::default());
     let mut desk = Desk { server, seq: 0 };
     assert!(matches!(desk.ask(Command::Hello), Some(Reply::Identity(_))));
     desk

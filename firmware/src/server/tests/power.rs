@@ -134,6 +134,5 @@ fn flash_that_does_not_read_back_is_never_committed() {
 
 /// A controller whose flash went dead during its second erase unit.
 fn stuck(cells: Cells) -> Server<Flash, Bench, Box<Buffers>> {
-    let bench = Bench { table: None, bypass: true, state: MotionState::Idle, runs: 0 };
-    Server::boot(BOARD, Flash::new(cells, Some(2), Tear::Partly), LAYOUT, bench, Box::default())
+    Server::boot(BOARD, Flash::new(cells, Some(2), Tear::Partly), LAYOUT, Bench::new(), Box::default())
 }

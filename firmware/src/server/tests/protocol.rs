@@ -203,6 +203,31 @@ fn read_back_stays_inside_the_slot() {
     }
 }
 
+/// The silence that is allowed, to the tick; the default comes back with a hello.
+#[test]
+fn a_silent_host_ends_what_waits_and_is_counted() {
+    let mut desk = fresh();
+    assert!(desk.done(circle()));
+    let after = |desk: &mut Desk, ticks: u32| {
+        desk.server.motion_mut().tick += ticks;
+        desk.server.supervise();
+        desk.server.motion_mut().held
+    };
+    assert_eq!(after(&mut desk, 999), 0);
+    assert_eq!(desk.status().counters.link_losses, 0);
+    assert_eq!(after(&mut desk, 999), 0);
+    assert_eq!(after(&mut desk, 1), 1);
+    assert_eq!(after(&mut desk, 5000), 1);
+    assert_eq!(desk.status().counters.link_losses, 1);
+    assert!(desk.done(Command::Supervise { after_ms: 0 }));
+    assert_eq!(after(&mut desk, 1_000_000), 1);
+    assert!(matches!(desk.ask(Command::Hello), Some(Reply::Identity(_))));
+    assert_eq!(after(&mut desk, 1000), 2);
+    // At rest nothing can be left alone.
+    assert!(desk.done(Command::Stop));
+    assert_eq!(after(&mut desk, 10_000), 2);
+}
+
 proptest! {
     /// Any bytes, among them whole requests in any order: no panic, and never a correction without a table.
     #[test]

@@ -48,6 +48,8 @@ fn largest_messages_fit() {
     let slot = SlotState::Table(TableInfo { length: u16::MAX, crc: most, generation: Some(most) });
     reply(Reply::Status(Status {
         motion: MotionState::Fault,
+        fault: Some(FaultCause::Discontinuity),
+        stop_input: true,
         bypass: true,
         active: Some(1),
         slots: [slot; 2],
@@ -66,6 +68,10 @@ fn largest_messages_fit() {
             overlong_frames: most,
             repeated_requests: most,
             lost_bytes: most,
+            dropped_segments: most,
+            uncorrected_segments: most,
+            stops: most,
+            link_losses: most,
         },
     }));
     let point = SetPoint { raw_nm: [i32::MIN; 3], corrected_nm: [i32::MIN; 3] };
