@@ -16,3 +16,7 @@ pub mod report;
 pub mod simulation;
 pub mod table_from_model;
 pub mod toml_file;
+
+// The guide, page by page; its sources are `guide/*.md`.
+#[cfg(doc)]
+include!(concat!(env!("OUT_DIR"), "/guide.rs"));

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// Arguments of `giotto compensate`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// NC program, RS-274 as LinuxCNC and Grbl speak it.
+    /// NC program, RS-274 as LinuxCNC and Grbl speak it; or a plain RAPID module.
     #[arg(value_name = "IN.nc")]
     program: PathBuf,
     /// Model of the machine, from `giotto fit` or `giotto diagnose`.
@@ -70,7 +70,7 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         }
     }
     let program = read(&args.program)?;
-    let model = ModelFile::load(&args.model).map_err(|e| Failure::input(&e).help(e.help()))?;
+    let model = ModelFile::load(&args.model)?;
     let options = Options {
         keep: match args.keep {
             KeepArg::Feed => Keep::Feed,
@@ -80,7 +80,9 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         max_offset_mm: args.max_offset,
         all_planes: args.all_planes,
     };
-    let result = gcode::compensate(&program, &model, &options);
+    let compensate =
+        if gcode::rapid::is_rapid(&program) { gcode::rapid::compensate } else { gcode::compensate };
+    let result = compensate(&program, &model, &options);
     std::fs::write(&args.output, &result.program)
         .map_err(|e| super::failure::cannot_write(&args.output, &e))?;
     let document = document(&result, &model);
@@ -91,7 +93,11 @@ fn read(path: &Path) -> Result<Vec<u8>, Failure> {
     let fail =
         |what: &str| Failure::input(format_args!("{}: {what}; expected an NC program", path.display()));
     match std::fs::read(path) {
+        Ok(bytes) if bytes.is_empty() => Err(fail("is empty").help("check which file this is")),
         Ok(bytes) if bytes.contains(&0) => Err(fail("holds zero bytes").help("check which file this is")),
+        Ok(bytes) if !gcode::rapid::is_rapid(&bytes) && !gcode::is_program(&bytes) => {
+            Err(fail("no line of it is a block").help("check which file this is; RAPID begins with MODULE"))
+        }
         Ok(bytes) => Ok(bytes),
         Err(_) if path.is_dir() => Err(fail("is a directory").help("check the path")),
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => {

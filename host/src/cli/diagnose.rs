@@ -1,40 +1,39 @@
 //! `giotto diagnose`: what the simulation gets wrong, why, the extended model, the gain.
 use super::failure::{Failure, cannot_write};
 use super::output::Output;
+use super::source::Source;
 use crate::diagnosis::{Diagnosis, Finding, Options, diagnose};
 use crate::model_file::ModelFile;
 use comfy_table::{Table, presets};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `giotto diagnose`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// Directory with campaign.toml.
-    campaign: PathBuf,
+    #[command(flatten)]
+    source: Source,
     /// Simulation to start from; without it one servo lag with fitted kv.
-    #[arg(long)]
+    #[arg(long, value_name = "MODEL.toml")]
     model: Option<PathBuf>,
     /// Write the extended model here.
-    #[arg(short, long)]
+    #[arg(short, long, value_name = "EXTENDED.toml")]
     output: Option<PathBuf>,
     /// Write an HTML report here.
-    #[arg(long)]
+    #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
     /// Seed of the bootstrap.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }
 
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
-    let campaign = crate::campaign::read(&args.campaign).map_err(Failure::input)?;
-    let model = args.model.as_deref().map(ModelFile::load).transpose().map_err(Failure::input)?;
-    let diagnosis = diagnose(&campaign, &Options { model, seed: args.seed }).map_err(|e| {
-        Failure::input(format_args!("{}: {e}", args.campaign.display()))
-            .help("see `giotto analyze` for what the runs hold")
-    })?;
+    let campaign = args.source.read(out)?;
+    let model = args.model.as_deref().map(ModelFile::load).transpose()?;
+    let diagnosis =
+        diagnose(&campaign, &Options { model, seed: args.seed }).map_err(|e| args.source.refused(&e))?;
     if let Some(path) = &args.output {
-        diagnosis.model.save(path).map_err(Failure::input)?;
+        diagnosis.model.save(path)?;
         out.note(format_args!("wrote {}", path.display()));
     }
     if let Some(path) = &args.report {
@@ -45,12 +44,12 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     if out.json {
         return out.document(&diagnosis);
     }
-    show(&campaign.name, &diagnosis, &out);
+    show(&campaign.name, &diagnosis, args.output.as_deref(), &out);
     Ok(())
 }
 
 /// The diagnosis as a person reads it.
-pub(super) fn show(name: &str, d: &Diagnosis, out: &Output) {
+fn show(name: &str, d: &Diagnosis, extended: Option<&Path>, out: &Output) {
     out.say(format_args!(
         "Campaign {name}: noise {:.2} µm a sample, {:.2} µm between runs; seed {}",
         d.noise_um, d.spread_um, d.seed
@@ -131,7 +130,7 @@ pub(super) fn show(name: &str, d: &Diagnosis, out: &Output) {
             g.percent, g.ci95_percent[0], g.ci95_percent[1], g.of_perfect_percent
         ));
     }
-    out.say(format_args!("Next: {}", recommendation(d)));
+    out.say(format_args!("Next: {}", recommendation(d, extended)));
 }
 
 fn row(f: &Finding) -> [String; 7] {
@@ -157,19 +156,42 @@ fn number(value: f64) -> String {
     }
 }
 
-/// The one thing to do now.
-fn recommendation(d: &Diagnosis) -> String {
-    let correctable = d.findings.iter().any(|f| f.compensable);
+/// The one thing to do now, and what it should bring.
+fn recommendation(d: &Diagnosis, extended: Option<&Path>) -> String {
     if let (true, Some(first)) = (d.findings.is_empty(), d.cannot_tell.first()) {
         return first.clone();
     }
-    match (d.findings.first(), correctable) {
-        (Some(_), true) => format!(
-            "write the extended model with -o EXTENDED.toml and flash it: `giotto flash EXTENDED.toml --port PORT` (expected {:.0} % less error)",
-            d.gain_percent
-        ),
-        (Some(first), false) => first.cause.model().words().adjust.to_string(),
-        (None, _) if d.unexplained.present => "look at the place and the law of what is unexplained; `giotto plan` lists the runs that would narrow it down".into(),
-        (None, _) => "flash the fitted model: `giotto fit CAMPAIGN -o MODEL.toml`, `giotto flash MODEL.toml --port PORT`".into(),
+    let Some(first) = d.findings.first() else {
+        return if d.unexplained.present {
+            "look at the place and the law of what is unexplained; `giotto plan` lists the runs that would narrow it down".into()
+        } else {
+            "flash the fitted model: `giotto fit CAMPAIGN -o MODEL.toml`, `giotto flash MODEL.toml --port PORT`".into()
+        };
+    };
+    if !d.findings.iter().any(|f| f.compensable) {
+        return format!(
+            "{} ({:.1} µm rms of the circles' error, {:.0} % of the misfit)",
+            first.cause.model().words().adjust,
+            first.rms_um,
+            first.share_percent
+        );
     }
+    let flash = match extended {
+        Some(path) => format!("flash it: `giotto flash {} --port PORT`", path.display()),
+        None => "write the extended model with -o EXTENDED.toml and flash it: `giotto flash EXTENDED.toml --port PORT`".into(),
+    };
+    match expected_um(d) {
+        Some([now, then]) if then < now => {
+            format!("{flash} (circles off by {now:.1} µm rms now, by {then:.1} expected)")
+        }
+        _ => flash,
+    }
+}
+
+/// Root mean square error of circles on runs left out, µm: as measured, and with the correction, which leaves
+/// what the extended model does not predict and what it predicts but no controller corrects.
+fn expected_um(d: &Diagnosis) -> Option<[f64; 2]> {
+    let gain = d.gain.as_ref()?;
+    let stays: f64 = d.findings.iter().filter(|f| !f.compensable).map(|f| f.rms_um.powi(2)).sum();
+    Some([gain.no_model_rms_um, (gain.extended_rms_um.powi(2) + stays).sqrt()])
 }

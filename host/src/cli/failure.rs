@@ -65,6 +65,13 @@ impl Failure {
     }
 }
 
+impl From<crate::toml_file::TomlFileError> for Failure {
+    fn from(error: crate::toml_file::TomlFileError) -> Self {
+        let help = error.help();
+        Self::input(error).help(help)
+    }
+}
+
 /// Writing a result failed: the place it should go to is bad input.
 pub fn cannot_write(path: &std::path::Path, error: &std::io::Error) -> Failure {
     Failure::input(format_args!("{}: cannot write: {error}", path.display()))

@@ -2,12 +2,14 @@
 mod analyze;
 mod bypass;
 mod compensate;
+mod completions;
 mod controller;
 mod demo;
 mod diagnose;
 mod fit;
 mod flash;
 mod import;
+mod man;
 mod monitor;
 mod plan;
 mod port;
@@ -19,6 +21,7 @@ mod status;
 mod table;
 mod table_file;
 mod verify;
+mod welcome;
 
 pub mod failure;
 pub mod output;
@@ -27,7 +30,7 @@ pub mod source;
 pub use failure::Failure;
 pub use output::Output;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
 
 /// True circles from robots and machine tools: measure, explain, compensate, prove.
@@ -85,6 +88,10 @@ enum Command {
     Controller(controller::Args),
     /// The whole loop on a bundled campaign and a simulated machine.
     Demo(demo::Args),
+    /// Script that completes commands and options in a shell.
+    Completions(completions::Args),
+    /// Manual pages, one a command.
+    Man(man::Args),
 }
 
 fn dispatch(command: Command, out: Output) -> Result<(), Failure> {
@@ -107,29 +114,28 @@ fn dispatch(command: Command, out: Output) -> Result<(), Failure> {
         Command::Monitor(args) => monitor::run(args, out),
         Command::Controller(args) => controller::run(args, out),
         Command::Demo(args) => demo::run(args, out),
+        Command::Completions(args) => completions::run(args, Cli::command(), out),
+        Command::Man(args) => man::run(args, Cli::command(), out),
     }
 }
-
-/// What `giotto` alone says to a newcomer.
-const WELCOME: &str = "\
-giotto finds out why a machine does not draw true circles, and corrects it.
-
-  giotto demo                      see the whole loop on a simulated machine
-  giotto analyze CAMPAIGN          what was measured: circles, size, roundness
-  giotto diagnose CAMPAIGN         what is wrong, why, and what to do
-  giotto import FILE --help        bring your own measurements in
-
-giotto --help lists every command.";
 
 /// Runs the command line of this process.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let out = Output { json: cli.json, quiet: cli.quiet, non_interactive: cli.non_interactive };
     let Some(command) = cli.command else {
-        println!("{WELCOME}");
+        let words = welcome::words(std::path::Path::new("."));
+        if out.json {
+            return shown(out.document(&serde_json::json!({ "words": words })));
+        }
+        out.say(words);
         return ExitCode::SUCCESS;
     };
-    match dispatch(command, out) {
+    shown(dispatch(command, out))
+}
+
+fn shown(result: Result<(), Failure>) -> ExitCode {
+    match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(),
     }

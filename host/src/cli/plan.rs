@@ -1,5 +1,5 @@
 //! `giotto plan`: the next runs that would best separate what cannot be told apart yet.
-use super::source::length;
+use super::source::{Source, length};
 use super::{Failure, Output};
 use crate::campaign::Direction;
 use crate::causes::Cause;
@@ -7,16 +7,22 @@ use crate::diagnosis::{Options, diagnose};
 use crate::model_file::ModelFile;
 use crate::planning::{self, Limits, Plan, Purpose};
 use comfy_table::{Table, presets};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `giotto plan`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// Directory with campaign.toml.
-    campaign: PathBuf,
+    #[command(flatten)]
+    source: Source,
     /// Write the runs as a plan that `giotto simulate` reads.
     #[arg(short, long, value_name = "PLAN.toml")]
     output: Option<PathBuf>,
+    /// Write the measuring program in RS-274 here: warm-up, runs in order, stops for the instrument.
+    #[arg(long, value_name = "FILE.nc")]
+    gcode: Option<PathBuf>,
+    /// Write the measuring program in RAPID here.
+    #[arg(long, value_name = "FILE.mod")]
+    rapid: Option<PathBuf>,
     /// Simulation to start from; without it one servo lag with fitted kv.
     #[arg(long, value_name = "MODEL.toml")]
     model: Option<PathBuf>,
@@ -39,15 +45,10 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
-    let campaign = crate::campaign::read(&args.campaign)?;
-    let model = args
-        .model
-        .as_deref()
-        .map(ModelFile::load)
-        .transpose()
-        .map_err(|e| Failure::input(&e).help(e.help()))?;
-    let diagnosis = diagnose(&campaign, &Options { model, seed: args.seed })
-        .map_err(|e| Failure::input(format_args!("{}: {e}", args.campaign.display())))?;
+    let campaign = args.source.read(out)?;
+    let model = args.model.as_deref().map(ModelFile::load).transpose()?;
+    let diagnosis =
+        diagnose(&campaign, &Options { model, seed: args.seed }).map_err(|e| args.source.refused(&e))?;
     let options = planning::Options {
         limits: Limits {
             radii_m: args.radii.iter().map(|mm| mm * 1e-3).collect(),
@@ -58,24 +59,38 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         seed: args.seed,
     };
     let plan = planning::propose(&campaign, &diagnosis, &options);
+    let asked = args.output.is_some() || args.gcode.is_some() || args.rapid.is_some();
+    if asked && plan.runs.is_empty() {
+        let why = "no runs to plan: circles have nothing more to tell apart";
+        return Err(
+            Failure::check(why).help("leave out -o, --gcode and --rapid to see what the campaign tells")
+        );
+    }
     if let Some(path) = &args.output {
-        if plan.runs.is_empty() {
-            let why = "no runs to plan: circles have nothing more to tell apart";
-            return Err(Failure::check(why).help("leave out -o to see what the campaign tells"));
-        }
         let text = toml::to_string(&plan.file(&campaign))
             .map_err(|e| Failure::input(format_args!("{}: {e}", path.display())))?;
         let text = format!(
             "# The next measurement, in this order. Warm up before it: {} turns of the first circle.\n# To simulate it, name the machine here: model = \"MODEL.toml\"\n{text}",
             plan.warm_up_turns
         );
-        crate::campaign::replace(path, &text)?;
-        out.note(format_args!("wrote {}", path.display()));
+        write(path, &text, out)?;
+    }
+    if let Some(path) = &args.gcode {
+        write(path, &plan.gcode(&campaign.name), out)?;
+    }
+    if let Some(path) = &args.rapid {
+        write(path, &plan.rapid(&campaign.name), out)?;
     }
     if out.json {
         return out.document(&plan);
     }
     show(&plan, out);
+    Ok(())
+}
+
+fn write(path: &Path, text: &str, out: Output) -> Result<(), Failure> {
+    crate::campaign::replace(path, text)?;
+    out.note(format_args!("wrote {}", path.display()));
     Ok(())
 }
 

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 #[derive(clap::Args, Debug)]
 pub(super) struct PortArgs {
     /// Serial device, `sim` (virtual controller in this process) or `qemu` (boots the firmware image).
-    #[arg(long, value_name = "PORT")]
+    #[arg(long, value_name = "PORT", value_parser = clap::builder::NonEmptyStringValueParser::new())]
     port: String,
     /// Firmware image for `qemu`, instead of the one of this workspace.
     #[arg(long, value_name = "PATH")]
@@ -21,9 +21,14 @@ pub(super) struct PortArgs {
 impl PortArgs {
     /// Opens the controller and its session.
     pub(super) fn open(&self, out: Output) -> Result<Controller, Failure> {
+        Ok(self.connect(out)?)
+    }
+
+    /// As [`Self::open`], for those who look at the error.
+    pub(super) fn connect(&self, out: Output) -> Result<Controller, ControllerError> {
         let Ok(port) = self.port.parse::<Port>();
         let options = OpenOptions { image: self.image.clone(), baud: self.baud };
-        Ok(open(&port, &options, &mut |note| out.note(note))?)
+        open(&port, &options, &mut |note| out.note(note))
     }
 }
 

@@ -1,6 +1,7 @@
 //! `giotto report`: self-contained HTML report with plots.
 use super::failure::{Failure, cannot_write};
 use super::output::Output;
+use super::source::Source;
 use crate::diagnosis::{Options, diagnose};
 use crate::model_file::ModelFile;
 use serde::Serialize;
@@ -9,8 +10,8 @@ use std::path::{Path, PathBuf};
 /// Arguments of `giotto report`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// Directory with campaign.toml.
-    campaign: PathBuf,
+    #[command(flatten)]
+    source: Source,
     /// The report.
     #[arg(short, long, value_name = "FILE.html")]
     output: PathBuf,
@@ -32,17 +33,10 @@ struct Document<'a> {
 
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
-    let campaign = crate::campaign::read(&args.campaign)?;
-    let model = args
-        .model
-        .as_deref()
-        .map(ModelFile::load)
-        .transpose()
-        .map_err(|e| Failure::input(&e).help(e.help()))?;
-    let diagnosis = diagnose(&campaign, &Options { model, seed: args.seed }).map_err(|e| {
-        Failure::input(format_args!("{}: {e}", args.campaign.display()))
-            .help("see `giotto analyze` for what the runs hold")
-    })?;
+    let campaign = args.source.read(out)?;
+    let model = args.model.as_deref().map(ModelFile::load).transpose()?;
+    let diagnosis =
+        diagnose(&campaign, &Options { model, seed: args.seed }).map_err(|e| args.source.refused(&e))?;
     let html = crate::report::html(&campaign, &diagnosis).map_err(Failure::input)?;
     std::fs::write(&args.output, &html).map_err(|e| cannot_write(&args.output, &e))?;
     if out.json {

@@ -23,10 +23,10 @@ enum Shape {
 #[derive(clap::Args, Debug)]
 struct CircleArgs {
     /// Programmed radius, mm.
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     radius: f64,
     /// Programmed feed, mm/s.
-    #[arg(long, value_name = "MM_S")]
+    #[arg(long, value_name = "MM_S", allow_negative_numbers = true)]
     feed: f64,
     /// Direction.
     #[arg(long, value_enum)]

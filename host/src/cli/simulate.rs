@@ -30,13 +30,13 @@ struct Document<'a> {
 
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
-    let plan = Plan::load(&args.plan).map_err(|e| Failure::input(&e).help(e.help()))?;
+    let plan = Plan::load(&args.plan)?;
     if args.output.join("campaign.toml").exists() {
         let message = format!("{}: holds a campaign already", args.output.display());
         return Err(Failure::input(message).help("choose another directory with -o, or remove this one"));
     }
     let campaign = simulation::campaign(&plan, args.seed);
-    crate::campaign::write(&campaign, &args.output).map_err(|e| Failure::input(&e).help(e.help()))?;
+    crate::campaign::write(&campaign, &args.output)?;
     if out.json {
         return out.document(&Document {
             simulated: true,

@@ -88,6 +88,9 @@ impl Source {
             return Ok(Opened { manifest: Manifest::open(path)?, _folder: None });
         }
         let Some(options) = self.foreign.options() else {
+            // What is no measurement at all is bad input, whatever is missing beside it.
+            let format = self.foreign.format.unwrap_or(Format::Auto);
+            import::recognise(path, format, self.foreign.columns.as_deref())?;
             let text = format!(
                 "{} is no campaign; a file of measurements needs --radius and --feed",
                 path.display()
@@ -103,6 +106,12 @@ impl Source {
         let mut manifest = Manifest::open(folder.path())?;
         manifest.name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
         Ok(Opened { manifest, _folder: Some(folder) })
+    }
+
+    /// The campaign was read, but what was asked cannot be answered from it.
+    pub(super) fn refused(&self, reason: &dyn std::fmt::Display) -> Failure {
+        Failure::input(format_args!("{}: {reason}", self.campaign.display()))
+            .help("see `giotto analyze` for what the runs hold")
     }
 
     /// Reads the whole campaign into memory and prints its notes.

@@ -20,11 +20,14 @@ pub(super) fn read(path: &Path, out: Output) -> Result<TableFile, Failure> {
     let shown = path.display();
     let expected = "a table (TABLE.bin) or a model (MODEL.toml)";
     let metadata = std::fs::metadata(path).map_err(|error| match error.kind() {
-        ErrorKind::NotFound => Failure::input(format_args!("{shown}: no such file; expected {expected}")),
+        ErrorKind::NotFound => {
+            Failure::input(format_args!("{shown}: no such file; expected {expected}")).help("check the path")
+        }
         _ => Failure::input(format_args!("{shown}: cannot be read: {error}")),
     })?;
     if metadata.is_dir() {
-        return Err(Failure::input(format_args!("{shown}: is a directory; expected {expected}")));
+        return Err(Failure::input(format_args!("{shown}: is a directory; expected {expected}"))
+            .help("check the path"));
     }
     if metadata.len() > MOST {
         return Err(Failure::input(format_args!("{shown}: {} bytes; expected {expected}", metadata.len())));
@@ -44,7 +47,7 @@ pub(super) fn read(path: &Path, out: Output) -> Result<TableFile, Failure> {
 
 /// Makes the table of a model.
 pub(super) fn from_model(path: &Path, out: Output) -> Result<TableFile, Failure> {
-    let model = ModelFile::load(path).map_err(|error| Failure::input(&error).help(error.help()))?;
+    let model = ModelFile::load(path)?;
     let made = table_from_model(&model).map_err(|error| {
         Failure::input(format_args!("{}: {error}", path.display()))
             .help("check the model's coefficients and ranges; a controller has bounds of its own")

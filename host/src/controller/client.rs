@@ -210,6 +210,23 @@ impl Controller {
         Ok(false)
     }
 
+    /// Listens for set-points for so long; they wait for [`Self::take_set_points`].
+    ///
+    /// # Errors
+    /// [`ControllerError::Lost`].
+    pub fn listen(&mut self, time: Duration) -> Result<(), ControllerError> {
+        let until = self.link.now() + time;
+        while self.link.now() < until {
+            self.arrival(until)?;
+        }
+        Ok(())
+    }
+
+    /// The set-points that have come in since the last call.
+    pub fn take_set_points(&mut self) -> Vec<SetPoints> {
+        std::mem::take(&mut self.set_points)
+    }
+
     fn send(&mut self, bytes: &[u8]) -> Result<(), ControllerError> {
         self.link.send(bytes).map_err(|error| lost(&self.name, &error))
     }

@@ -2,14 +2,15 @@
 //!
 //! The correction is an offset across the programmed path: δ on an arc, none on a line. A servo chain answers
 //! after the command, so that the offset it needs begins to change at the joint and not before: for one lag
-//! exactly as (s/σf)² over the way σf behind the joint, σ = √κ2. A smooth step over σf (1.25·σf for one lag)
-//! stands for it; what remains at the joint is 4 % of δ for one lag, 8 % for two lags or a lag with a moving
-//! average of twice its length, 20 % for a moving average alone. An arc's own blocks carry the change at its start; after its end the following arc does, or a
-//! run-out along the following line, whose block then starts from a point farther along it and is not touched.
-//! From standstill the machine falls behind only as it gets going, and the step is longer. Where nothing may
-//! follow (a stop, a corner, increments), the offset ends inside the arc with an overshoot of equal area, and up
-//! to 40 % of δ remains at that point. Pairs of arcs (biarcs) follow the step with a common tangent at every joint.
+//! exactly as (s/σf)² over the way σf behind the joint, σ = √κ2. How the step goes on, and what remains at the
+//! joint, is for `transition` to say. An arc's own blocks carry the change at its start; after its end the
+//! following arc does, or a run-out along the following line, whose block then starts from a point farther along
+//! it and is not touched. From standstill the machine falls behind only as it gets going, and the step is longer.
+//! Where nothing may follow (a stop, a corner, increments), the offset ends inside the arc with an overshoot of
+//! equal area, and up to 40 % of δ remains at that point. Pairs of arcs (biarcs) follow the step with a common
+//! tangent at every joint.
 use super::state::{Arc, sub};
+use super::transition::Transition;
 
 /// How a corrected arc begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,6 +19,8 @@ pub(super) struct Entry {
     pub(super) from_mm: f64,
     /// Way to the arc's own offset, mm; 0: it is there already.
     pub(super) length_mm: f64,
+    /// How it gets there.
+    pub(super) shape: Transition,
 }
 
 /// How a corrected arc ends.
@@ -29,6 +32,8 @@ pub(super) enum Exit {
     RunOut {
         /// Way, mm.
         length_mm: f64,
+        /// How.
+        shape: Transition,
         /// Direction of the line.
         along: [f64; 2],
     },
@@ -39,9 +44,7 @@ pub(super) enum Exit {
     },
 }
 
-/// Largest |g″|·L² of the step: what it adds to the curvature, in Δ/L².
-pub(super) const STEP_CURVATURE: f64 = 6.0;
-/// As [`STEP_CURVATURE`], of the step with overshoot.
+/// Largest |g″|·L² of the step with overshoot: what it adds to the curvature, in Δ/L².
 pub(super) const INSIDE_CURVATURE: f64 = 36.0;
 
 impl Exit {
@@ -79,8 +82,7 @@ pub(super) struct Piece {
 /// Beyond this radius, mm, an arc is written as a line; over a millimetre they differ by 0.1 nm.
 const STRAIGHT_MM: f64 = 1e6;
 
-/// Biarcs to a step, and to a step with overshoot.
-const STEP_BIARCS: usize = 2;
+/// Biarcs to a step with overshoot.
 const INSIDE_BIARCS: usize = 4;
 
 /// The corrected path of `arc` with radius R + δ.
@@ -107,9 +109,7 @@ pub(super) fn pieces(arc: &Arc, delta_mm: f64, entry: Entry, exit: Exit) -> Vec<
     }
     if in_rad > 0.0 {
         let rise = delta_mm - entry.from_mm;
-        for k in 1..=STEP_BIARCS {
-            let u = k as f64 / STEP_BIARCS as f64;
-            let [g, slope] = step(u);
+        for (u, g, slope) in entry.shape.nodes() {
             let next = node(u * in_rad, entry.from_mm + rise * g, rise * slope / entry.length_mm);
             biarc(&mut list, last, next, u * in_rad / total);
             last = next;
@@ -143,12 +143,10 @@ pub(super) fn pieces(arc: &Arc, delta_mm: f64, entry: Entry, exit: Exit) -> Vec<
                 last = next;
             }
         }
-        Exit::RunOut { length_mm, along } => {
+        Exit::RunOut { length_mm, shape, along } => {
             // Outward of a CCW arc is to the right of travel.
             let across = [along[1] * side, -along[0] * side];
-            for k in 1..=STEP_BIARCS {
-                let u = k as f64 / STEP_BIARCS as f64;
-                let [g, slope] = step(u);
+            for (u, g, slope) in shape.nodes() {
                 let (way, offset, tilt) =
                     (u * length_mm, delta_mm * (1.0 - g), -delta_mm * slope / length_mm);
                 let norm = tilt.hypot(1.0);

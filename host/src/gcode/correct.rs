@@ -1,7 +1,8 @@
 //! Which arcs are corrected, and how they meet their neighbours.
-use super::blend::{Entry, Exit, INSIDE_CURVATURE, STEP_CURVATURE};
+use super::blend::{Entry, Exit, INSIDE_CURVATURE, Piece, pieces};
 use super::inverse::{Inverse, Twin};
 use super::state::{Action, Arc, Plane, Straight};
+use super::transition::Transition;
 use super::word::Line;
 use super::{Left, Options};
 
@@ -22,15 +23,18 @@ pub(super) struct Plan {
 
 /// Length of the step from standstill in units of σ·f: a lag has (1 − exp(−t/σ))².
 const START_RESPONSES: f64 = 3.0;
+/// A step longer than this many σ·f answers slowly enough to be taken as smooth.
+const LONGEST_RESPONSES: f64 = 6.0;
 /// A line keeps at least this much of its length behind a run-out, mm.
 const LINE_LEFT_MM: f64 = 0.1;
 
-/// One decision a line; `None` where there is no arc.
+/// One decision a line; `None` where there is no arc. Arcs that would need a block shorter than `least_mm` are left.
 pub(super) fn decide(
     lines: &[Line<'_>],
     actions: &[Action],
     inverse: &Inverse,
     options: &Options,
+    least_mm: f64,
 ) -> Vec<Option<Result<Plan, Left>>> {
     let mut twins: Vec<Option<Result<Twin, Left>>> = actions
         .iter()
@@ -42,7 +46,7 @@ pub(super) fn decide(
         .collect();
     // An arc that turns out too short may have carried on its neighbour's offset: until nothing changes.
     loop {
-        let room = Room { lines, actions, twins: &twins, inverse, options };
+        let room = Room { lines, actions, twins: &twins, inverse, options, least_mm };
         let plans: Vec<_> = (0..lines.len()).map(|i| room.plan(i)).collect();
         let mut changed = false;
         for (twin, plan) in twins.iter_mut().zip(&plans) {
@@ -72,6 +76,7 @@ struct Room<'a> {
     twins: &'a [Option<Result<Twin, Left>>],
     inverse: &'a Inverse,
     options: &'a Options,
+    least_mm: f64,
 }
 
 impl Room<'_> {
@@ -82,38 +87,59 @@ impl Room<'_> {
         };
         let Action::Arc(arc) = &self.actions[i] else { return None };
         let (entry, exit) = (self.entry(i, arc, twin), self.exit(i, arc, twin));
-        let fits = entry.length_mm + exit.inside_mm() < arc.length_mm();
+        let room = entry.length_mm + exit.inside_mm() < arc.length_mm();
+        let long = |piece: &Piece| piece.length_mm >= self.least_mm;
+        let fits = room && (self.least_mm == 0.0 || pieces(arc, twin.delta_mm, entry, exit).iter().all(long));
         Some(if fits { Ok(Plan { twin, entry, exit }) } else { Err(Left::TooShort) })
     }
 
     fn entry(&self, i: usize, arc: &Arc, twin: Twin) -> Entry {
-        let (f, a) = (arc.feed_mm_s, self.options.acceleration_mm_s2);
-        let response_mm = f * self.inverse.response_s();
-        let length = |rise: f64, least: f64| (f * (STEP_CURVATURE * rise.abs() / a).sqrt()).max(least);
         match self.neighbour(i, arc, false) {
             Neighbour::Corrected(before, other) => {
                 // The same offset in space is outward of one and inward of the other where the turn changes.
                 let from_mm = other.delta_mm * (before.sweep_rad * arc.sweep_rad).signum();
                 let rise = twin.delta_mm - from_mm;
-                let same = rise.abs() < SAME_OFFSET_MM;
-                Entry {
-                    from_mm,
-                    length_mm: if same {
-                        0.0
-                    } else {
-                        length(rise, self.inverse.step_responses() * response_mm)
-                    },
+                if rise.abs() < SAME_OFFSET_MM {
+                    return Entry { from_mm, length_mm: 0.0, shape: Transition::SMOOTH };
                 }
+                let (length_mm, shape) = self.step(arc, rise);
+                Entry { from_mm, length_mm, shape }
             }
-            Neighbour::Line(..) | Neighbour::OtherArc => Entry {
-                from_mm: 0.0,
-                length_mm: length(twin.delta_mm, self.inverse.step_responses() * response_mm),
-            },
+            Neighbour::Line(..) | Neighbour::OtherArc => {
+                let (length_mm, shape) = self.step(arc, twin.delta_mm);
+                Entry { from_mm: 0.0, length_mm, shape }
+            }
             Neighbour::Rest => {
-                let least = START_RESPONSES * response_mm + f * f / (2.0 * a);
-                Entry { from_mm: 0.0, length_mm: length(twin.delta_mm, least) }
+                let (f, a) = (arc.feed_mm_s, self.options.acceleration_mm_s2);
+                let least = START_RESPONSES * f * self.inverse.response_s() + f * f / (2.0 * a);
+                let shape = Transition::SMOOTH;
+                let gentle = f * (shape.curvature() * twin.delta_mm.abs() / a).sqrt();
+                Entry { from_mm: 0.0, length_mm: gentle.max(least), shape }
             }
         }
+    }
+
+    /// Length and shape of a step of so much, mm: as the machine answers, or longer where that would ask for more
+    /// acceleration than is allowed.
+    fn step(&self, arc: &Arc, rise_mm: f64) -> (f64, Transition) {
+        let (f, a) = (arc.feed_mm_s, self.options.acceleration_mm_s2);
+        let response = self.inverse.response();
+        let unit_mm = f * self.inverse.response_s();
+        let (mut length, mut shape) = (response.length(), response.transition(response.length()));
+        if unit_mm > 0.0 {
+            let gentle = |shape: Transition| f * (shape.curvature() * rise_mm.abs() / a).sqrt() / unit_mm;
+            // A longer step is a flatter one; a few rounds find where both agree.
+            for _ in 0..4 {
+                if gentle(shape) <= length {
+                    break;
+                }
+                length = gentle(shape).min(LONGEST_RESPONSES);
+                shape =
+                    if length < LONGEST_RESPONSES { response.transition(length) } else { Transition::SMOOTH };
+            }
+            length = length.max(gentle(shape));
+        }
+        (length * unit_mm, shape)
     }
 
     fn exit(&self, i: usize, arc: &Arc, twin: Twin) -> Exit {
@@ -124,7 +150,7 @@ impl Room<'_> {
         match self.neighbour(i, arc, true) {
             Neighbour::Corrected(..) => Exit::Held,
             Neighbour::Line(line, along) => {
-                let length_mm = gentle(STEP_CURVATURE).max(self.inverse.step_responses() * response_mm);
+                let (length_mm, shape) = self.step(arc, twin.delta_mm);
                 let [first, second, third] = arc.plane.axes();
                 let long = |s: f64, e: f64, t: f64, u: f64| (e - s).hypot(u - t) > length_mm + LINE_LEFT_MM;
                 let reaches = match (line.start[first], line.end[first], line.start[second], line.end[second])
@@ -134,7 +160,7 @@ impl Room<'_> {
                 };
                 let level = line.start[third] == line.end[third];
                 if line.absolute && arc.modes.absolute && level && reaches {
-                    Exit::RunOut { length_mm, along }
+                    Exit::RunOut { length_mm, shape, along }
                 } else {
                     inside
                 }

@@ -1,4 +1,5 @@
 //! The circle to program so that the machine makes the wanted one.
+use super::transition::Response;
 use super::{Keep, Left, Options};
 use crate::model_file::{ModelFile, Servo};
 use giotto_shared::model::{Cumulants, Element, RadiusModel};
@@ -53,9 +54,9 @@ impl Inverse {
         self.cumulants().kappa2_s2.abs().sqrt()
     }
 
-    /// Length of the step at a joint in units of σ·f: 1.25 for one lag (κ4/κ2² = 6), 1 for a chain of several.
-    pub(super) fn step_responses(&self) -> f64 {
-        if (self.cumulants().ratio() - 6.0).abs() < 1.0 { 1.25 } else { 1.0 }
+    /// The response beyond its size, for the steps at joints.
+    pub(super) fn response(&self) -> Response {
+        Response::of(&self.cumulants())
     }
 
     fn element(&self) -> Option<Element<f64>> {

@@ -1,6 +1,6 @@
-//! NC programs: arcs rewritten with the inverse correction, everything else to the letter.
+//! Programs for machines: arcs rewritten with the inverse correction, everything else to the letter.
 //!
-//! RS-274 as LinuxCNC and Grbl speak it. An arc of radius R at feed f becomes one of the radius that the machine
+//! RS-274 as LinuxCNC and Grbl speak it, and plain RAPID ([`rapid`]). An arc of radius R at feed f becomes one of the radius that the machine
 //! turns into R, with tangent transitions where it meets its neighbours (`blend`); the blocks of lines are not
 //! touched. What cannot be corrected within bounds stays as it was, with a reason.
 //!
@@ -13,9 +13,11 @@ mod emit;
 mod inverse;
 #[cfg(test)]
 mod proof;
+pub mod rapid;
 mod state;
 #[cfg(test)]
 mod tests;
+mod transition;
 mod word;
 
 use crate::model_file::ModelFile;
@@ -124,12 +126,22 @@ pub struct Compensated {
     pub arcs: Vec<Report>,
 }
 
+/// Whether any line is a block: words that were understood, or what steers a program.
+pub fn is_program(program: &[u8]) -> bool {
+    let block = |line: &word::Line<'_>| match line.sort {
+        word::Sort::Plain | word::Sort::Optional => !line.words.is_empty(),
+        word::Sort::Flow => true,
+        word::Sort::Unread => false,
+    };
+    word::lines(program).iter().any(block)
+}
+
 /// Rewrites the arcs of a program. The text need not be UTF-8; bytes outside rewritten arcs are copied.
 pub fn compensate(program: &[u8], model: &ModelFile, options: &Options) -> Compensated {
     let lines = word::lines(program);
     let mut state = State::new();
     let actions: Vec<Action> = lines.iter().map(|line| state.step(line)).collect();
     let inverse = inverse::Inverse::new(model, options);
-    let fates = correct::decide(&lines, &actions, &inverse, options);
+    let fates = correct::decide(&lines, &actions, &inverse, options, 0.0);
     emit::emit(&lines, &actions, &fates)
 }

@@ -6,10 +6,14 @@
 //! | `grid` | the circles that may be run |
 //! | `information` | what a circle would tell of every explanation, by the causes' own signatures |
 //! | `design` | the choice: Ds-optimality, greedy and then by exchange; what it is worth |
+//! | `program` | the plan as a program for the machine, in RS-274 and RAPID |
 //! | `sequence` | the order: shuffled, a reference run repeated, a warm-up before |
 mod design;
 mod grid;
 mod information;
+mod program;
+#[cfg(test)]
+mod program_tests;
 mod question;
 mod sequence;
 #[cfg(test)]

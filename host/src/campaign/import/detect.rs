@@ -31,7 +31,7 @@ pub enum Format {
 impl fmt::Display for Format {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Auto => "unknown",
+            Self::Auto => "any",
             Self::Contract => "giotto CSV",
             Self::German => "CSV with decimal commas",
             Self::Named => "text with named columns",

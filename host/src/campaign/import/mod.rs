@@ -28,3 +28,14 @@ mod trim;
 
 pub use add::{Added, Laps, Options, add};
 pub use detect::Format;
+
+use crate::campaign::CampaignError;
+use std::path::Path;
+
+/// The layout of a foreign file, by its first lines; nothing else of it is read.
+///
+/// # Errors
+/// A file that cannot be read, or whose layout is not known.
+pub fn recognise(file: &Path, format: Format, columns: Option<&str>) -> Result<Format, CampaignError> {
+    recording::recognise(file, format, columns).map(|layout| layout.format)
+}

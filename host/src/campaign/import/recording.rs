@@ -22,6 +22,30 @@ pub(super) struct Recording {
     pub(super) target_m: [Vec<f64>; 3],
 }
 
+/// Which layout a file has, by its first lines.
+pub(super) fn recognise(path: &Path, wanted: Format, given: Option<&str>) -> Result<Layout, CampaignError> {
+    let io = |e: std::io::Error| CampaignError::io(path, "read", EXPECTED, &e);
+    if path.is_dir() {
+        return Err(CampaignError::new(Place::file(path), Problem::IsDirectory { expected: EXPECTED }));
+    }
+    let mut head = Vec::new();
+    std::fs::File::open(path).map_err(io)?.take(1 << 16).read_to_end(&mut head).map_err(io)?;
+    if head.is_empty() {
+        return Err(CampaignError::new(Place::file(path), Problem::Empty { expected: EXPECTED }));
+    }
+    let head = Head::of(&head);
+    let refuse = |problem| Err(CampaignError::new(Place::at(path, 1, 1), problem));
+    match detect(&head, wanted, given) {
+        Err(reason) => refuse(Problem::Columns { reason }),
+        Ok(Detected::Results) => refuse(Problem::ResultsOnly),
+        Ok(Detected::Unknown) => {
+            let found = crate::campaign::table::shorten(head.line(0));
+            refuse(Problem::UnknownFormat { found, wanted: wanted.to_string() })
+        }
+        Ok(Detected::Table(layout)) => Ok(layout),
+    }
+}
+
 impl Recording {
     /// Reads a file. `progress` is told the bytes read so far.
     pub(super) fn read(
@@ -30,27 +54,7 @@ impl Recording {
         given: Option<&str>,
         progress: &dyn Fn(u64),
     ) -> Result<Self, CampaignError> {
-        let io = |e: std::io::Error| CampaignError::io(path, "read", EXPECTED, &e);
-        if path.is_dir() {
-            return Err(CampaignError::new(Place::file(path), Problem::IsDirectory { expected: EXPECTED }));
-        }
-        let mut head = Vec::new();
-        std::fs::File::open(path).map_err(io)?.take(1 << 16).read_to_end(&mut head).map_err(io)?;
-        if head.is_empty() {
-            return Err(CampaignError::new(Place::file(path), Problem::Empty { expected: EXPECTED }));
-        }
-        let head = Head::of(&head);
-        let refuse = |problem| Err(CampaignError::new(Place::at(path, 1, 1), problem));
-        let layout = match detect(&head, wanted, given) {
-            Err(reason) => return refuse(Problem::Columns { reason }),
-            Ok(Detected::Results) => return refuse(Problem::ResultsOnly),
-            Ok(Detected::Unknown) => {
-                let found = crate::campaign::table::shorten(head.line(0));
-                return refuse(Problem::UnknownFormat { found, wanted: wanted.to_string() });
-            }
-            Ok(Detected::Table(layout)) => layout,
-        };
-        Self::read_table(path, &layout, progress)
+        Self::read_table(path, &recognise(path, wanted, given)?, progress)
     }
 
     fn read_table(path: &Path, layout: &Layout, progress: &dyn Fn(u64)) -> Result<Self, CampaignError> {
