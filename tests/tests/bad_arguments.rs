@@ -170,6 +170,8 @@ fn wrong_usage_is_two_and_json_keeps_stdout_clean() {
         assert_eq!(code, 0, "giotto {line}\n{errors}");
         assert!(serde_json::from_str::<serde_json::Value>(&stdout).is_ok(), "giotto {line}\n{stdout}");
     }
+    let (code, stdout, errors) = run(folder, "--quiet fit campaign -o quiet.toml");
+    assert!(code == 0 && errors.is_empty() && !stdout.contains('\x1b'), "{stdout}{errors}");
     let (_, stdout, _) = run(folder, "monitor --port sim --count 2 --interval 0.01");
     assert!(
         !stdout.contains('\x1b') && stdout.matches("motion").count() == 2,

@@ -30,8 +30,10 @@ pub struct Args {
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let campaign = args.source.read(out)?;
     let model = args.model.as_deref().map(ModelFile::load).transpose()?;
-    let diagnosis =
-        diagnose(&campaign, &Options { model, seed: args.seed }).map_err(|e| args.source.refused(&e))?;
+    let bar = out.spinner("diagnosing");
+    let diagnosis = diagnose(&campaign, &Options { model, seed: args.seed });
+    bar.finish_and_clear();
+    let diagnosis = diagnosis.map_err(|e| args.source.refused(&e))?;
     if let Some(path) = &args.output {
         diagnosis.model.save(path)?;
         out.note(format_args!("wrote {}", path.display()));

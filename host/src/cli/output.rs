@@ -1,7 +1,9 @@
 //! Where results go: tables for people, one JSON document for programs.
 use super::failure::Failure;
+use indicatif::ProgressBar;
 use serde::Serialize;
 use std::io::{IsTerminal, Write};
+use std::time::Duration;
 
 /// How results are shown, from the flags every command takes.
 #[derive(Clone, Copy, Debug)]
@@ -33,6 +35,16 @@ impl Output {
     /// Whether progress bars may be drawn.
     pub fn draws(&self) -> bool {
         !self.quiet && !self.json && !self.non_interactive && std::io::stderr().is_terminal()
+    }
+
+    /// A sign of life while something takes seconds; nothing where nothing is drawn.
+    pub fn spinner(&self, words: &'static str) -> ProgressBar {
+        if !self.draws() {
+            return ProgressBar::hidden();
+        }
+        let bar = ProgressBar::new_spinner().with_message(words);
+        bar.enable_steady_tick(Duration::from_millis(100));
+        bar
     }
 
     /// Prints `value` as the JSON document of this command.

@@ -47,8 +47,10 @@ pub struct Args {
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let campaign = args.source.read(out)?;
     let model = args.model.as_deref().map(ModelFile::load).transpose()?;
-    let diagnosis =
-        diagnose(&campaign, &Options { model, seed: args.seed }).map_err(|e| args.source.refused(&e))?;
+    let bar = out.spinner("diagnosing");
+    let diagnosis = diagnose(&campaign, &Options { model, seed: args.seed });
+    bar.finish_and_clear();
+    let diagnosis = diagnosis.map_err(|e| args.source.refused(&e))?;
     let options = planning::Options {
         limits: Limits {
             radii_m: args.radii.iter().map(|mm| mm * 1e-3).collect(),

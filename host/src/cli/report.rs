@@ -35,8 +35,10 @@ struct Document<'a> {
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let campaign = args.source.read(out)?;
     let model = args.model.as_deref().map(ModelFile::load).transpose()?;
-    let diagnosis =
-        diagnose(&campaign, &Options { model, seed: args.seed }).map_err(|e| args.source.refused(&e))?;
+    let bar = out.spinner("diagnosing");
+    let diagnosis = diagnose(&campaign, &Options { model, seed: args.seed });
+    bar.finish_and_clear();
+    let diagnosis = diagnosis.map_err(|e| args.source.refused(&e))?;
     let html = crate::report::html(&campaign, &diagnosis).map_err(Failure::input)?;
     std::fs::write(&args.output, &html).map_err(|e| cannot_write(&args.output, &e))?;
     if out.json {

@@ -1,194 +1,15 @@
 //! Foreign files in their real layouts, good and broken, through the real binary.
 #![allow(clippy::unwrap_used, reason = "a test may fail where it stands")]
+mod bench;
+mod layouts;
+
+use bench::{Bench, near};
 use giotto_tests::command::{giotto, outcome};
+use layouts::{LAYOUTS, Path3, SIZE_MM, german, kflop, leica, rtde, spatial_analyzer};
 use serde_json::Value;
 use std::f64::consts::TAU;
-use std::fmt::Write as _;
 use std::fs;
-use std::path::{Path, PathBuf};
-
-/// A measured circular path in space: 80 µm too large, 30 µm oval, 4 µm noise, seen at 100 Hz; lead-in and lead-out
-/// along the tangent, standing still before and after.
-struct Path3 {
-    radius_mm: f64,
-    feed_mm_s: f64,
-    sign: f64,
-    turns: f64,
-    tilt: f64,
-    centre_mm: [f64; 3],
-    lead_mm: f64,
-    dwell: usize,
-}
-
-const SIZE_MM: f64 = 0.08;
-
-impl Default for Path3 {
-    fn default() -> Self {
-        let centre_mm = [1832.4, -977.1, 611.8];
-        Self {
-            radius_mm: 100.0,
-            feed_mm_s: 60.0,
-            sign: 1.0,
-            turns: 1.0,
-            tilt: 0.02,
-            centre_mm,
-            lead_mm: 0.0,
-            dwell: 0,
-        }
-    }
-}
-
-impl Path3 {
-    /// Time (s), measured and wanted position (mm).
-    fn points(&self) -> Vec<(f64, [f64; 3], [f64; 3])> {
-        let step = self.feed_mm_s / 100.0;
-        let lead = (self.lead_mm / step).round() as i64;
-        let around = (self.turns * TAU * self.radius_mm / step).round() as i64;
-        let place = |s: i64, radius: f64| {
-            let on = s.clamp(0, around) as f64 * step / self.radius_mm;
-            let beyond = (s - s.clamp(0, around)) as f64 * step;
-            let a = self.sign * on;
-            let (sin, cos) = a.sin_cos();
-            [radius * cos - self.sign * sin * beyond, radius * sin + self.sign * cos * beyond]
-        };
-        let lift = |[u, v]: [f64; 2]| {
-            let (sin, cos) = self.tilt.sin_cos();
-            let [x, y, z] = self.centre_mm;
-            [x + u * cos, y + v, z - u * sin]
-        };
-        let stand = self.dwell as i64;
-        (-lead - stand..around + lead + stand)
-            .enumerate()
-            .map(|(k, s)| {
-                let s = s.clamp(-lead, around + lead - 1);
-                let noise = |m: u64| {
-                    ((k as u64 * 2_654_435_761 + m * 40_503).wrapping_mul(0x9E37_79B9) >> 20 & 0xFFF) as f64
-                };
-                let bump = |m| (noise(m) / 4095.0 - 0.5) * 0.0138;
-                let a = s as f64 * step / self.radius_mm;
-                let [u, v] = place(s, self.radius_mm + SIZE_MM + 0.015 * (2.0 * a).cos());
-                let measured = lift([u + bump(1), v + bump(2)]);
-                (k as f64 / 100.0, measured, lift(place(s, self.radius_mm)))
-            })
-            .collect()
-    }
-}
-
-fn leica(path: &Path3) -> Vec<u8> {
-    let mut text = "X  [mm],Y  [mm],Z  [mm],U(95)  [mm],Temperatur [°C],Time Stamp,Name\r\n".to_owned();
-    for (t, [x, y, z], _) in path.points() {
-        let (minute, second) = (58 + (t / 60.0) as u32, t % 60.0);
-        let (hour, minute) = (23 + minute / 60, minute % 60);
-        let (day, hour) = (8 + hour / 24, hour % 24); // over midnight
-        writeln!(
-            text,
-            "{x:.4},{y:.4},{z:.4},0.0152,20.1,'{day:02}.11.2022 {hour:02}:{minute:02}:{second:06.3},P\r"
-        )
-        .unwrap();
-    }
-    text.chars().map(|c| u8::try_from(u32::from(c)).unwrap()).collect() // Latin-1
-}
-
-fn spatial_analyzer(path: &Path3) -> Vec<u8> {
-    let mut text = "// Exported from SpatialAnalyzer\n// Units: mm\n// Group, Name\n".to_owned();
-    for (k, (t, [x, y, z], _)) in path.points().iter().enumerate() {
-        let (minute, second) = (2 + (t / 60.0) as u32, (t % 60.0) as u32);
-        writeln!(
-            text,
-            "Circle,  p{k},  {k},  {x:.4},  {y:.4},  {z:.4},  11/08/22 16:{minute:02}:{second:02}"
-        )
-        .unwrap();
-    }
-    text.into_bytes()
-}
-
-fn rtde(path: &Path3) -> Vec<u8> {
-    let names = |who: &str| (0..6).map(|k| format!("{who}_TCP_pose_{k}")).collect::<Vec<_>>().join(" ");
-    let mut text = format!("timestamp {} {}\n", names("target"), names("actual"));
-    for (t, is, want) in path.points() {
-        let pose =
-            |p: [f64; 3]| format!("{:.7} {:.7} {:.7} 0.01 -3.14 0.02", p[0] / 1e3, p[1] / 1e3, p[2] / 1e3);
-        writeln!(text, "{:.3} {} {}", 81_234.5 + t, pose(want), pose(is)).unwrap();
-    }
-    text.into_bytes()
-}
-
-fn kflop(path: &Path3) -> Vec<u8> {
-    let mut text = "time,pos0,pos1,pos2,dest0,dest1,dest2\n".to_owned();
-    for (t, [x, y, z], [a, b, c]) in path.points() {
-        writeln!(text, "{t:.4},{x:.5},{y:.5},{z:.5},{a:.5},{b:.5},{c:.5}").unwrap();
-    }
-    text.into_bytes()
-}
-
-fn german(path: &Path3) -> Vec<u8> {
-    let mut text = "\u{feff}Zeit [s];X [mm];Y [mm];Z [mm];Bemerkung\r\n".to_owned();
-    for (t, [x, y, z], _) in path.points() {
-        text += &format!("{t:.3};{x:.4};{y:.4};{z:.4};\r\n").replace('.', ",");
-    }
-    text.into_bytes()
-}
-
-fn bare(path: &Path3) -> Vec<u8> {
-    let mut text = "some controller\nexport 7\n".to_owned();
-    for (t, [x, y, _], _) in path.points() {
-        writeln!(text, "{:.1}\t-1\t{:.6}\t{:.6}", t * 1e3, x / 1e3, y / 1e3).unwrap();
-    }
-    text.into_bytes()
-}
-
-struct Bench {
-    dir: tempfile::TempDir,
-}
-
-impl Bench {
-    fn new() -> Self {
-        Self { dir: tempfile::tempdir().unwrap() }
-    }
-
-    fn put(&self, name: &str, bytes: &[u8]) -> PathBuf {
-        let path = self.dir.path().join(name);
-        fs::write(&path, bytes).unwrap();
-        path
-    }
-
-    fn campaign(&self) -> PathBuf {
-        self.dir.path().join("campaign")
-    }
-
-    /// `giotto import FILE --radius 100 --feed 60 … -o campaign --json`
-    fn import(&self, file: &Path, more: &[&str]) -> (i32, String, String) {
-        let mut command = giotto();
-        command
-            .arg("import")
-            .arg(file)
-            .args(["--radius", "100", "--feed", "60", "--json", "-o"])
-            .arg(self.campaign());
-        outcome(&command.args(more).output().unwrap())
-    }
-
-    fn analyze(&self) -> Value {
-        let (code, out, err) =
-            outcome(&giotto().args(["analyze", "--json"]).arg(self.campaign()).output().unwrap());
-        assert_eq!(code, 0, "{err}");
-        serde_json::from_str(&out).unwrap()
-    }
-}
-
-fn near(value: &Value, expected: f64, tolerance: f64) {
-    let found = value.as_f64().unwrap_or(f64::NAN);
-    assert!((found - expected).abs() <= tolerance, "{found} against {expected}");
-}
-
-type Maker = fn(&Path3) -> Vec<u8>;
-const LAYOUTS: &[(&str, Maker, &str, &[&str])] = &[
-    ("leica.csv", leica, "Leica tracker CSV", &[]),
-    ("sa.txt", spatial_analyzer, "SpatialAnalyzer text", &[]),
-    ("rtde.csv", rtde, "UR RTDE recording", &[]),
-    ("kflop.csv", kflop, "KFLOP log", &[]),
-    ("german.csv", german, "CSV with decimal commas", &[]),
-    ("bare.txt", bare, "columns as given", &["--columns", "time_ms,-,x_m,y_m"]),
-];
+use std::path::Path;
 
 #[test]
 fn each_layout_gives_the_same_circle() {
@@ -451,6 +272,34 @@ fn a_foreign_file_stands_for_a_campaign() {
     assert_eq!(code, 0, "{err}");
     assert!(err.contains("Leica tracker CSV"), "{err}");
     near(&serde_json::from_str::<Value>(&out).unwrap()["runs"][0]["radius_error_um"], SIZE_MM * 1e3, 1.0);
+}
+
+/// The other commands take the file as well; what one run cannot tell, they say.
+#[test]
+fn every_command_takes_a_foreign_file() {
+    let bench = Bench::new();
+    let file = bench.put("tracker.csv", &leica(&Path3::default()));
+    let rest = ["--radius", "100", "--feed", "60"];
+    let run = |command: &str, more: &[&str]| {
+        let mut line = giotto();
+        line.arg(command).arg(&file).args(rest).args(more).current_dir(bench.dir.path());
+        outcome(&line.output().unwrap())
+    };
+    let (code, out, err) = run("diagnose", &["--json"]);
+    assert_eq!(code, 0, "{err}");
+    let diagnosis: Value = serde_json::from_str(&out).unwrap();
+    assert!(diagnosis["cannot_tell"][0].as_str().unwrap().starts_with("1 run(s)"), "{out}");
+    let (code, _, err) = run("report", &["-o", "report.html"]);
+    assert_eq!(code, 0, "{err}");
+    assert!(fs::read_to_string(bench.dir.path().join("report.html")).unwrap().contains("tracker.csv"));
+    let (code, out, err) = run("plan", &["--gcode", "next.nc", "--rapid", "next.mod"]);
+    assert_eq!(code, 0, "{err}");
+    assert!(out.contains("Warm up with"), "{out}");
+    let program = fs::read_to_string(bench.dir.path().join("next.nc")).unwrap();
+    assert!(program.contains("run 1 of ") && program.contains("tracker.csv, seed 1"), "{program}");
+    assert!(fs::read_to_string(bench.dir.path().join("next.mod")).unwrap().starts_with("MODULE"));
+    let (code, _, err) = run("fit", &[]);
+    assert!(code == 3 && err.contains("help: measure more"), "{code} {err}");
 }
 
 #[test]

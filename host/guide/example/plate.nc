@@ -1,0 +1,65 @@
+%
+(PLATE 120 X 80, ROUNDED CORNERS, TWO SLOTS, TWO HOLES)
+N10 G17 G21 G90 G94 G91.1
+N20 T1 M6 (6 mm end mill)
+N30 S12000 M3
+N40 G0 Z5.
+(outline, corners R10, entered and left on an arc)
+N50 G0 X-20. Y30.
+N60 G1 Z-2. F300.
+N70 G1 X-15. Y30. F1500.
+N80 G3 X0. Y45. I0. J15.
+N90 G1 Y70.
+N100 G2 X10. Y80. I10. J0. ; first corner
+N110 G1 X110.
+N120 G2 X120. Y70. R10.
+N130 G1 Y10.
+N140 G2 X110. Y0. I-10. J0.
+N150 G1 X10.
+N160 G2 X0. Y10. R10.
+N170 G1 Y45.
+N180 G3 X-15. Y60. I-15. J0.
+N190 G1 X-20.
+N200 G0 Z5.
+(slot 30 x 16)
+N210 G0 X45. Y55.
+N220 G1 Z-2. F300.
+N230 G1 X55. Y48. F1500. (to the side of the slot)
+N240 G1 X70. Y48.
+G3 X70. Y64. I0. J8.
+G1 X40.
+G3 X40. Y48. I0. J-8.
+G1 X60.
+G0 Z5.
+(slot of 12, half turns by R)
+G0 X50. Y20.
+G1 Z-2. F300.
+G1 X55. Y14. F1500.
+G1 X75.
+G3 X75. Y26. R6.
+G1 X45.
+G3 X45. Y14. R6.
+G1 X65.
+G0 Z5.
+(hole of 24 at 25 40, tangent in and out)
+G0 X25. Y34.
+G1 Z-2. F300.
+G1 X31. Y34. F1500.
+G3 X37. Y40. I0. J6.
+G3 X37. Y40. I-12. J0.
+G3 X31. Y46. I-6. J0.
+G1 X25. Y46.
+G0 Z5.
+(hole of 30 at 95 40, in two halves)
+G0 X95. Y33.
+G1 Z-2. F300.
+G1 X103. Y33. F1500.
+G3 X110. Y40. I0. J7.
+G3 X80. Y40. I-15. J0.
+G3 X110. Y40. I15. J0.
+G3 X103. Y47. I-7. J0.
+G1 X95. Y47.
+G0 Z5.
+M5
+M30
+%
