@@ -93,7 +93,16 @@ fn the_numbers_of_requests_are_those_of_the_page() {
         ("Subscribe", Command::Subscribe { every: 1, on_link: true }),
         ("Reset", Command::Reset),
         ("Provision", Command::Provision { key: [0; 32] }),
+        ("Supervise", Command::Supervise { after_ms: 0 }),
     ];
+    let versions = [
+        format!("protocol version {}.", wire::PROTOCOL_VERSION),
+        format!("`Hello` sets {} ms", wire::SUPERVISE_MS),
+        format!("The longest payload is {} bytes.", wire::MAX_PAYLOAD),
+    ];
+    for words in &versions {
+        assert!(text.contains(words), "{words}");
+    }
     for (name, command) in &all {
         let row = format!("| {} | `{name}` |", first(command));
         assert!(text.contains(&row), "{row}");

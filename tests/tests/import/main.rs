@@ -5,9 +5,10 @@ mod layouts;
 
 use bench::{Bench, near};
 use giotto_tests::command::{giotto, outcome};
-use layouts::{LAYOUTS, Path3, SIZE_MM, german, kflop, leica, rtde, spatial_analyzer};
+use layouts::{LAYOUTS, Path3, SIZE_MM, bare, german, kflop, leica, rtde, spatial_analyzer};
 use serde_json::Value;
 use std::f64::consts::TAU;
+use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 

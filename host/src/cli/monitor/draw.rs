@@ -108,8 +108,10 @@ fn words(status: &Status) -> Vec<Line<'static>> {
             None => format!("{:08x}, not confirmed", info.crc),
         },
     };
+    let cause = status.fault.map(|cause| format!(" ({cause:?})").to_lowercase()).unwrap_or_default();
+    let stop = if status.stop_input { ", stop input active" } else { "" };
     let mut lines: Vec<String> = vec![
-        format!("motion       {}", motion(status.motion)),
+        format!("motion       {}{cause}{stop}", motion(status.motion)),
         format!("correction   {correction}"),
         format!("probation    {probation}"),
         format!("slot 0       {}", slot(&status.slots[0])),
@@ -119,6 +121,11 @@ fn words(status: &Status) -> Vec<Line<'static>> {
         format!("ticks        {}", status.tick),
         format!("overruns     {}", counts.tick_overruns),
         format!("clamps       offset {}, rate {}", counts.offset_clamps, counts.slew_clamps),
+        format!(
+            "segments     {} dropped, {} uncorrected",
+            counts.dropped_segments, counts.uncorrected_segments
+        ),
+        format!("stops        {}, {} runs lost their host", counts.stops, counts.link_losses),
         format!("link         {} CRC errors, {} malformed", counts.crc_errors, counts.malformed_frames),
         format!("             {} overlong, {} repeated", counts.overlong_frames, counts.repeated_requests),
         format!("lost         {} bytes, {} set-points", counts.lost_bytes, counts.dropped_set_points),
@@ -140,6 +147,8 @@ mod tests {
     fn status() -> Status {
         Status {
             motion: MotionState::Running,
+            fault: None,
+            stop_input: true,
             bypass: false,
             active: Some(1),
             slots: [SlotState::Empty, SlotState::Invalid],
@@ -177,7 +186,7 @@ mod tests {
         let lines = picture(&view, 110, 32);
         let all = lines.join("\n");
         for words in [
-            "motion       running",
+            "motion       running, stop input active",
             "on, table in slot 1",
             "7 CRC errors",
             "×500: up to 12.0 µm",

@@ -79,10 +79,13 @@ fn lines(args: &Args, mut controller: Controller, out: Output) -> Result<(), Fai
     if let Some(circle) = args.circle() {
         controller.start_circle(&circle)?;
     }
-    let mut looks = 0;
+    let interval = Duration::from_secs_f64(args.interval);
+    let (mut looks, mut since) = (0, interval);
     while args.count.is_none_or(|count| looks < count) {
         if looks > 0 {
-            std::thread::sleep(Duration::from_secs_f64(args.interval));
+            let pause = interval.saturating_sub(since).min(watch::SILENCE);
+            std::thread::sleep(pause);
+            since += pause;
         }
         let status = match controller.status() {
             Ok(status) => status,
@@ -95,8 +98,12 @@ fn lines(args: &Args, mut controller: Controller, out: Output) -> Result<(), Fai
             }
             Err(error) => return Err(error.into()),
         };
-        show(&controller, &status, out);
-        looks += 1;
+        // Between looks it is asked all the same: silence would end a run.
+        if since >= interval {
+            show(&controller, &status, out);
+            looks += 1;
+            since = Duration::ZERO;
+        }
     }
     Ok(())
 }

@@ -6,6 +6,10 @@ use std::time::Duration;
 
 /// From one attempt to open a lost line to the next.
 pub(super) const RETRY: Duration = Duration::from_millis(500);
+/// Longest silence: during a run the controller takes one of [`SUPERVISE_MS`] for the end of its host.
+///
+/// [`SUPERVISE_MS`]: giotto_shared::wire::SUPERVISE_MS
+pub(super) const SILENCE: Duration = Duration::from_millis(200);
 /// Set-points a second: a smooth trace, a tenth of what the line carries.
 const POINTS_PER_S: u32 = 100;
 
@@ -76,6 +80,7 @@ fn serve(
     {
         return Some(error.to_string());
     }
+    let mut since = interval;
     loop {
         loop {
             let command = match wishes.try_recv() {
@@ -92,13 +97,19 @@ fn serve(
             }
         }
         match controller.status() {
-            Ok(status) => events.send(Event::Status(Box::new(status))).ok()?,
+            Ok(status) if since >= interval => {
+                since = Duration::ZERO;
+                events.send(Event::Status(Box::new(status))).ok()?;
+            }
+            Ok(_) => {}
             Err(error) if super::gone(&error) => return Some(error.to_string()),
             Err(error) => events.send(Event::Refused(error.to_string())).ok()?,
         }
-        if let Err(error) = controller.listen(interval) {
+        let pause = interval.min(SILENCE);
+        if let Err(error) = controller.listen(pause) {
             return Some(error.to_string());
         }
+        since += pause;
         let points: Vec<SetPoint> = controller.take_set_points().into_iter().flat_map(|b| b.points).collect();
         if !points.is_empty() {
             events.send(Event::Points(points)).ok()?;
