@@ -1,6 +1,6 @@
 //! Ripples of a fixed frequency in time: vibration, or the polygon of a slow interpolator.
 //!
-//! Each run has a phase of its own, so power is added, not amplitude; a run counts for at most [`CAP`], so
+//! Each run has a phase of its own, so power is added, not amplitude; a run counts for at most `CAP`, so
 //! that the sharp harmonics of a few runs cannot pose as a tone that all share.
 use super::basis::{axpy, dot};
 use super::ledger::Samples;
