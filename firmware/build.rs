@@ -2,6 +2,7 @@
 use std::env;
 use std::fs;
 use std::path::PathBuf;
+use std::process::Command;
 
 /// Memory of a board, for cortex-m-rt's link.x. Flash and RAM are as long as an image may be, not as long as
 /// the part has: what does not fit does not link.
@@ -16,17 +17,38 @@ const TEXT: u32 = 128 * 1024;
 /// Most RAM of an image, stack and all, bytes. The goal is 16 KiB.
 const RAM: u32 = 32 * 1024;
 
-const BOARDS: [Memory; 2] = [
+const BOARDS: [Memory; 3] = [
     // SSRAM1 as code memory, SSRAM2 as data memory (ARM DAI0386). The flash stand-in is at 0x0010_0000.
     Memory { feature: "CARGO_FEATURE_MPS2_AN386", flash: (0x0000_0000, TEXT), ram: (0x2000_0000, RAM) },
+    // Sectors 0 to 4 of the flash; tables are in 10 and 11 (RM0090 3.3). The first of two RAMs (RM0090 2.3).
+    Memory { feature: "CARGO_FEATURE_STM32F405", flash: (0x0800_0000, TEXT), ram: (0x2000_0000, RAM) },
     Memory { feature: "CARGO_FEATURE_TICKS", flash: (0x0000_0000, 2 * TEXT), ram: (0x2000_0000, 4 * RAM) },
 ];
+
+/// Version of the package and, in a git work tree, the commit: what an image says of itself.
+fn build() -> String {
+    let git = |arguments: &[&str]| {
+        let output =
+            Command::new("git").args(arguments).output().ok().filter(|output| output.status.success())?;
+        Some(String::from_utf8(output.stdout).ok()?.trim().to_owned())
+    };
+    let log = git(&["rev-parse", "--git-path", "logs/HEAD"]).filter(|log| fs::exists(log).unwrap_or(false));
+    if let Some(log) = log {
+        println!("cargo:rerun-if-changed={log}");
+    }
+    let version = env::var("CARGO_PKG_VERSION").unwrap_or_default();
+    match git(&["rev-parse", "--short=8", "HEAD"]) {
+        Some(commit) => format!("{version}+{commit}"),
+        None => version,
+    }
+}
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
     if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
         return;
     }
+    println!("cargo:rustc-env=GIOTTO_BUILD={}", build());
     let chosen = BOARDS.iter().find(|board| env::var_os(board.feature).is_some());
     let (Some(board), Some(out)) = (chosen, env::var_os("OUT_DIR")) else { return };
     let out = PathBuf::from(out);

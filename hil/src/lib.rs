@@ -3,5 +3,7 @@
 
 pub mod elf;
 pub mod faults;
+pub mod rate;
+pub mod scenarios;
 pub mod size;
 pub mod ticks;

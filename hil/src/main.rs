@@ -3,13 +3,15 @@
 
 use clap::{Parser, Subcommand};
 use giotto::controller::flash::Verdict;
-use giotto::controller::image::Board;
 use giotto::controller::virtual_controller::VirtualLink;
+use giotto::controller::{Board, OpenOptions, Port, open};
 use giotto::controller::{Controller, ControllerError};
 use giotto_hil::faults::FaultyLink;
-use giotto_hil::size;
+use giotto_hil::scenarios::{self, Outcome};
 use giotto_hil::ticks::{self, Counts, TERMS};
+use giotto_hil::{rate, size};
 use serde_json::{Value, json};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Scenarios on the giotto controller.
@@ -28,8 +30,38 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Runs every scenario on a controller. The machine on a real port moves: circles of up to 100 mm about the origin.
+    Run {
+        /// Serial device, `sim`, `qemu` or `qemu:stm32f405`.
+        #[arg(long)]
+        port: String,
+        /// Baud rate of a serial device.
+        #[arg(long, default_value_t = giotto::controller::port::BAUD)]
+        baud: u32,
+        /// Firmware image for QEMU, instead of the one of this workspace.
+        #[arg(long)]
+        image: Option<PathBuf>,
+        /// The flash is known not to keep what it is given: tables must be refused.
+        #[arg(long)]
+        worn_flash: bool,
+        /// One JSON document.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Ticks a second that the 25 MHz image reaches with time to spare, and the time to flash a table.
+    Rate {
+        /// One JSON document.
+        #[arg(long)]
+        json: bool,
+        /// Exit code 5 unless every bar is met.
+        #[arg(long)]
+        check: bool,
+    },
     /// What an image takes in flash and RAM, its deepest stack, and whether its tick can panic.
     Size {
+        /// The board: `mps2_an386` or `stm32f405`; only the first one's stack can be measured.
+        #[arg(long, default_value = "mps2_an386")]
+        board: String,
         /// One JSON document.
         #[arg(long)]
         json: bool,
@@ -54,7 +86,11 @@ enum Command {
 fn main() -> ExitCode {
     let done = match Cli::parse().command {
         Command::Ticks { json } => run_ticks(json),
-        Command::Size { json, check } => run_size(json, check),
+        Command::Run { port, baud, image, worn_flash, json } => {
+            run_scenarios(&port, &OpenOptions { image, baud }, worn_flash, json)
+        }
+        Command::Rate { json, check } => run_rate(json, check),
+        Command::Size { board, json, check } => run_size(&board, json, check),
         Command::Faults { frames, share, seed } => run_faults(frames, share, seed),
     };
     match done {
@@ -103,8 +139,72 @@ fn run_ticks(as_json: bool) -> Result<ExitCode, ControllerError> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn run_size(as_json: bool, check: bool) -> Result<ExitCode, ControllerError> {
-    let report = size::measure(Board::Mps2An386, &mut |text: &str| eprintln!("{text}"))?;
+fn run_scenarios(
+    port: &str,
+    options: &OpenOptions,
+    worn_flash: bool,
+    as_json: bool,
+) -> Result<ExitCode, ControllerError> {
+    let Ok(port) = port.parse::<Port>();
+    let mut controller = open(&port, options, &mut |text: &str| eprintln!("{text}"))?;
+    let (mut failed, mut done) = (0, Vec::new());
+    for scenario in &scenarios::ALL {
+        let outcome = scenarios::run(scenario, &mut controller);
+        let good = match outcome {
+            Outcome::Passed => true,
+            Outcome::RefusedByFlash => worn_flash,
+            Outcome::Failed(_) => false,
+        };
+        failed += usize::from(!good);
+        let words = match &outcome {
+            Outcome::Passed => "passed".to_owned(),
+            Outcome::RefusedByFlash => "refused: the flash does not read back".to_owned(),
+            Outcome::Failed(how) => format!("failed: {how}"),
+        };
+        if !as_json {
+            println!("{} {}: {words}", if good { "ok    " } else { "FAILED" }, scenario.0);
+        }
+        done.push(json!({ "scenario": scenario.0, "ok": good, "outcome": words }));
+    }
+    if as_json {
+        let identity = controller.identity();
+        let document = json!({ "board": identity.board, "build": identity.build, "scenarios": done });
+        println!("{document:#}");
+    }
+    Ok(if failed == 0 { ExitCode::SUCCESS } else { ExitCode::from(5) })
+}
+
+fn run_rate(as_json: bool, check: bool) -> Result<ExitCode, ControllerError> {
+    let report = rate::measure(&mut |text: &str| eprintln!("{text}"))?;
+    if as_json {
+        println!("{:#}", report.document());
+    } else {
+        println!(
+            "{} ticks/s with {:.1} % idle, {} late (bar: {} with {} %)",
+            report.tick_hz,
+            report.idle_percent,
+            report.overruns,
+            rate::RATE_BAR_HZ,
+            rate::IDLE_BAR_PERCENT
+        );
+        println!(
+            "flash, read back, commit, confirm and verify of {} bytes: {:.3} s by the clock, {:.3} s by its ticks \
+             (bar: {} s)",
+            report.table_bytes,
+            report.flash_s,
+            report.flash_controller_s,
+            rate::FLASH_BAR_S
+        );
+    }
+    Ok(if check && !report.meets_bars() { ExitCode::from(5) } else { ExitCode::SUCCESS })
+}
+
+fn run_size(board: &str, as_json: bool, check: bool) -> Result<ExitCode, ControllerError> {
+    let Some(board) = Board::named(board) else {
+        eprintln!("error: no board {board}: there are mps2_an386 and stm32f405");
+        return Ok(ExitCode::from(2));
+    };
+    let report = size::measure(board, &mut |text: &str| eprintln!("{text}"))?;
     if as_json {
         println!("{:#}", report.document());
     } else {

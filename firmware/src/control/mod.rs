@@ -24,3 +24,6 @@ pub use tick::Tick;
 pub const SEGMENTS: usize = 3;
 /// Set-points that wait for the link, at most.
 pub const SET_POINTS: usize = 64;
+
+#[cfg(test)]
+mod tests;

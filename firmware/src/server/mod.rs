@@ -42,6 +42,8 @@ pub const CENTRIPETAL_MAX_M_S2: f32 = 50.0;
 pub struct Board {
     /// Name of the board.
     pub name: &'static str,
+    /// Version and, if known, commit it was built from.
+    pub build: &'static str,
     /// Ticks a second.
     pub tick_hz: u32,
 }
@@ -101,6 +103,7 @@ pub struct Server<F, M, B> {
     supervision: Supervision,
     lost_bytes: u32,
     stack_bytes: u32,
+    idle_permille: Option<u16>,
     reset: bool,
 }
 
@@ -125,6 +128,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             supervision: Supervision::new(board.tick_hz),
             lost_bytes: 0,
             stack_bytes: 0,
+            idle_permille: None,
             reset: false,
         };
         server.install_last_good();
@@ -164,6 +168,11 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     /// Deepest stack since boot, as the board measures it.
     pub const fn note_stack(&mut self, bytes: u32) {
         self.stack_bytes = bytes;
+    }
+
+    /// Share of its time the core sleeps, thousandths, as the board measures it.
+    pub const fn note_idle(&mut self, permille: u16) {
+        self.idle_permille = Some(permille);
     }
 
     /// Looks whether the link is still alive; to be called again and again.
@@ -319,7 +328,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     fn identity(&self) -> Identity {
         Identity {
             board: cut(self.board.name),
-            build: cut(env!("CARGO_PKG_VERSION")),
+            build: cut(self.board.build),
             protocol: PROTOCOL_VERSION,
             table_format: FORMAT_VERSION,
             schema_hash: SCHEMA_HASH,
@@ -343,6 +352,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             probation: self.probation,
             tick: now.tick,
             stack_bytes: self.stack_bytes,
+            idle_permille: self.idle_permille,
             raw_nm: now.raw_nm,
             corrected_nm: now.corrected_nm,
             counters: Counters {

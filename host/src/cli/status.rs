@@ -65,6 +65,7 @@ fn document(controller: &Controller, status: &Status) -> Value {
         "slots": status.slots.iter().map(slot_document).collect::<Vec<_>>(),
         "ticks": status.tick,
         "stack_bytes": status.stack_bytes,
+        "idle_percent": status.idle_permille.map(|permille| f64::from(permille) / 10.0),
         "programmed_mm": status.raw_nm.map(millimetres),
         "corrected_mm": status.corrected_nm.map(millimetres),
         "counters": status.counters,
@@ -158,6 +159,9 @@ pub(super) fn words(controller: &Controller, status: &Status) -> Table {
             counts.dropped_set_points
         ),
     );
+    if let Some(permille) = status.idle_permille {
+        row("idle", format!("{:.1} % of the time", f64::from(permille) / 10.0));
+    }
     if status.stack_bytes > 0 {
         row("stack", format!("{} bytes at the deepest", status.stack_bytes));
     }

@@ -5,7 +5,7 @@ use super::link::Link;
 use giotto_shared::table::SCHEMA_HASH;
 use giotto_shared::wire::{
     self, Accumulator, CHUNK, Command, FromController, Identity, MAX_FRAME, PROTOCOL_VERSION, Reply, Request,
-    SetPoints, Status,
+    SUPERVISE_MS, SetPoints, Status,
 };
 use std::time::Duration;
 
@@ -28,6 +28,7 @@ pub struct Controller {
     pub(super) set_points: Vec<SetPoints>,
     identity: Identity,
     repeats: u32,
+    supervise_ms: u16,
 }
 
 impl std::fmt::Debug for Controller {
@@ -68,6 +69,7 @@ impl Controller {
             set_points: Vec::new(),
             identity: nobody,
             repeats: 0,
+            supervise_ms: SUPERVISE_MS,
         };
         controller.hello()?;
         Ok(controller)
@@ -86,7 +88,11 @@ impl Controller {
             return Err(ControllerError::OtherSchema { port, theirs, ours: SCHEMA_HASH });
         }
         self.identity = identity;
-        Ok(())
+        // A hello sets it back.
+        if self.supervise_ms == SUPERVISE_MS {
+            return Ok(());
+        }
+        self.command(Command::Supervise { after_ms: self.supervise_ms })
     }
 
     /// Who it is.
@@ -110,8 +116,18 @@ impl Controller {
     /// # Errors
     /// Those of the link.
     pub fn supervise(&mut self, after: Option<Duration>) -> Result<(), ControllerError> {
-        let after_ms = after.map_or(0, |after| u16::try_from(after.as_millis()).unwrap_or(u16::MAX));
-        self.command(Command::Supervise { after_ms })
+        self.supervise_ms = after.map_or(0, |after| u16::try_from(after.as_millis()).unwrap_or(u16::MAX));
+        self.command(Command::Supervise { after_ms: self.supervise_ms })
+    }
+
+    /// Lets time pass on the link without a word, as a host that has died.
+    ///
+    /// # Errors
+    /// Those of the link.
+    pub fn stay_silent(&mut self, time: Duration) -> Result<(), ControllerError> {
+        let until = self.now() + time;
+        while self.now() < until && self.arrival(until)?.is_some() {}
+        Ok(())
     }
 
     /// Requests that had to be sent again, so far.

@@ -1,6 +1,6 @@
-//! The firmware image in QEMU: UART0 on a pty, as a serial device would be, UART1 on a socket.
+//! The firmware image in QEMU: the link on a pty, as a serial device would be, other ports on sockets.
 use super::error::ControllerError;
-use super::image::{self, Board};
+use super::image::{self, Board, SerialPort};
 use super::link::Link;
 use super::serial::SerialLink;
 use std::io::{self, BufRead, BufReader};
@@ -84,23 +84,23 @@ impl Emulator {
         let mut command = Command::new("sh");
         command.args(["-c", KEEPER, "sh", &program]);
         command.args(["-machine", board.machine(), "-nographic", "-monitor", "none", "-kernel"]).arg(&image);
-        command.args(["-serial", "pty"]);
-        for name in ["uart1", "uart2"] {
-            let path = folder.path().join(name);
-            command
-                .arg("-chardev")
-                .arg(format!("socket,id={name},path={},server=on,wait=off", path.display()));
-            command.args(["-serial", &format!("chardev:{name}")]);
+        for port in board.serial_ports() {
+            match port {
+                SerialPort::Link => command.args(["-serial", "pty"]),
+                SerialPort::Nowhere => command.args(["-serial", "null"]),
+                SerialPort::Socket(name) => {
+                    let path = folder.path().join(name);
+                    let socket = format!("socket,id={name},path={},server=on,wait=off", path.display());
+                    command.args(["-chardev", &socket, "-serial", &format!("chardev:{name}")])
+                }
+            };
         }
-        // Time counts instructions, 32 ns each (about what the 25 MHz of the board allow), so that a busy host delays
-        // the controller but never makes a tick late.
-        command.args([
-            "-icount",
-            match pace {
-                Pace::Fast => "shift=5,sleep=off,align=off",
-                Pace::Clock => "shift=5,sleep=on,align=off",
-            },
-        ]);
+        // Time counts instructions, so that a busy host delays the controller but never makes a tick late.
+        let sleep = match pace {
+            Pace::Fast => "off",
+            Pace::Clock => "on",
+        };
+        command.arg("-icount").arg(format!("shift={},sleep={sleep},align=off", board.instruction_shift()));
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut process = command.spawn().map_err(|error| failed(&error))?;
         match find_pty(&mut process) {
@@ -112,17 +112,17 @@ impl Emulator {
         }
     }
 
-    /// Path of the pty that is UART0.
+    /// Path of the pty that is the link.
     pub fn pty(&self) -> &str {
         &self.pty
     }
 
-    /// Path of the socket that is UART1, where set-points stream.
+    /// Path of the socket where set-points stream, if the board has a port for them.
     pub fn stream_path(&self) -> PathBuf {
-        self.folder.path().join("uart1")
+        self.folder.path().join("stream")
     }
 
-    /// Connects to UART1.
+    /// Connects to the port for set-points, which on the mps2-an386 is the stop switch as well.
     ///
     /// # Errors
     /// Those of the socket.
@@ -130,12 +130,12 @@ impl Emulator {
         UnixStream::connect(self.stream_path())
     }
 
-    /// Connects to UART2, where the log goes in defmt's encoding.
+    /// Connects to where the log goes in defmt's encoding.
     ///
     /// # Errors
     /// Those of the socket.
     pub fn log(&self) -> io::Result<UnixStream> {
-        UnixStream::connect(self.folder.path().join("uart2"))
+        UnixStream::connect(self.folder.path().join("log"))
     }
 
     /// Waits until the emulator ends by itself.
@@ -143,7 +143,7 @@ impl Emulator {
         while self.words.recv().is_ok() {}
     }
 
-    /// Opens UART0; the emulator ends with the link.
+    /// Opens the link; the emulator ends with it.
     ///
     /// # Errors
     /// Those of [`SerialLink::open`].
@@ -199,7 +199,7 @@ fn find_pty(process: &mut Child) -> Result<(String, mpsc::Receiver<String>), Con
     Err(ControllerError::Emulator { reason })
 }
 
-/// UART0 of an emulator, which lives as long as this.
+/// The link of an emulator, which lives as long as this.
 pub struct EmulatorLink {
     serial: SerialLink,
     _emulator: Emulator,

@@ -16,8 +16,21 @@ pub const PROFILE: &str = "firmware";
 pub enum Board {
     /// QEMU's mps2-an386.
     Mps2An386,
+    /// STM32F405, as QEMU's netduinoplus2 has it.
+    Stm32f405,
     /// Not a controller: counts the instructions of a tick, on the mps2-an386.
     Ticks,
+}
+
+/// What a serial port of the emulator leads to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SerialPort {
+    /// The pty of the link.
+    Link,
+    /// A socket.
+    Socket(&'static str),
+    /// Nothing.
+    Nowhere,
 }
 
 impl Board {
@@ -25,7 +38,33 @@ impl Board {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Mps2An386 => "mps2_an386",
+            Self::Stm32f405 => "stm32f405",
             Self::Ticks => "ticks",
+        }
+    }
+
+    /// The board of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        [Self::Mps2An386, Self::Stm32f405].into_iter().find(|board| board.name() == name)
+    }
+
+    /// The emulator's serial ports in order: which is the link, and which lead to a socket of this name.
+    pub const fn serial_ports(self) -> &'static [SerialPort] {
+        use SerialPort::{Link, Nowhere, Socket};
+        match self {
+            Self::Mps2An386 | Self::Ticks => &[Link, Socket("stream"), Socket("log")],
+            // USART3 and USART6.
+            Self::Stm32f405 => &[Nowhere, Nowhere, Link, Nowhere, Nowhere, Socket("log")],
+        }
+    }
+
+    /// Emulated time of an instruction: 2^n ns. About what the board needs for one.
+    pub const fn instruction_shift(self) -> u8 {
+        match self {
+            // 32 ns, a cycle of 25 MHz is 40 ns.
+            Self::Mps2An386 | Self::Ticks => 5,
+            // 8 ns: QEMU's SysTick counts at 168 MHz whatever the image chose.
+            Self::Stm32f405 => 3,
         }
     }
 
@@ -33,6 +72,7 @@ impl Board {
     pub const fn machine(self) -> &'static str {
         match self {
             Self::Mps2An386 | Self::Ticks => "mps2-an386",
+            Self::Stm32f405 => "netduinoplus2",
         }
     }
 }
@@ -112,8 +152,14 @@ pub fn workspace() -> PathBuf {
 
 /// Where cargo puts the image of a board.
 pub fn path(board: Board) -> PathBuf {
-    let target =
-        std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from);
+    below(&target_folder(), board)
+}
+
+fn target_folder() -> PathBuf {
+    std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from)
+}
+
+fn below(target: &Path, board: Board) -> PathBuf {
     target.join(TARGET).join(PROFILE).join(board.name())
 }
 
@@ -122,7 +168,23 @@ pub fn path(board: Board) -> PathBuf {
 /// # Errors
 /// [`ControllerError::NoImage`] with cargo's own words.
 pub fn ensure(board: Board, note: &mut dyn FnMut(&str)) -> Result<PathBuf, ControllerError> {
-    let path = path(board);
+    ensure_with(board, &[], note)
+}
+
+/// As [`ensure`], with features of the firmware beside those of the board; such an image has a folder of its own.
+///
+/// # Errors
+/// As there.
+pub fn ensure_with(
+    board: Board,
+    features: &[&str],
+    note: &mut dyn FnMut(&str),
+) -> Result<PathBuf, ControllerError> {
+    let mut target = target_folder();
+    if !features.is_empty() {
+        target.push(features.join("-"));
+    }
+    let path = below(&target, board);
     let sources = ["firmware", "shared"].map(|room| workspace().join(room));
     let built = modified(&path);
     let newest = sources.iter().filter_map(|room| newest_below(room)).max();
@@ -135,7 +197,8 @@ pub fn ensure(board: Board, note: &mut dyn FnMut(&str)) -> Result<PathBuf, Contr
         return Err(no_image(format!("no compiler for {TARGET} is installed")));
     };
     note(&format!("firmware image {} is {what}: building it with {}", board.name(), toolchain.name()));
-    let output = toolchain.cargo(board, &[]).current_dir(workspace()).output();
+    let mut cargo = toolchain.cargo(board, features);
+    let output = cargo.arg("--target-dir").arg(&target).current_dir(workspace()).output();
     let output = output.map_err(|error| no_image(format!("cargo cannot be run: {error}")))?;
     if !output.status.success() {
         return Err(no_image(String::from_utf8_lossy(&output.stderr).trim_end().to_owned()));

@@ -28,5 +28,6 @@ mod tests;
 pub use client::Controller;
 pub use error::ControllerError;
 pub use giotto_shared::path::CircleRun;
+pub use image::Board;
 pub use port::{OpenOptions, Port, open};
 pub use recording::{Recording, SetPointRecord, circle};

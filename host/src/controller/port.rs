@@ -2,6 +2,7 @@
 use super::client::Controller;
 use super::emulator::{Emulator, Pace};
 use super::error::ControllerError;
+use super::image::Board;
 use super::serial::SerialLink;
 use super::virtual_controller::VirtualLink;
 use std::path::PathBuf;
@@ -16,8 +17,10 @@ pub const BAUD: u32 = 460_800;
 pub enum Port {
     /// The firmware's library in this process, in simulated time.
     Sim,
-    /// The firmware image in QEMU, started for this call.
+    /// The firmware image for QEMU's mps2-an386, started for this call.
     Qemu,
+    /// The image of another board in QEMU.
+    QemuBoard(Board),
     /// A serial device.
     Device(String),
 }
@@ -29,7 +32,10 @@ impl FromStr for Port {
         Ok(match name {
             "sim" => Self::Sim,
             "qemu" => Self::Qemu,
-            device => Self::Device(device.to_owned()),
+            device => match device.strip_prefix("qemu:").and_then(Board::named) {
+                Some(board) => Self::QemuBoard(board),
+                None => Self::Device(device.to_owned()),
+            },
         })
     }
 }
@@ -60,8 +66,9 @@ pub fn open(
 ) -> Result<Controller, ControllerError> {
     match port {
         Port::Sim => Controller::connect(Box::new(VirtualLink::new()), "sim", 1),
-        Port::Qemu => {
-            let emulator = Emulator::start(options.image.as_deref(), Pace::Fast, note)?;
+        Port::Qemu | Port::QemuBoard(_) => {
+            let board = if let Port::QemuBoard(board) = port { *board } else { Board::Mps2An386 };
+            let emulator = Emulator::start_board(board, options.image.as_deref(), Pace::Fast, note)?;
             let mut controller = Controller::connect(Box::new(emulator.into_link()?), "qemu", 1)?;
             // Its time does not wait for ours: a second of silence there may be a moment here.
             controller.supervise(None)?;

@@ -20,7 +20,7 @@ pub const TICK_HZ: u32 = 1000;
 const SLOT: usize = 4096;
 /// Two slots, each one erase unit.
 const LAYOUT: Layout = Layout::new([0, SLOT as u32], SLOT as u32);
-const BOARD: Board = Board { name: "virtual", tick_hz: TICK_HZ };
+const BOARD: Board = Board { name: "virtual", build: env!("CARGO_PKG_VERSION"), tick_hz: TICK_HZ };
 
 /// Flash of a virtual controller.
 pub type Flash = RamFlash<{ 2 * SLOT }, SLOT>;
@@ -117,6 +117,7 @@ impl embedded_io::Write for Wires {
 pub struct VirtualController {
     server: VirtualServer,
     tick: VirtualTick,
+    shared: Arc<Shared>,
     wires: Wires,
     ticks: u64,
 }
@@ -139,13 +140,18 @@ impl VirtualController {
         let planner = Box::new(Planner::new(&config, origin));
         let desk = Desk::new(planner, Arc::clone(&shared), segments_in, points_out);
         let server = Server::boot(BOARD, flash, LAYOUT, desk, Box::default());
-        let tick = Tick::new(executor, shared, segments_out, points_in);
-        Self { server, tick, wires: Wires::default(), ticks: 0 }
+        let tick = Tick::new(executor, Arc::clone(&shared), segments_out, points_in);
+        Self { server, tick, shared, wires: Wires::default(), ticks: 0 }
     }
 
     /// Takes bytes from the host.
     pub fn receive(&mut self, bytes: &[u8]) {
         self.wires.to_controller.extend(bytes);
+    }
+
+    /// The stop input, as a switch on a board.
+    pub fn set_stop_input(&mut self, active: bool) {
+        self.shared.set_stop_input(active);
     }
 
     /// Answers what has come, then lets one period pass.

@@ -277,6 +277,8 @@ pub struct Status {
     pub tick: u32,
     /// Deepest stack since boot, bytes; 0: not measured.
     pub stack_bytes: u32,
+    /// Share of its time the core sleeps, thousandths; `None`: not measured.
+    pub idle_permille: Option<u16>,
     /// Programmed position, nm.
     pub raw_nm: Pose,
     /// Corrected position, nm.

@@ -9,13 +9,16 @@ pub enum FlashError {
     /// The flash controller reports an error or does not answer.
     #[allow(dead_code, reason = "not every board has a controller that can")]
     Controller,
+    /// What was erased or programmed does not read back so.
+    #[allow(dead_code, reason = "not every board looks")]
+    ReadBack,
 }
 
 impl NorFlashError for FlashError {
     fn kind(&self) -> NorFlashErrorKind {
         match self {
             Self::Range(kind) => *kind,
-            Self::Controller => NorFlashErrorKind::Other,
+            Self::Controller | Self::ReadBack => NorFlashErrorKind::Other,
         }
     }
 }

@@ -6,12 +6,18 @@
 //! | middle | receive interrupt of the link: a byte into a queue | some 30 instructions |
 //! | thread | server, flash, set-points out, log, watchdog; sleeps when there is nothing to do | – |
 //!
+//! A tick that is due while the last one still runs is late: it is counted, the run stops within its limits, and
+//! nothing starts before a reset. A background that hangs is ended by the watchdog. The stop input (`super::stop`) is
+//! read in every tick.
+//!
 //! RTIC would prove that no lock is held across priorities. There is no lock: tick and background meet in two
 //! single-producer, single-consumer queues and a page of words, each written by one side, so its ceilings would
 //! guard nothing; and the emulated board has no PAC that it could be told about. The priorities are three
 //! lines below.
 pub mod flash;
+pub mod idle;
 pub mod log;
+pub mod port;
 pub mod stack;
 
 use core::cell::Cell;
@@ -29,8 +35,8 @@ use giotto_firmware::server::{Board, Buffers, Server, TimedSetPoint};
 use giotto_firmware::store::Layout;
 use heapless_spsc::spsc::{Consumer, Producer, Queue};
 
-/// Ticks a second.
-pub const TICK_HZ: u32 = 1000;
+/// Ticks a second; the `fast` images show how many there can be.
+pub const TICK_HZ: u32 = if cfg!(feature = "fast") { 8000 } else { 1000 };
 /// Priority of the link's receive interrupt; the tick has 0.
 pub const LINK_PRIORITY: u8 = 0x40;
 /// Bytes that arrive while the background is busy with the flash: three requests and their repetition.
@@ -63,6 +69,7 @@ fn SysTick() {
         *OWNED = critical_section::with(|token| TICK.borrow(token).take());
         return;
     };
+    SHARED.set_stop_input(super::stop::active());
     tick.tick(*LATE);
     *LATE = SCB::is_pendst_pending();
 }
@@ -135,6 +142,7 @@ where
         server.subscribe(1, false);
     }
     let mut rounds: u8 = 0;
+    let mut idle = idle::Idle::new();
     loop {
         (ports.feed)();
         server.count_lost_bytes((ports.lost)());
@@ -153,7 +161,9 @@ where
             log::drain(&mut ports.log);
             SCB::sys_reset();
         }
-        cortex_m::asm::wfi();
+        if let Some(permille) = idle.sleep() {
+            server.note_idle(permille);
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 //! | port | use |
 //! |---|---|
 //! | UART0 | the host's link |
-//! | UART1 | set-points while a run is in progress, in the frames of the link |
+//! | UART1 | set-points while a run is in progress, in the frames of the link; in: the stop switch, `!` pressed, `.` released |
 //! | UART2 | the log, in defmt's encoding (`defmt-print -e IMAGE`) |
 //!
 //! Tables are kept in a window of code memory that behaves like NOR flash; it survives a warm reset, not the
@@ -21,6 +21,8 @@ mod common;
 #[cfg(target_os = "none")]
 mod flash;
 #[cfg(target_os = "none")]
+mod stop;
+#[cfg(target_os = "none")]
 mod uart;
 #[cfg(target_os = "none")]
 mod vectors;
@@ -35,7 +37,7 @@ mod image {
 
     /// Clock of core and peripherals (DAI0386 2.5).
     const CLOCK_HZ: u32 = 25_000_000;
-    const BOARD: Board = Board { name: "mps2-an386", tick_hz: common::TICK_HZ };
+    const BOARD: Board = Board { name: "mps2-an386", build: env!("GIOTTO_BUILD"), tick_hz: common::TICK_HZ };
 
     #[entry]
     fn main() -> ! {

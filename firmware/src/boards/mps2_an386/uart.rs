@@ -1,7 +1,7 @@
 //! CMSDK APB UARTs (DDI0479 4.3): polled out, interrupt in on UART0.
 use super::common::RECEIVED;
+use super::common::port::{Patience, Stuck};
 use core::cell::Cell;
-use core::convert::Infallible;
 use core::ptr;
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use cortex_m::singleton;
@@ -75,13 +75,19 @@ macro_rules! register {
 pub struct Uart {
     registers: *mut Registers,
     received: Option<Consumer<'static, u8, RECEIVED>>,
+    patience: Patience,
 }
 
+/// Looks at the port of the host before it is given up, some tenths of a second.
+const LINK_PATIENCE: u32 = 1_000_000;
+/// As above, for a port where nobody may be: some milliseconds.
+const SIDE_PATIENCE: u32 = 5_000;
+
 impl Uart {
-    fn open(registers: *mut Registers, control: u32) -> Self {
+    fn open(registers: *mut Registers, control: u32, patience: u32) -> Self {
         write(register!(registers, baud_divider), DIVIDER);
         write(register!(registers, control), control);
-        Self { registers, received: None }
+        Self { registers, received: None, patience: Patience::new(patience) }
     }
 
     /// UART0, both ways; `None` if called twice.
@@ -89,20 +95,26 @@ impl Uart {
         let queue = singleton!(: Queue<u8, RECEIVED> = Queue::new())?;
         let (producer, consumer) = queue.split();
         critical_section::with(|token| RECEIVER.borrow(token).set(Some(producer)));
-        let mut uart = Self::open(UART0, CONTROL_TX | CONTROL_RX | CONTROL_RX_INTERRUPT);
+        let mut uart = Self::open(UART0, CONTROL_TX | CONTROL_RX | CONTROL_RX_INTERRUPT, LINK_PATIENCE);
         uart.received = Some(consumer);
         Some(uart)
     }
 
-    /// UART1, out only.
+    /// UART1: set-points out, the stop switch in (see `stop`).
     pub fn stream() -> Self {
-        Self::open(UART1, CONTROL_TX)
+        Self::open(UART1, CONTROL_TX | CONTROL_RX, SIDE_PATIENCE)
     }
 
     /// UART2, out only.
     pub fn log() -> Self {
-        Self::open(UART2, CONTROL_TX)
+        Self::open(UART2, CONTROL_TX, SIDE_PATIENCE)
     }
+}
+
+/// The byte that has come to UART1, if one has.
+pub fn stream_received() -> Option<u8> {
+    let full = read(register!(UART1, state)) & STATE_RX_FULL != 0;
+    full.then(|| read(register!(UART1, data)) as u8)
 }
 
 /// UART0's receive interrupt: one byte into the queue.
@@ -122,17 +134,17 @@ pub extern "C" fn received() {
 }
 
 impl ErrorType for Uart {
-    type Error = Infallible;
+    type Error = Stuck;
 }
 
 impl ReadReady for Uart {
-    fn read_ready(&mut self) -> Result<bool, Infallible> {
+    fn read_ready(&mut self) -> Result<bool, Stuck> {
         Ok(self.received.as_ref().is_some_and(Consumer::ready))
     }
 }
 
 impl Read for Uart {
-    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Infallible> {
+    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Stuck> {
         let mut count = 0;
         if let Some(queue) = &mut self.received {
             for place in buffer {
@@ -146,15 +158,16 @@ impl Read for Uart {
 }
 
 impl Write for Uart {
-    fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Stuck> {
         for &byte in bytes {
-            while read(register!(self.registers, state)) & STATE_TX_FULL != 0 {}
+            let state = register!(self.registers, state);
+            self.patience.wait(|| read(state) & STATE_TX_FULL == 0)?;
             write(register!(self.registers, data), u32::from(byte));
         }
         Ok(bytes.len())
     }
 
-    fn flush(&mut self) -> Result<(), Infallible> {
+    fn flush(&mut self) -> Result<(), Stuck> {
         Ok(())
     }
 }

@@ -17,7 +17,7 @@ const SLOT: usize = 2048;
 const ERASE: usize = 512;
 const CELLS: usize = 2 * SLOT;
 const LAYOUT: Layout = Layout::new([0, SLOT as u32], SLOT as u32);
-const BOARD: Board = Board { name: "bench", tick_hz: 1000 };
+const BOARD: Board = Board { name: "bench", build: "0", tick_hz: 1000 };
 
 type Cells = RamFlash<CELLS, ERASE>;
 type Flash = PowerCut<CELLS, ERASE>;

@@ -56,6 +56,7 @@ fn largest_messages_fit() {
         probation: Probation::FirstRun,
         tick: most,
         stack_bytes: most,
+        idle_permille: Some(u16::MAX),
         raw_nm: [i32::MIN; 3],
         corrected_nm: [i32::MIN; 3],
         counters: Counters {

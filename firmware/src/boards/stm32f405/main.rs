@@ -1,0 +1,72 @@
+//! Image for the STM32F405 as on Adafruit's Feather STM32F405 Express (12 MHz crystal); runs on QEMU's
+//! `-machine netduinoplus2` as well, which has the same part.
+//!
+//! | pins | use |
+//! |---|---|
+//! | PB10, PB11 (TX, RX) | USART3, the host's link |
+//! | PC6 (D6) | USART6, the log, in defmt's encoding |
+//! | PC3 (D11) | stop input: a closed contact to ground lets it run; open, or a broken wire, stops |
+//!
+//! Tables are in the last two sectors of the flash. While one is erased the core stands still for a second or two, and so
+//! does the tick: it happens at rest only, and the watchdog waits for four.
+//!
+//! **Never run on a real board**: what QEMU does not emulate (clock, flash, pins) follows the reference manual (RM0090) and
+//! has been seen to fail as it should, never to work.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(not(target_os = "none"))]
+fn main() {
+    eprintln!("an image for a board: build it for thumbv7em-none-eabihf");
+}
+
+#[cfg(target_os = "none")]
+mod clock;
+#[cfg(target_os = "none")]
+#[path = "../common/mod.rs"]
+mod common;
+#[cfg(target_os = "none")]
+mod flash;
+#[cfg(target_os = "none")]
+mod register;
+#[cfg(target_os = "none")]
+mod stop;
+#[cfg(target_os = "none")]
+mod usart;
+#[cfg(target_os = "none")]
+mod vectors;
+#[cfg(target_os = "none")]
+mod watchdog;
+
+#[cfg(target_os = "none")]
+mod image {
+    use super::{clock, common, flash, stop, usart, vectors, watchdog};
+    use cortex_m_rt::entry;
+    use giotto_firmware::server::Board;
+
+    const BOARD: Board = Board { name: "stm32f405", build: env!("GIOTTO_BUILD"), tick_hz: common::TICK_HZ };
+
+    #[entry]
+    fn main() -> ! {
+        let clock = clock::start();
+        stop::prepare();
+        let started = cortex_m::Peripherals::take().and_then(|mut core| {
+            let link = usart::Usart::link(&clock)?;
+            vectors::enable(&mut core.NVIC);
+            let desk = common::start(&mut core.SYST, &mut core.SCB, clock.core_hz)?;
+            Some((link, desk, common::buffers()?))
+        });
+        let Some((link, desk, buffers)) = started else { cortex_m::asm::udf() };
+        if clock.fell_back {
+            defmt::warn!("clock: no crystal, running on the internal oscillator");
+        }
+        watchdog::start();
+        let ports = common::Ports {
+            link,
+            stream: None::<usart::Usart>,
+            log: usart::Usart::log(&clock),
+            feed: watchdog::feed,
+            lost: usart::lost,
+        };
+        common::background(BOARD, flash::Sectors::new(), flash::LAYOUT, (desk, buffers), ports)
+    }
+}
