@@ -155,6 +155,7 @@ mod tests {
             probation: Probation::None,
             tick: 4321,
             stack_bytes: 0,
+            idle_permille: None,
             raw_nm: [50_000_000, -1, 0],
             corrected_nm: [50_012_000, 0, 0],
             counters: Counters { crc_errors: 7, ..Counters::default() },
