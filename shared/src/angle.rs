@@ -26,13 +26,22 @@ const THIRD: i32 = to_fixed(1.0 / 3.0, 32);
 /// instructions on a Cortex-M4 for 2 KiB of table; polynomials over an eighth of a turn took 29 and erred by 3.7e-9.
 #[inline(always)]
 pub fn sincos(phase: u32) -> (i32, i32) {
+    sincos_with(SINCOS, phase)
+}
+
+/// Constants of [`sincos_with`].
+pub const SINCOS: [i32; 2] = [REST, MINUS_HALF_REST];
+
+/// [`sincos`] with [`SINCOS`] from memory: one load brings both, where immediate operands cost four instructions.
+#[inline(always)]
+pub fn sincos_with([by_rest, by_half]: [i32; 2], phase: u32) -> (i32, i32) {
     let nearest = phase.wrapping_add(1 << (31 - BITS)) >> (32 - BITS);
     let [c, s] = PLACES[nearest as usize];
     let rest = (phase << BITS) as i32;
-    let sine = mulh(rest, REST);
+    let sine = mulh(rest, by_rest);
     // −δ²/2 in Q32, as a product of two numbers: of a square the compiler would know the sign, take it for unsigned
     // and multiply in three instructions instead of one.
-    let cosine_less_1 = mulh(sine, mulh(rest, MINUS_HALF_REST));
+    let cosine_less_1 = mulh(sine, mulh(rest, by_half));
     let sine_q32 = mulh_add(sine, sine, mulh(cosine_less_1, THIRD)) >> 4;
     let cos = mulh_sub(mulh_add(c, c, cosine_less_1), s, sine_q32);
     let sin = mulh_add(mulh_add(s, s, cosine_less_1), c, sine_q32);

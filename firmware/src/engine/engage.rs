@@ -63,7 +63,7 @@ impl Engage {
             self.share_q31 = match (end, self.heading) {
                 (true, true) => i32::MAX,
                 (true, false) => 0,
-                _ => (shapes(&POLYNOMIAL, x).s_q32 >> 1) as i32,
+                _ => shapes(&POLYNOMIAL, x).s_q31,
             };
             if end {
                 self.full = self.heading;

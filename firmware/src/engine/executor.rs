@@ -7,10 +7,10 @@
 use super::engage::Engage;
 use super::extra::Sides;
 use super::guard::Guard;
-use super::planned::{Kind, Planned};
+use super::planned::{Kind, Planned, turn};
 use super::ramp::{Clock, POLYNOMIAL, Shapes, shapes};
 use super::{Counters, Fault, Output, flag};
-use giotto_shared::angle::sincos;
+use giotto_shared::angle::{SINCOS, sincos, sincos_with};
 use giotto_shared::fixed::mulh;
 
 /// Where the next segment comes from: the receiving end of a lock-free queue.
@@ -71,7 +71,8 @@ pub struct Executor {
     phase: u64,
     clock: Clock,
     segment: Planned,
-    ramp: [i32; 3],
+    ramp: [i32; 4],
+    sincos: [i32; 2],
     guard: Guard,
     engage: Engage,
     counters: Counters,
@@ -103,6 +104,7 @@ impl Executor {
             clock: Clock::default(),
             segment: Planned::default(),
             ramp: POLYNOMIAL,
+            sincos: SINCOS,
             // Bounds of 0 take the careful way, which also minds the engagement.
             guard: Guard::new(0, 0),
             engage: Engage::new(engage_ticks, !bypass),
@@ -248,7 +250,7 @@ impl Executor {
         if self.left == 0 {
             self.begin_fall();
         }
-        let (c, s) = sincos((phase >> 32) as u32);
+        let (c, s) = sincos_with(self.sincos, (phase >> 32) as u32);
         let [x, y, z] = &self.segment.axes;
         let wanted = [x.steady(c, s), y.steady(c, s), z.steady(c, s)];
         self.arc_out(c, s, wanted, flag::MOVING | flag::CRUISE)
@@ -280,12 +282,15 @@ impl Executor {
             return if FALLING { self.standstill() } else { self.top() };
         }
         let shape = shapes(&self.ramp, x);
-        let step = scaled(self.segment.timing.step, shape.s_q32);
+        let step = scaled(self.segment.timing.step_q1, shape.s_q31);
         self.phase = self.phase.wrapping_add(step);
+        core::sync::atomic::compiler_fence(core::sync::atomic::Ordering::AcqRel);
         let law = if FALLING { &self.segment.fall } else { &self.segment.rise };
         let phase_q32 = ramp_phase(self.phase, step, law.end_term(&shape));
-        let (c, s) = sincos(phase_q32);
-        let (re, im) = law.gain(&shape, c, s);
+        let (radial, tangential) = law.gain(&shape);
+        core::sync::atomic::compiler_fence(core::sync::atomic::Ordering::AcqRel);
+        let (c, s) = sincos_with(self.sincos, phase_q32);
+        let (re, im) = turn(radial, tangential, c, s);
         let [x, y, z] = &self.segment.axes;
         let [nx, ny, nz] = [x.on_arc(c, s), y.on_arc(c, s), z.on_arc(c, s)];
         let [wx, wy, wz] = [x.turned(re, im), y.turned(re, im), z.turned(re, im)];
@@ -299,7 +304,7 @@ impl Executor {
     fn term_cruise(&mut self) -> Output {
         let phase = self.phase.wrapping_add(self.segment.timing.step);
         self.phase = phase;
-        let (c, s) = sincos((phase >> 32) as u32);
+        let (c, s) = sincos_with(self.sincos, (phase >> 32) as u32);
         let [x, y, z] = &self.segment.axes;
         let nominal = [x.on_arc(c, s), y.on_arc(c, s), z.on_arc(c, s)];
         let wanted = [x.steady(c, s), y.steady(c, s), z.steady(c, s)];
@@ -318,18 +323,20 @@ impl Executor {
             return if FALLING { self.standstill() } else { self.top() };
         }
         let shape = shapes(&self.ramp, x);
-        let step = scaled(self.segment.timing.step, shape.s_q32);
+        let step = scaled(self.segment.timing.step_q1, shape.s_q31);
         self.phase = self.phase.wrapping_add(step);
+        core::sync::atomic::compiler_fence(core::sync::atomic::Ordering::AcqRel);
         let law = if FALLING { &self.segment.fall } else { &self.segment.rise };
         let phase_q32 = ramp_phase(self.phase, step, law.end_term(&shape));
-        let (c, s) = sincos(phase_q32);
-        let (re, im) = law.gain(&shape, c, s);
+        let (radial, tangential) = law.gain(&shape);
+        let (c, s) = sincos_with(self.sincos, phase_q32);
+        let (re, im) = turn(radial, tangential, c, s);
         let [x, y, z] = &self.segment.axes;
         let nominal = [x.on_arc(c, s), y.on_arc(c, s), z.on_arc(c, s)];
         let around = ([x.turned(c, s), y.turned(c, s)], self.segment.extra.ahead_at(c, s));
         let turning = if FALLING { shape.w4_q31.wrapping_neg() } else { shape.w4_q31 };
         let [lx, ly, lz] = &self.segment.extra.linear;
-        let rate = (shape.s_q32 >> 1) as i32;
+        let rate = shape.s_q31;
         let rate2 = mulh(rate, rate).wrapping_mul(2);
         let wanted = [
             x.turned(re, im).wrapping_add(lx.on_arc(rate, rate2, turning, c, s)),
@@ -427,7 +434,7 @@ impl Executor {
     /// One tick of a ramp on any curve.
     #[inline(always)]
     fn ramp_at(&mut self, shape: Shapes, falling: bool) -> Output {
-        let step = scaled(self.segment.timing.step, shape.s_q32);
+        let step = scaled(self.segment.timing.step_q1, shape.s_q31);
         self.advance(step);
         let law = if falling { &self.segment.fall } else { &self.segment.rise };
         let phase_q32 = ramp_phase(self.phase, step, law.end_term(&shape));
@@ -438,12 +445,13 @@ impl Executor {
             let along = law.along(&shape);
             [mulh(x.v, along), mulh(y.v, along), mulh(z.v, along)]
         } else {
-            let (re, im) = law.gain(&shape, c, s);
+            let (radial, tangential) = law.gain(&shape);
+            let (re, im) = turn(radial, tangential, c, s);
             [x.turned(re, im), y.turned(re, im), z.turned(re, im)]
         };
         if self.segment.extended {
             let turning = if falling { shape.w4_q31.wrapping_neg() } else { shape.w4_q31 };
-            wanted = self.with_linear(c, s, (shape.s_q32 >> 1) as i32, turning, wanted);
+            wanted = self.with_linear(c, s, shape.s_q31, turning, wanted);
             wanted = self.with_terms(c, s, nominal, wanted);
         }
         self.out(nominal, wanted, flag::MOVING)
@@ -574,7 +582,7 @@ impl Executor {
     fn settle(&mut self) -> Output {
         let target = self.target_nm;
         let (x, end) = self.clock.rise();
-        let share = shapes(&self.ramp, x).s_q32;
+        let share = shapes(&self.ramp, x).s_q31;
         if end || self.rest_offset_nm == target {
             self.rest_offset_nm = target;
             self.begin_segment();
@@ -583,7 +591,7 @@ impl Executor {
         let mut offset = self.rest_offset_nm;
         for (o, t) in offset.iter_mut().zip(target) {
             let way = i64::from(t).wrapping_sub(i64::from(*o)).wrapping_mul(i64::from(share));
-            *o = o.wrapping_add((way >> 32) as i32);
+            *o = o.wrapping_add((way >> 31) as i32);
         }
         self.finish(self.rest_nm, offset, flag::SETTLING)
     }
@@ -700,10 +708,10 @@ fn ramp_phase(sum: u64, step: u64, end_term: i32) -> u32 {
     ((sum >> 32) as u32).wrapping_sub((step >> 33) as u32).wrapping_sub(end_term as u32)
 }
 
-/// step·share, share in Q32.
+/// step·share, step doubled, share in Q31.
 #[inline(always)]
-fn scaled(step: u64, share_q32: u32) -> u64 {
-    let share = u64::from(share_q32);
-    let low = u64::from(step as u32).wrapping_mul(share) >> 32;
-    (step >> 32).wrapping_mul(share).wrapping_add(low)
+fn scaled(step_q1: u64, share_q31: i32) -> u64 {
+    let share = u64::from(share_q31 as u32);
+    let low = u64::from(step_q1 as u32).wrapping_mul(share) >> 32;
+    (step_q1 >> 32).wrapping_mul(share).wrapping_add(low)
 }

@@ -164,7 +164,7 @@ impl Extra {
     pub(crate) fn standing_at(
         &self,
         sides: &Sides,
-        ramp: &[i32; 3],
+        ramp: &[i32; 4],
         nominal: [i32; 3],
         arm: [i32; 2],
     ) -> [i32; 2] {
@@ -185,7 +185,7 @@ impl Extra {
     pub(crate) fn unsteady_at(
         &self,
         sides: &mut Sides,
-        ramp: &[i32; 3],
+        ramp: &[i32; 4],
         ahead: [i32; 2],
         nominal: [i32; 3],
         arm: [i32; 2],
@@ -287,7 +287,7 @@ impl Sides {
 impl Side {
     /// (sense in Q31, pulse in nm) after one more tick.
     #[inline(always)]
-    fn tick(&mut self, p: &[i32; 3], ahead: i32, step: u64, spike: i32, loss_q32: i32) -> (i32, i32) {
+    fn tick(&mut self, p: &[i32; 4], ahead: i32, step: u64, spike: i32, loss_q32: i32) -> (i32, i32) {
         self.pulse = self.pulse.wrapping_sub(mulh(self.pulse, loss_q32));
         if self.turning {
             return self.turn(p, loss_q32);
@@ -310,7 +310,7 @@ impl Side {
 
     /// A turn under way is finished before the next begins.
     #[inline(never)]
-    fn turn(&mut self, p: &[i32; 3], loss_q32: i32) -> (i32, i32) {
+    fn turn(&mut self, p: &[i32; 4], loss_q32: i32) -> (i32, i32) {
         self.before = self.before.wrapping_sub(mulh(self.before, loss_q32));
         let (x, end) = self.clock.rise();
         if end {
@@ -318,7 +318,7 @@ impl Side {
             self.value = if self.forward { i32::MAX } else { -i32::MAX };
             return (self.value, self.pulse >> 8);
         }
-        let share = (shapes(p, x).s_q32 >> 1) as i32;
+        let share = shapes(p, x).s_q31;
         let to = if self.forward { i32::MAX >> 1 } else { -(i32::MAX >> 1) };
         let way = mulh(share, i32::wrapping_sub(to, self.from >> 1)).wrapping_mul(4);
         self.value = self.from.wrapping_add(way);

@@ -35,9 +35,7 @@ impl Axis {
     /// Position on an arc, nm (rounded down), at cosine and sine in Q31.
     #[inline(always)]
     pub(crate) fn on_arc(&self, c: i32, s: i32) -> i32 {
-        let u = i64::from(self.u).wrapping_mul(i64::from(c));
-        let v = i64::from(self.v).wrapping_mul(i64::from(s));
-        self.base.wrapping_add((u.wrapping_add(v) >> 32) as i32)
+        mulh_add(mulh_add(self.base, self.u, c), self.v, s)
     }
 
     /// Position on a line, nm (rounded down). The share is Q30 and signed: rounding may carry it past either end.
@@ -70,6 +68,8 @@ pub(crate) struct Timing {
     pub(crate) end: u64,
     /// Phase per tick at the constant rate; even.
     pub(crate) step: u64,
+    /// Twice that: a ramp's share of it is then the upper half of a product.
+    pub(crate) step_q1: u64,
     pub(crate) ramp_ticks: u32,
     pub(crate) cruise_ticks: u32,
     /// Q63 step of the ramp's x per tick.
@@ -122,19 +122,17 @@ impl Law {
         mulh(f.w4_q31, self.end_term_q1)
     }
 
-    /// (δ + ib)(c + is) in Q31.
+    /// (δ, b) in Q32. Asked for before sine and cosine: so the tick needs the fewest registers.
     #[inline(always)]
-    pub(crate) fn gain(&self, f: &Shapes, c: i32, s: i32) -> (i32, i32) {
-        let rate = (f.s_q32 >> 1) as i32;
-        let rate2 = mulh(rate, rate).wrapping_mul(2);
+    pub(crate) fn gain(&self, f: &Shapes) -> (i32, i32) {
+        let rate2 = mulh(f.s_q31, f.s_q31).wrapping_mul(2);
         let main = mulh(mulh_add(self.k1, self.k2, rate2), rate2);
-        let jerk = mulh(rate, f.xw3_q29);
+        let jerk = mulh(f.s_q31, f.xw3_q29);
         let fine = mulh_add(mulh(self.k3, jerk), mulh(self.k4, f.w4_q31), f.w4_q31);
         let radial = main.wrapping_add(fine.wrapping_mul(16));
         let ahead = mulh(mulh_add(self.k5, self.k6, rate2), f.w4_q31);
         let snap = mulh_add(mulh(self.k7, f.w2_q31), self.k8, f.w3_q30);
-        let tangential = ahead.wrapping_add(snap.wrapping_mul(8));
-        (mulh_sub(mulh(radial, c), tangential, s), mulh_add(mulh(radial, s), tangential, c))
+        (radial, ahead.wrapping_add(snap.wrapping_mul(8)))
     }
 
     /// Offset along a line, nm·2.
@@ -142,6 +140,12 @@ impl Law {
     pub(crate) fn along(&self, f: &Shapes) -> i32 {
         mulh_add(mulh_add(mulh(self.k5, f.w4_q31), self.k7, f.w2_q31), self.k8, f.w3_q30)
     }
+}
+
+/// (δ + ib)(c + is) in Q31, from Q32 and Q31.
+#[inline(always)]
+pub(crate) fn turn(radial: i32, tangential: i32, c: i32, s: i32) -> (i32, i32) {
+    (mulh_sub(mulh(radial, c), tangential, s), mulh_add(mulh(radial, s), tangential, c))
 }
 
 /// A segment ready to run.

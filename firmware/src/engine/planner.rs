@@ -132,7 +132,7 @@ impl Planner {
             let up = u64::from(phase_from_rad(sign * run.start_rad)) << 32;
             let down = up.wrapping_add(step.wrapping_mul(u64::from(cruise_ticks)));
             let (start, end) = (up.wrapping_sub(entry), down.wrapping_add(entry));
-            Timing { start, up, end, step, ramp_ticks, cruise_ticks, ..Timing::default() }
+            Timing { start, up, end, step, step_q1: step << 1, ramp_ticks, cruise_ticks, ..Timing::default() }
         })?;
         let start = segment.start_nm;
         let approach =
@@ -497,7 +497,16 @@ fn share_out(whole: u128, ramp_ticks: u32, cruise_ticks: u32) -> Timing {
     let steps = u128::from(ramp_ticks) + u128::from(cruise_ticks);
     let step = ((whole / steps.max(1)) as u64) & !1;
     let up = (step >> 1).wrapping_mul(u64::from(ramp_ticks));
-    Timing { start: 0, up, end: whole as u64, step, ramp_ticks, cruise_ticks, ..Timing::default() }
+    Timing {
+        start: 0,
+        up,
+        end: whole as u64,
+        step,
+        step_q1: step << 1,
+        ramp_ticks,
+        cruise_ticks,
+        ..Timing::default()
+    }
 }
 
 fn finite(values: &[f64], name: &'static str) -> Result<(), Refused> {

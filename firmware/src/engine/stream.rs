@@ -381,10 +381,10 @@ impl Stream {
     fn joined(&mut self, position: [i32; 3]) -> [i32; 3] {
         let (x, end) = self.join.rise();
         self.joining = !end;
-        let left = if end { 0 } else { u32::MAX - shapes(&POLYNOMIAL, x).s_q32 };
+        let left = if end { 0 } else { i32::MAX - shapes(&POLYNOMIAL, x).s_q31 };
         let mut taken = position;
         for (t, b) in taken.iter_mut().zip(self.bias_nm) {
-            *t = t.wrapping_add((i64::from(b).wrapping_mul(i64::from(left)) >> 32) as i32);
+            *t = t.wrapping_add((i64::from(b).wrapping_mul(i64::from(left)) >> 31) as i32);
         }
         for ((v, t), last) in self.velocity.iter_mut().zip(taken).zip(self.last_nm) {
             *v = t.wrapping_sub(last);
