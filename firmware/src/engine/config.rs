@@ -29,7 +29,7 @@ pub struct Config {
     pub engage_s: f64,
     /// Time in which the play of an axis is taken up at its reversal, s.
     pub take_up_s: f64,
-    /// Width of the means that streams are differentiated with, s; the latency is two and a half times that.
+    /// Distance of the set-points that streams are differentiated with, s; the latency is twice that.
     pub stream_window_s: f64,
     /// Ticks that a missing set-point of a stream is bridged.
     pub stream_hold_ticks: u32,

@@ -94,6 +94,26 @@ impl Guard {
         easy
     }
 
+    /// Joins the size of one axis' offset and that of its change to the others'. For ticks that make one axis after
+    /// the other and keep the last offset themselves.
+    #[inline(always)]
+    pub(crate) fn weigh(wanted: i32, last: i32, (sizes, changes): (u32, u32)) -> (u32, u32) {
+        let size = |v: i32| (v ^ (v >> 31)) as u32;
+        (sizes | size(wanted), changes | size(wanted.wrapping_sub(last)))
+    }
+
+    /// Whether offsets and changes are easily seen to be within the bounds.
+    #[inline(always)]
+    pub(crate) fn easy(&self, (sizes, changes): (u32, u32)) -> bool {
+        sizes < self.easy_offset_nm && changes < self.easy_slew_nm
+    }
+
+    /// [`Self::pass`] after an offset that was not kept here.
+    pub(crate) fn pass_after(&mut self, last: [i32; 3], wanted: [i32; 3]) -> ([i32; 3], Verdict) {
+        self.last_nm = last;
+        self.pass(wanted)
+    }
+
     /// The offset that may go out, axis by axis.
     pub(crate) fn pass(&mut self, wanted: [i32; 3]) -> ([i32; 3], Verdict) {
         if self.stale {
@@ -122,7 +142,10 @@ mod tests {
     fn what_passes_easily_is_within_the_bounds() {
         for v in [0, 511, -512, 512, -513, 1000, -1000, i32::MAX, i32::MIN] {
             let mut guard = Guard::new(1000, i32::MAX);
+            let weights = [0, v, 0].into_iter().fold((0, 0), |w, v| Guard::weigh(v, 0, w));
+            let weighed = guard.easy(weights);
             let easy = guard.pass_easily([0, v, 0]);
+            assert_eq!(weighed, easy);
             assert_eq!(easy, (-512..512).contains(&v), "{v}");
             assert_eq!(guard.last_nm()[1], if easy { v } else { 0 });
         }

@@ -1,10 +1,10 @@
 //! Stream mode: programmed set-points in at the tick's rate, corrected set-points out.
 //!
-//! The differentiator is one symmetric FIR for the whole correction A·p″ + B·p⁗: means over `M` samples (odd), taken
-//! at five places `M` samples apart, with weights such that its second and fourth moments are exactly those of the
-//! operator. Its error is of order (h·d/dt)⁶ with h = M ticks. Latency is [`StreamPlan::latency`] = 2M + (M − 1)/2
-//! ticks for nominal and corrected position alike; nominal is the input of so many ticks before, bit for bit, and so
-//! is corrected while the correction is disengaged.
+//! The differentiator is one symmetric FIR for the whole correction A·p″ + B·p⁗: five set-points `h` apart (the stride,
+//! in ticks), with weights such that its second and fourth moments are exactly those of the operator. Its error is of
+//! order (h·d/dt)⁶. Rounding of the set-points (white, 0.29 nm) comes through it [`StreamPlan::noise_gain`] times. Latency is
+//! [`StreamPlan::latency`], two strides, for nominal and corrected position alike; nominal is the input of so many ticks
+//! before, bit for bit, and so is corrected while the correction is disengaged.
 //!
 //! A set-point that is missing, late or further from the one before than the feed allows is replaced by carrying on
 //! at the last velocity, for [`StreamPlan::hold_ticks`] at most ("hold"); a set-point that comes in that time is
@@ -14,13 +14,12 @@ use super::engage::Engage;
 use super::guard::Guard;
 use super::ramp::{Clock, POLYNOMIAL, clock_step, shapes};
 use super::{Counters, Output, flag};
-use giotto_shared::fixed::to_fixed;
+use core::sync::atomic::{Ordering, compiler_fence};
+use giotto_shared::fixed::{mulh, mulh_add, to_fixed};
 use giotto_shared::law::Operator;
 
-/// Samples kept; a power of two.
-const RING: usize = 128;
-/// Longest mean, samples.
-pub const MAX_STRIDE: u32 = 31;
+/// Longest distance of the places, samples; a power of two.
+pub const MAX_STRIDE: u32 = 32;
 /// Ticks over which a set-point that comes after a gap is joined.
 const JOIN_TICKS: u32 = 32;
 
@@ -51,7 +50,7 @@ pub enum StreamState {
 /// A stream in the form that the tick runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StreamPlan {
-    /// Samples per mean, and ticks between the places: odd.
+    /// Ticks between the places.
     stride: u32,
     /// Weights of the inner and outer second difference, Q28.
     inner: i32,
@@ -67,24 +66,18 @@ pub struct StreamPlan {
     corrected: bool,
 }
 
-/// Where in the ring the filter looks: the places of the means, and the middle of them all.
-struct Places {
-    now: usize,
-    one: usize,
-    two: usize,
-    three: usize,
-    four: usize,
-    centre: usize,
-}
-
-/// Fraction bits of the weights: they may reach 8 in size.
-const WEIGHT_BITS: u32 = 28;
+/// Fraction bits of the weights: they may reach 128 in size.
+const WEIGHT_BITS: u32 = 24;
+/// What a product of a weight and a difference lacks.
+const SCALE: i32 = 1 << (32 - WEIGHT_BITS);
+/// Not the number of any set-point: the next one is taken with care.
+const CARE: u32 = u32::MAX;
 
 /// What a plan is made from.
 pub(crate) struct StreamNeeds {
     pub(crate) operator: Option<Operator<f64>>,
     pub(crate) tick_s: f64,
-    /// Width of the mean wanted, s.
+    /// Distance of the places wanted, s.
     pub(crate) window_s: f64,
     pub(crate) feed_m_s: f64,
     pub(crate) acceleration_m_s2: f64,
@@ -97,13 +90,12 @@ pub(crate) struct StreamNeeds {
 impl StreamPlan {
     /// `None` if the operator is too strong for so short a window.
     pub(crate) fn build(n: &StreamNeeds) -> Option<Self> {
-        let stride = (libm::round(n.window_s / n.tick_s) as u32).clamp(1, MAX_STRIDE) | 1;
-        let (m, h) = (f64::from(stride), f64::from(stride) * n.tick_s);
+        let stride = (libm::round(n.window_s / n.tick_s) as u32).clamp(1, MAX_STRIDE);
+        let h = f64::from(stride) * n.tick_s;
         let operator = n.operator.unwrap_or_default();
-        // Means: 1 + v s²/2 + …; differences: s²h² + s⁴h⁴/12 + … and 4 s²h² + 16 s⁴h⁴/12 + …
-        let variance = (m * m - 1.0) / 12.0 * n.tick_s * n.tick_s;
-        let second = operator.second_s2 / (m * h * h);
-        let fourth = 12.0 * (operator.fourth_s4 - operator.second_s2 * variance / 2.0) / (m * h * h * h * h);
+        // p(−h) − 2p + p(h) is s²h² + s⁴h⁴/12 + …, with 2h it is 4 s²h² + 16 s⁴h⁴/12 + …
+        let second = operator.second_s2 / (h * h);
+        let fourth = 12.0 * operator.fourth_s4 / (h * h * h * h);
         let outer = (fourth - second) / 12.0;
         let inner = second - 4.0 * outer;
         let most = 0.99 * f64::from(1u32 << (31 - WEIGHT_BITS));
@@ -127,32 +119,29 @@ impl StreamPlan {
         })
     }
 
-    /// Takes one axis' set-point in; nominal position and correction, nm.
+    /// Takes one axis' set-point in, in place of the oldest of those that are whole strides old; its correction, nm.
     #[inline(always)]
-    fn axis(
-        &self,
-        position: &mut [i32; RING],
-        sum: &mut [i32; RING],
-        total: &mut i32,
-        input: i32,
-        at: &Places,
-    ) -> (i32, i32) {
-        let newest = total.wrapping_add(input).wrapping_sub(position[at.one]);
-        *total = newest;
-        position[at.now] = input;
-        sum[at.now] = newest;
-        let twice = sum[at.two].wrapping_mul(2);
-        let inner = sum[at.one].wrapping_add(sum[at.three]).wrapping_sub(twice);
-        let outer = newest.wrapping_add(sum[at.four]).wrapping_sub(twice);
-        let inner = i64::from(inner).wrapping_mul(i64::from(self.inner));
-        let outer = i64::from(outer).wrapping_mul(i64::from(self.outer));
-        // Half a nm of rounding is not worth its instructions.
-        (position[at.centre], (inner.wrapping_add(outer) >> WEIGHT_BITS) as i32)
+    fn axis(&self, kept: &mut [i32; 4], p0: i32) -> i32 {
+        let [p1, p2, p3, p4] = *kept;
+        *kept = [p0, p1, p2, p3];
+        let twice = p2.wrapping_mul(2);
+        // Differences beyond 8 mm wrap; the bounds catch what comes of it.
+        let inner = p1.wrapping_add(p3).wrapping_sub(twice).wrapping_mul(SCALE);
+        let outer = p0.wrapping_add(p4).wrapping_sub(twice).wrapping_mul(SCALE);
+        mulh_add(mulh(outer, self.outer), inner, self.inner)
     }
 
     /// Ticks from a set-point in to the same one out.
     pub const fn latency(&self) -> u32 {
-        2 * self.stride + (self.stride - 1) / 2
+        2 * self.stride
+    }
+
+    /// White noise of the set-points, root mean square, comes out in the correction so many times.
+    pub fn noise_gain(&self) -> f64 {
+        let weight = |w: i32| f64::from(w) / f64::from(1u32 << WEIGHT_BITS);
+        let (inner, outer) = (weight(self.inner), weight(self.outer));
+        let middle = -2.0 * (inner + outer);
+        libm::sqrt(2.0 * (inner * inner + outer * outer) + middle * middle)
     }
 
     /// Ticks that a missing set-point is bridged.
@@ -170,14 +159,14 @@ impl StreamPlan {
 #[derive(Clone, Debug)]
 pub struct Stream {
     plan: StreamPlan,
-    /// By axis: positions and running sums over `stride` of them (sums wrap; only differences matter), newest at
-    /// `head`. One index serves all axes.
-    position: [[i32; RING]; 3],
-    sum: [[i32; RING]; 3],
-    total: [i32; 3],
-    head: u32,
-    /// Taken as the input before, and its velocity per tick.
-    last_nm: [i32; 3],
+    /// By the tick's place in a stride and by axis: the newest set-point of this place, and those 1, 2 and 3 strides
+    /// before it; the first row is the offset of that tick.
+    kept: [[[i32; 4]; 4]; MAX_STRIDE as usize],
+    /// Place of the newest.
+    place: u32,
+    /// Number of the set-point that may be taken as it is, or [`CARE`].
+    regular: u32,
+    /// Velocity per tick where regular set-points ended; meant only while care is needed.
     velocity: [i32; 3],
     state: StreamState,
     sequence: u16,
@@ -209,17 +198,15 @@ pub struct StreamCounters {
 impl Stream {
     /// At rest at a position; the first set-point expected is number `sequence`, there.
     pub fn new(plan: &StreamPlan, position_nm: [i32; 3], sequence: u16, bypass: bool) -> Self {
-        let total = position_nm.map(|p| p.wrapping_mul(plan.stride as i32));
+        let [x, y, z] = position_nm;
         let engage = Engage::new(plan.engage_ticks, !bypass);
         let mut guard = Guard::new(plan.offset_nm, plan.slew_nm);
         guard.watch(bypass);
         Self {
             plan: *plan,
-            position: position_nm.map(|p| [p; RING]),
-            sum: total.map(|t| [t; RING]),
-            total,
-            head: 0,
-            last_nm: position_nm,
+            kept: [[[0; 4], [x; 4], [y; 4], [z; 4]]; MAX_STRIDE as usize],
+            place: 0,
+            regular: u32::from(sequence),
             velocity: [0; 3],
             state: StreamState::Running,
             sequence,
@@ -265,65 +252,88 @@ impl Stream {
     /// One tick with the set-point that came for it, if any.
     #[inline]
     pub fn tick(&mut self, sample: Option<StreamSample>) -> Output {
-        let taken = match sample {
-            Some(s) if self.regular(&s) => {
-                self.sequence = self.sequence.wrapping_add(1);
-                let ([x, y, z], [lx, ly, lz]) = (s.position_nm, self.last_nm);
-                self.velocity = [x.wrapping_sub(lx), y.wrapping_sub(ly), z.wrapping_sub(lz)];
-                s.position_nm
+        if let Some(StreamSample { sequence, position_nm: [x, y, z] }) = sample
+            && u32::from(sequence) == self.regular
+        {
+            let (last, most) = (&self.kept[(self.place % MAX_STRIDE) as usize], self.plan.step_nm);
+            let near = |now: i32, last: i32| {
+                (now.wrapping_sub(last) as u32).wrapping_add(most) <= most.wrapping_mul(2)
+            };
+            if near(x, last[1][0]) && near(y, last[2][0]) && near(z, last[3][0]) {
+                self.regular = u32::from(sequence.wrapping_add(1));
+                return self.filter(x, y, z);
             }
-            other => self.irregular(other),
-        };
-        self.last_nm = taken;
-        self.filter(taken)
+        }
+        self.careful_tick(sample)
     }
 
-    /// The case of every tick when all is well.
-    #[inline(always)]
-    fn regular(&self, s: &StreamSample) -> bool {
-        let ([x, y, z], [lx, ly, lz]) = (s.position_nm, self.last_nm);
-        let most = self.plan.step_nm;
-        let near =
-            |now: i32, last: i32| (now.wrapping_sub(last) as u32).wrapping_add(most) <= most.wrapping_mul(2);
-        self.state == StreamState::Running
-            && !self.joining
-            && s.sequence == self.sequence
-            && near(x, lx)
-            && near(y, ly)
-            && near(z, lz)
+    #[inline(never)]
+    fn careful_tick(&mut self, sample: Option<StreamSample>) -> Output {
+        if self.regular != CARE {
+            self.sequence = self.regular as u16;
+            self.velocity = self.last_velocity();
+        }
+        let [x, y, z] = self.irregular(sample);
+        let regular = self.state == StreamState::Running && !self.joining;
+        self.regular = if regular { u32::from(self.sequence) } else { CARE };
+        self.filter(x, y, z)
     }
 
     /// Nominal and corrected position of `latency` ticks ago.
     #[inline(always)]
-    fn filter(&mut self, [x, y, z]: [i32; 3]) -> Output {
-        const MASK: u32 = RING as u32 - 1;
-        let (stride, head) = (self.plan.stride, self.head.wrapping_add(1));
-        self.head = head;
-        let back = |ticks: u32| (head.wrapping_sub(ticks) & MASK) as usize;
-        let at = Places {
-            now: back(0),
-            one: back(stride),
-            two: back(stride.wrapping_mul(2)),
-            three: back(stride.wrapping_mul(3)),
-            four: back(stride.wrapping_mul(4)),
-            centre: back(stride.wrapping_mul(2).wrapping_add(stride >> 1)),
-        };
-        let ([px, py, pz], [sx, sy, sz], [tx, ty, tz]) = (&mut self.position, &mut self.sum, &mut self.total);
-        let (nx, wx) = self.plan.axis(px, sx, tx, x, &at);
-        let (ny, wy) = self.plan.axis(py, sy, ty, y, &at);
-        let (nz, wz) = self.plan.axis(pz, sz, tz, z, &at);
-        let (nominal, wanted) = ([nx, ny, nz], [wx, wy, wz]);
-        if self.guard.pass_easily(wanted) {
-            return Output::new(nominal, wanted, flag::MOVING);
+    fn filter(&mut self, x: i32, y: i32, z: i32) -> Output {
+        let before = self.place;
+        let next = before.wrapping_add(1);
+        let place = if next == self.plan.stride { 0 } else { next };
+        self.place = place;
+        compiler_fence(Ordering::AcqRel);
+        let [offset, kx, ky, kz] = &mut self.kept[(place % MAX_STRIDE) as usize];
+        // One axis after the other and its result put away: all at once they do not fit into the registers.
+        let wx = self.plan.axis(kx, x);
+        offset[0] = wx;
+        compiler_fence(Ordering::AcqRel);
+        let wy = self.plan.axis(ky, y);
+        offset[1] = wy;
+        compiler_fence(Ordering::AcqRel);
+        let wz = self.plan.axis(kz, z);
+        offset[2] = wz;
+        compiler_fence(Ordering::AcqRel);
+        // The set-points of two strides ago have moved up one place.
+        let nominal = [kx[2], ky[2], kz[2]];
+        let [lx, ly, lz, _] = self.kept[(before % MAX_STRIDE) as usize][0];
+        let weights = Guard::weigh(wz, lz, Guard::weigh(wy, ly, Guard::weigh(wx, lx, (0, 0))));
+        if self.guard.easy(weights) {
+            return Output::new(nominal, [wx, wy, wz], flag::MOVING);
         }
-        self.with_care(nominal, wanted)
+        self.with_care([lx, ly, lz])
     }
 
+    /// The newest set-point, nm.
+    fn last_nm(&self) -> [i32; 3] {
+        let [_, [x, ..], [y, ..], [z, ..]] = self.kept[(self.place % MAX_STRIDE) as usize];
+        [x, y, z]
+    }
+
+    /// Way of the newest set-point from the one before, nm.
+    fn last_velocity(&self) -> [i32; 3] {
+        // The one before is in the place before, or where a stride is but one tick long, one stride before.
+        let place = self.place.checked_sub(1).unwrap_or(self.plan.stride.wrapping_sub(1));
+        let before = usize::from(self.plan.stride == 1);
+        let before = self.kept[(place % MAX_STRIDE) as usize].map(|axis| axis[before]);
+        let ([x, y, z], [_, bx, by, bz]) = (self.last_nm(), before);
+        [x.wrapping_sub(bx), y.wrapping_sub(by), z.wrapping_sub(bz)]
+    }
+
+    /// As [`Self::filter`] when bounds or engagement may change what goes out.
     #[inline(never)]
-    fn with_care(&mut self, nominal: [i32; 3], wanted: [i32; 3]) -> Output {
+    fn with_care(&mut self, last: [i32; 3]) -> Output {
+        let [[wx, wy, wz, _], x, y, z] = self.kept[(self.place % MAX_STRIDE) as usize];
+        let (nominal, wanted) = ([x[2], y[2], z[2]], [wx, wy, wz]);
         let wanted = self.engage.apply(wanted);
         self.guard.watch(!self.engage.full());
-        let (offset, verdict) = self.guard.pass(wanted);
+        let (offset, verdict) = self.guard.pass_after(last, wanted);
+        let [ox, oy, oz] = offset;
+        self.kept[(self.place % MAX_STRIDE) as usize][0] = [ox, oy, oz, 0];
         let bounds = &mut self.counters.bounds;
         bounds.offset_cuts = bounds.offset_cuts.wrapping_add(u32::from(verdict.offset_cut));
         bounds.slew_cuts = bounds.slew_cuts.wrapping_add(u32::from(verdict.slew_cut));
@@ -337,7 +347,7 @@ impl Stream {
         match self.state {
             StreamState::Running | StreamState::Holding => {}
             StreamState::Stopping | StreamState::Ended => return self.brake(),
-            StreamState::Fault => return self.last_nm,
+            StreamState::Fault => return self.last_nm(),
         }
         let expected = self.sequence;
         self.sequence = expected.wrapping_add(1);
@@ -386,7 +396,8 @@ impl Stream {
         for (t, b) in taken.iter_mut().zip(self.bias_nm) {
             *t = t.wrapping_add((i64::from(b).wrapping_mul(i64::from(left)) >> 31) as i32);
         }
-        for ((v, t), last) in self.velocity.iter_mut().zip(taken).zip(self.last_nm) {
+        let last = self.last_nm();
+        for ((v, t), last) in self.velocity.iter_mut().zip(taken).zip(last) {
             *v = t.wrapping_sub(last);
         }
         taken
@@ -395,17 +406,19 @@ impl Stream {
     /// Near enough to where the path was going: as far as the feed allows, each tick of the gap.
     fn plausible(&self, s: &StreamSample) -> bool {
         let most = self.plan.step_nm.saturating_mul(self.missing.saturating_add(2));
-        s.position_nm.iter().zip(self.last_nm).all(|(p, last)| p.wrapping_sub(last).unsigned_abs() <= most)
+        let last = self.last_nm();
+        s.position_nm.iter().zip(last).all(|(p, last)| p.wrapping_sub(last).unsigned_abs() <= most)
     }
 
     fn carry_on(&self) -> [i32; 3] {
-        let ([x, y, z], [vx, vy, vz]) = (self.last_nm, self.velocity);
+        let ([x, y, z], [vx, vy, vz]) = (self.last_nm(), self.velocity);
         [x.wrapping_add(vx), y.wrapping_add(vy), z.wrapping_add(vz)]
     }
 
     fn begin_rest(&mut self, then: StreamState) {
         // Finer from now on: the velocity fades by shares of itself.
         self.velocity = self.velocity.map(|v| v.wrapping_mul(1 << 8));
+        self.regular = CARE;
         self.bias_nm = [0; 3];
         self.state = then;
         // After ten time constants 5e-5 of the velocity are left; then the filter empties, the correction fades.
@@ -414,7 +427,7 @@ impl Stream {
 
     /// Velocity fades along the tangent.
     fn brake(&mut self) -> [i32; 3] {
-        let mut taken = self.last_nm;
+        let mut taken = self.last_nm();
         for ((t, v), rest) in taken.iter_mut().zip(&mut self.velocity).zip(&mut self.bias_nm) {
             *v = v.wrapping_sub(*v >> self.plan.brake_shift);
             // `bias_nm` keeps what is below a nanometre.

@@ -40,7 +40,7 @@ fn sample(n: i32) -> StreamSample {
 fn nominal_is_the_input_late_and_so_is_bypass_bit_for_bit() {
     let plan = plan();
     let latency = plan.latency() as i32;
-    assert_eq!(latency, 2 * 15 + 7);
+    assert_eq!(latency, 2 * 15);
     let mut active = Stream::new(&plan, ellipse(0), 0, false);
     let mut bypass = Stream::new(&plan, ellipse(0), 0, true);
     let mut moved = 0;
