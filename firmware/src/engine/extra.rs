@@ -1,6 +1,9 @@
 //! Profile terms in fixed point: what a zone with profile terms adds to the tick.
-use super::ramp::{Clock, FIRST, clock_step, shapes};
-use giotto_shared::angle::{phase_from_rad, sincos};
+use super::ramp::FIRST;
+use super::sides::FINE;
+use core::f64::consts::TAU;
+use core::sync::atomic::{Ordering, compiler_fence};
+use giotto_shared::angle::{phase_from_rad, sincos_with};
 use giotto_shared::fixed::{mulh, mulh_add, to_fixed};
 use giotto_shared::law::Profile;
 
@@ -10,40 +13,70 @@ use giotto_shared::law::Profile;
 pub(crate) struct Linear {
     pub(crate) a: [i32; 4],
     pub(crate) b: [i32; 4],
-    /// nm, everywhere.
-    pub(crate) constant_nm: i32,
 }
 
-/// One periodic error.
+/// The linear terms of an arc for the fast tick, in the form they have: a matrix at the place; opposite in X and Y what
+/// goes with velocity and acceleration; outward a constant. Shares of the radius; `W` is that of the constant rate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub(crate) struct Moving {
+    /// X and Y: weights of cosφ and sinφ, nm·2.
+    pub(crate) place: [[i32; 2]; 2],
+    /// Along the tangent by W and by w⁴, along the radius by W²: Q33.
+    pub(crate) tangential: [i32; 2],
+    pub(crate) radial: i32,
+    /// Q32.
+    pub(crate) outward: i32,
+}
+
+/// One periodic error: amplitude·sin(phase + per_nm·position), each a vector of X and Y with one entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub(crate) struct Cyclic {
-    /// nm·2; 0: none.
-    amplitude: i32,
-    /// Units of 2⁻³² turn per nm: whole and fraction (Q32).
-    per_nm: u32,
-    per_nm_q32: u32,
+    /// nm·2.
+    amplitude: [i32; 2],
+    /// Units of 2⁻³² turn per nm: nearest whole number, and the rest (Q32).
+    per_nm: [i32; 2],
+    rest_q32: [i32; 2],
     phase: u32,
-    on_y: bool,
+}
+
+/// What the sides of X and Y are made of. Offsets in [`FINE`] nm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub(crate) struct Turning {
+    /// Ticks of a take-up, at least 3, and their distance in x (Q31).
+    pub(crate) ticks: u32,
+    pub(crate) dx: i32,
+    /// Middle of the first tick, Q31.
+    pub(crate) first_x: i32,
+    /// 3.75/ticks: twice what S gains in a tick at w² = 1.
+    pub(crate) share_q30: i32,
+    /// By axis: offset of X and Y when it travels forward, doubled, and 2·(gain of S per tick at w² = 1) of its change
+    /// from side to side.
+    pub(crate) side: [[i32; 2]; 2],
+    pub(crate) jump: [[i32; 2]; 2],
+    /// By axis: height of the friction pulse, and its change per tick (a share, Q32).
+    pub(crate) spike: [i32; 2],
+    pub(crate) fade: [i32; 2],
 }
 
 /// All profile terms of a segment, as correction (the opposite of the error).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub(crate) struct Extra {
     pub(crate) linear: [Linear; 3],
+    pub(crate) moving: Moving,
+    /// The terms have the form of [`Moving`], and none is beyond its numbers.
+    fits: bool,
     /// Indicator of the sense of X and Y: `[0]·cosφ + [1]·sinφ`, a little ahead of the phase.
     pub(crate) ahead: [[i32; 2]; 2],
-    /// Offset of X and Y by the sense of X and Y, nm·2.
-    cross: [[i32; 2]; 2],
-    /// Height of the pulse where its onset begins, nm·2⁸, and its loss per tick, Q32.
-    spike: [i32; 2],
-    loss_q32: [i32; 2],
-    take_up_step: u64,
+    pub(crate) turning: Turning,
+    /// Offset of X and Y that nothing changes, in [`FINE`] nm.
+    pub(crate) constant_fine: [i32; 2],
     cyclic: [Cyclic; 2],
-    /// Opposite of the bow, Q32 for u²/2³² in nm, by the axis of travel.
+    /// Opposite of the bow, Q31 for u²/2³² in nm, by the axis of travel.
     bow: [i32; 2],
-    /// Anything that depends on the sense of an axis; anything periodic; any bow.
+    /// Anything that depends on the sense of an axis.
     sided: bool,
-    periodic: bool,
+    /// Periodic errors, and any bow.
+    periodic: u8,
     bowed: bool,
 }
 
@@ -87,15 +120,42 @@ impl Extra {
                 nm2(acceleration * by(second, u)),
             ];
             let fixed = p.position[i][0] * centre[0] + p.position[i][1] * centre[1];
-            extra.linear[i].constant_nm = to_fixed(-fixed * 1e9, 0);
+            extra.constant_fine[i] = to_fixed(-fixed * 1e9, FINE);
             let turn = m.rate * extra.lead_s(m);
             let (cos, sin) = (libm::cos(turn), libm::sin(turn));
             extra.ahead[i] = [nm2(v[i] * cos - u[i] * sin), nm2(-u[i] * cos - v[i] * sin)];
         }
-        // u²/2³² in nm² times this over 2³² is c·u² in nm.
-        extra.bow = p.bow_per_m.map(|c| to_fixed(-c * 1e-9 * 4_294_967_296.0, 32));
+        // u²/2³¹ in nm² times this over 2³² is c·u² in nm.
+        extra.bow = p.bow_per_m.map(|c| to_fixed(-c * 1e-9 * 4_294_967_296.0, 31));
         extra.bowed = extra.bow != [0; 2];
+        let ([[slow, _], _], [[second, _], _]) = (p.velocity_s, p.acceleration_s2);
+        let shares = [-slow * m.rate, -second * acceleration, second * m.rate * m.rate, 0.5 * outward];
+        let [by_rate, by_change, radial, _] = shares.map(|share| to_fixed(share, 33));
+        let place = |i: usize, arm: [f64; 3]| nm2(-p.position[i][0] * arm[0] - p.position[i][1] * arm[1]);
+        extra.moving = Moving {
+            place: [[place(0, u), place(0, v)], [place(1, u), place(1, v)]],
+            tangential: [by_rate, by_change],
+            radial,
+            outward: to_fixed(outward, 32),
+        };
+        let opposite = |[[a, b], [c, d]]: [[f64; 2]; 2]| a == -d && b == 0.0 && c == 0.0;
+        extra.fits = opposite(p.velocity_s)
+            && opposite(p.acceleration_s2)
+            && shares.iter().all(|share| libm::fabs(*share) < 0.24)
+            && extra.within_numbers();
         extra
+    }
+
+    /// Whether sides and constants are within the 8 mm of their numbers, with room for their sum.
+    pub(crate) fn within_numbers(&self) -> bool {
+        let t = &self.turning;
+        let small = |fine: &i32| fine.unsigned_abs() < 1 << 28;
+        self.constant_fine.iter().chain(t.side.iter().flatten()).chain(&t.spike).all(small)
+    }
+
+    /// Whether the fast tick can run it.
+    pub(crate) const fn fits(&self) -> bool {
+        self.fits
     }
 
     /// For a line with a span (m), its start seen from the reference point (m).
@@ -108,7 +168,7 @@ impl Extra {
             let velocity = -m.rate * by(&p.velocity_s, along);
             let acceleration = -m.rate * FIRST / m.ramp_s * by(&p.acceleration_s2, along);
             extra.linear[i].a = [nm2(-by(&p.position, along)), nm2(velocity), 0, nm2(acceleration)];
-            extra.linear[i].constant_nm = to_fixed(-by(&p.position, start) * 1e9, 0);
+            extra.constant_fine[i] = to_fixed(-by(&p.position, start) * 1e9, FINE);
             extra.ahead[i] = [nm2(span[i]), 0];
         }
         extra
@@ -117,59 +177,94 @@ impl Extra {
     /// The terms that are the same on every curve.
     fn unsteady(p: &Profile<f64>, m: &Motion) -> Self {
         let nm2 = |metres: f64| to_fixed(metres * 1e9, 1);
-        let half = |metres: f64| nm2(0.5 * metres);
-        let mut extra = Self {
-            cross: [
-                [half(p.backlash_m[0]), half(p.lateral_m[1])],
-                [half(-p.lateral_m[0]), half(p.backlash_m[1])],
-            ],
-            take_up_step: clock_step(libm::ceil(m.take_up_s / m.tick_s) as u32),
-            ..Self::default()
+        let ticks = take_up_ticks(m);
+        let share = 3.75 / f64::from(ticks);
+        let mut extra = Self::default();
+        // By the sense of X, then of Y.
+        let sides = [[p.backlash_m[0], -p.lateral_m[0]], [p.lateral_m[1], p.backlash_m[1]]];
+        let fine = |metres: f64| to_fixed(metres * 1e9, FINE);
+        extra.turning = Turning {
+            ticks,
+            dx: to_fixed(2.0 / f64::from(ticks), 31),
+            first_x: to_fixed(1.0 / f64::from(ticks) - 1.0, 31),
+            share_q30: to_fixed(share, 30),
+            side: sides.map(|axis| axis.map(fine)),
+            jump: sides.map(|axis| axis.map(|b| fine(b * share))),
+            ..Turning::default()
         };
-        let lead = extra.lead_s(m);
         for (i, spike) in p.spike.iter().enumerate() {
             if spike.peak_m != 0.0 {
-                extra.spike[i] = to_fixed(spike.peak_m * libm::exp(lead / spike.decay_s) * 1e9, 8);
-                extra.loss_q32[i] = to_fixed(-libm::expm1(-m.tick_s / spike.decay_s), 32);
+                extra.turning.spike[i] = fine(spike.peak_m);
+                extra.turning.fade[i] = to_fixed(libm::expm1(-m.tick_s / spike.decay_s), 32);
             }
         }
-        for (built, c) in extra.cyclic.iter_mut().zip(&p.cyclic) {
+        for c in p.cyclic.iter().filter(|c| c.amplitude_m != 0.0) {
+            let axis = |value: i32| if c.axis == 1 { [0, value] } else { [value, 0] };
             let per_nm = 4.294_967_296 / c.pitch_m;
-            let whole = libm::floor(per_nm);
-            *built = Cyclic {
-                amplitude: nm2(-c.amplitude_m),
-                per_nm: whole as u32,
-                per_nm_q32: ((per_nm - whole) * 4_294_967_296.0) as u32,
+            let whole = libm::round(per_nm);
+            extra.cyclic[usize::from(extra.periodic)] = Cyclic {
+                amplitude: axis(nm2(-c.amplitude_m)),
+                per_nm: axis(whole as i64 as i32),
+                rest_q32: axis(to_fixed(per_nm - whole, 32)),
                 phase: phase_from_rad(c.phase_rad),
-                on_y: c.axis == 1,
             };
+            extra.periodic += 1;
         }
-        extra.sided = extra.cross != [[0; 2]; 2] || extra.spike != [0; 2];
-        extra.periodic = extra.cyclic.iter().any(|c| c.amplitude != 0);
+        extra.sided = sides != [[0.0; 2]; 2] || extra.turning.spike != [0; 2];
         extra
     }
 
-    /// The middle of the take-up falls on the reversal.
+    /// The middle of the take-up falls on the reversal: it is noticed half a tick late on average, and the
+    /// take-up begins in the next tick.
     fn lead_s(&self, m: &Motion) -> f64 {
-        0.5 * m.take_up_s
+        (0.5 * f64::from(self.turning.ticks) + 0.5) * m.tick_s
+    }
+
+    /// Whether anything depends on the sense of an axis.
+    pub(crate) const fn sided(&self) -> bool {
+        self.sided
+    }
+
+    /// Offset bound (m) and slew bound (m/s) of all terms together on an arc: the sum of each one's own largest.
+    pub(crate) fn worst_on_arc(p: &Profile<f64>, m: &Motion, radius: f64, centre: [f64; 2]) -> [f64; 2] {
+        let row = |matrix: &[[f64; 2]; 2]| {
+            matrix.iter().map(|[a, b]| libm::fabs(*a) + libm::fabs(*b)).fold(0.0, f64::max)
+        };
+        let (rate, ramp) = (m.rate, m.rate / m.ramp_s);
+        let (speed, acceleration) = (radius * rate, radius * (rate * rate + FIRST * ramp));
+        let jerk = radius * (rate * rate * rate + 3.0 * FIRST * rate * ramp + 10.0 * ramp / m.ramp_s);
+        let reach = radius + libm::fabs(centre[0]) + libm::fabs(centre[1]);
+        let outward = libm::fabs(p.radius_offset_m);
+        let (position, velocity) = (row(&p.position), row(&p.velocity_s));
+        let second = row(&p.acceleration_s2);
+        let mut offset = outward + position * reach + velocity * speed + second * acceleration;
+        let mut slew = outward * rate + position * speed + velocity * acceleration + second * jerk;
+        // Smoothstep of degree 5: 15/8 of the mean slope.
+        let steep = 1.875 / (f64::from(take_up_ticks(m)) * m.tick_s);
+        for play in p.backlash_m.iter().chain(&p.lateral_m) {
+            offset += 0.5 * libm::fabs(*play);
+            slew += libm::fabs(*play) * steep;
+        }
+        for spike in p.spike.iter().filter(|spike| spike.peak_m != 0.0) {
+            let peak = libm::fabs(spike.peak_m);
+            offset += peak;
+            slew += peak * (2.0 * steep + 1.0 / spike.decay_s);
+        }
+        for c in p.cyclic.iter().filter(|c| c.amplitude_m != 0.0) {
+            offset += libm::fabs(c.amplitude_m);
+            slew += libm::fabs(c.amplitude_m) * TAU / c.pitch_m * speed;
+        }
+        for bow in p.bow_per_m {
+            offset += libm::fabs(bow) * radius * radius;
+            slew += 2.0 * libm::fabs(bow) * radius * speed;
+        }
+        [offset, slew]
     }
 
     /// The linear terms at constant rate on an arc, nm·2: they cost the tick nothing.
     pub(crate) fn steady(&self, axis: usize) -> (i32, i32) {
         let Linear { a, b, .. } = self.linear[axis];
         (a[0].wrapping_add(a[1]).wrapping_add(a[2]), b[0].wrapping_add(b[1]).wrapping_add(b[2]))
-    }
-
-    /// [`Self::unsteady_at`] where the machine stands: sides and pulses stay as they are.
-    pub(crate) fn standing_at(
-        &self,
-        sides: &Sides,
-        ramp: &[i32; 4],
-        nominal: [i32; 3],
-        arm: [i32; 2],
-    ) -> [i32; 2] {
-        let frozen = Self { loss_q32: [0; 2], ..*self };
-        frozen.unsteady_at(&mut sides.clone(), ramp, [0; 2], nominal, arm)
     }
 
     /// Indicators of the sense of X and Y. Asked for before anything branches: a product whose factors come from
@@ -180,52 +275,52 @@ impl Extra {
         [mulh_add(mulh(xc, c), xs, s), mulh_add(mulh(yc, c), ys, s)]
     }
 
-    /// Everything but the linear terms of an arc, nm: X and Y.
+    /// Adds periodic errors at a position, and bow at a distance from the centre, nm: X and Y.
     #[inline(always)]
-    pub(crate) fn unsteady_at(
+    pub(crate) fn by_place(
         &self,
-        sides: &mut Sides,
-        ramp: &[i32; 4],
-        ahead: [i32; 2],
-        nominal: [i32; 3],
-        arm: [i32; 2],
+        sincos: &[i32; 2],
+        [nx, ny]: [i32; 2],
+        arm: impl FnOnce() -> [i32; 2],
+        mut offset: [i32; 2],
     ) -> [i32; 2] {
-        let mut offset = [self.linear[0].constant_nm, self.linear[1].constant_nm];
-        if self.sided {
-            let mut sense = [0; 2];
-            for (i, side) in sides.0.iter_mut().enumerate() {
-                let (value, pulse) =
-                    side.tick(ramp, ahead[i], self.take_up_step, self.spike[i], self.loss_q32[i]);
-                sense[i] = value;
-                offset[i] = offset[i].wrapping_add(pulse);
-            }
-            for (o, [by_x, by_y]) in offset.iter_mut().zip(self.cross) {
-                *o = mulh_add(mulh_add(*o, by_x, sense[0]), by_y, sense[1]);
-            }
-        }
-        if self.periodic {
-            for cyclic in &self.cyclic {
-                if cyclic.amplitude != 0 {
-                    let at = if cyclic.on_y { nominal[1] } else { nominal[0] };
-                    let fraction = (i64::from(at).wrapping_mul(i64::from(cyclic.per_nm_q32)) >> 32) as u32;
-                    let phase = (at as u32).wrapping_mul(cyclic.per_nm).wrapping_add(fraction);
-                    let (_, sine) = sincos(phase.wrapping_add(cyclic.phase));
-                    let o = mulh(cyclic.amplitude, sine);
-                    if cyclic.on_y {
-                        offset[1] = offset[1].wrapping_add(o);
-                    } else {
-                        offset[0] = offset[0].wrapping_add(o);
-                    }
-                }
+        if self.periodic != 0 {
+            offset = self.cyclic[0].add(sincos, nx, ny, offset);
+            if self.periodic != 1 {
+                offset = self.cyclic[1].add(sincos, nx, ny, offset);
             }
         }
         if self.bowed {
             // Travel along X bows Y, and the other way round.
-            offset[1] = mulh_add(offset[1], mulh(arm[0], arm[0]), self.bow[0]);
-            offset[0] = mulh_add(offset[0], mulh(arm[1], arm[1]), self.bow[1]);
+            let ([ax, ay], [bx, by]) = (arm(), self.bow);
+            let [ox, oy] = offset;
+            offset = [
+                mulh_add(ox, mulh(ay, ay).wrapping_mul(2), by),
+                mulh_add(oy, mulh(ax, ax).wrapping_mul(2), bx),
+            ];
         }
         offset
     }
+}
+
+impl Cyclic {
+    #[inline(always)]
+    fn add(&self, sincos: &[i32; 2], nx: i32, ny: i32, [ox, oy]: [i32; 2]) -> [i32; 2] {
+        // The constants are loaded here, not before the branch that led here: factors from another block of code
+        // cost four instructions a product instead of one.
+        compiler_fence(Ordering::AcqRel);
+        let ([px, py], [rx, ry]) = (self.per_nm, self.rest_q32);
+        let whole = nx.wrapping_mul(px).wrapping_add(ny.wrapping_mul(py)).wrapping_add(self.phase as i32);
+        let phase = mulh_add(mulh_add(whole, nx, rx), ny, ry);
+        let (_, sine) = sincos_with(*sincos, phase as u32);
+        let [ax, ay] = self.amplitude;
+        [mulh_add(ox, ax, sine), mulh_add(oy, ay, sine)]
+    }
+}
+
+/// Ticks of a take-up.
+fn take_up_ticks(m: &Motion) -> u32 {
+    (libm::ceil(m.take_up_s / m.tick_s) as u32).clamp(3, 1 << 20)
 }
 
 impl Linear {
@@ -249,80 +344,5 @@ impl Linear {
     #[inline(always)]
     pub(crate) fn on_line(&self, share: i32, rate: i32, turning: i32) -> i32 {
         mulh_add(mulh_add(mulh(self.a[0], share), self.a[1], rate), self.a[3], turning)
-    }
-}
-
-/// The senses in which X and Y travel, kept from segment to segment: play stays on its side at rest.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub(crate) struct Sides([Side; 2]);
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-struct Side {
-    forward: bool,
-    turning: bool,
-    clock: Clock,
-    /// ±1 in Q31, between them while the play is taken up; 0 as long as the axis has not moved.
-    value: i32,
-    from: i32,
-    /// Friction pulse, nm·2⁸, and what was left of the one before when its onset began.
-    pulse: i32,
-    before: i32,
-}
-
-/// Indicators below this, nm, do not turn a side: the axis stands, or stands as good as still.
-const DEAD_NM: i32 = 16;
-
-impl Sides {
-    /// Before a segment: an axis that never moved takes the side that the segment begins with.
-    pub(crate) fn seed(&mut self, extra: &Extra, c: i32, s: i32) {
-        for (side, ahead) in self.0.iter_mut().zip(extra.ahead_at(c, s)) {
-            if side.value == 0 && !side.turning && ahead.unsigned_abs() > DEAD_NM as u32 {
-                side.forward = ahead > 0;
-                side.value = if side.forward { i32::MAX } else { -i32::MAX };
-            }
-        }
-    }
-}
-
-impl Side {
-    /// (sense in Q31, pulse in nm) after one more tick.
-    #[inline(always)]
-    fn tick(&mut self, p: &[i32; 4], ahead: i32, step: u64, spike: i32, loss_q32: i32) -> (i32, i32) {
-        self.pulse = self.pulse.wrapping_sub(mulh(self.pulse, loss_q32));
-        if self.turning {
-            return self.turn(p, loss_q32);
-        }
-        let turn = if self.value >= 0 { ahead < -DEAD_NM } else { false }
-            || if self.value <= 0 { ahead > DEAD_NM } else { false };
-        if turn {
-            let forward = ahead > 0;
-            self.forward = forward;
-            self.turning = true;
-            self.from = self.value;
-            self.clock = Clock::rising(step);
-            self.before = self.pulse;
-            // The axis lags behind its new sense: the correction goes ahead with it.
-            self.pulse = if forward { spike } else { spike.wrapping_neg() };
-            return self.turn(p, loss_q32);
-        }
-        (self.value, self.pulse >> 8)
-    }
-
-    /// A turn under way is finished before the next begins.
-    #[inline(never)]
-    fn turn(&mut self, p: &[i32; 4], loss_q32: i32) -> (i32, i32) {
-        self.before = self.before.wrapping_sub(mulh(self.before, loss_q32));
-        let (x, end) = self.clock.rise();
-        if end {
-            self.turning = false;
-            self.value = if self.forward { i32::MAX } else { -i32::MAX };
-            return (self.value, self.pulse >> 8);
-        }
-        let share = shapes(p, x).s_q31;
-        let to = if self.forward { i32::MAX >> 1 } else { -(i32::MAX >> 1) };
-        let way = mulh(share, i32::wrapping_sub(to, self.from >> 1)).wrapping_mul(4);
-        self.value = self.from.wrapping_add(way);
-        let change = mulh(self.pulse.wrapping_sub(self.before), share).wrapping_mul(2);
-        (self.value, self.before.wrapping_add(change) >> 8)
     }
 }

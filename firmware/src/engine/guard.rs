@@ -60,11 +60,12 @@ impl Guard {
         self.stale = self.easy_offset_nm != 0;
     }
 
-    /// Comes to rest without an offset after a plan that was relied on; `false` (and no effect) while watched.
-    pub(crate) fn rest(&mut self) -> bool {
-        let relied = self.stale && self.easy_offset_nm != 0;
+    /// Comes to rest with an offset after a plan that was relied on; `false` (and no effect) while watched, or if the
+    /// offset is not easily seen to be within its bound.
+    pub(crate) fn rest(&mut self, wanted: [i32; 3]) -> bool {
+        let relied = self.stale && self.small(wanted);
         if relied {
-            (self.stale, self.last_nm) = (false, [0; 3]);
+            (self.stale, self.last_nm) = (false, wanted);
         }
         relied
     }

@@ -17,6 +17,7 @@ mod guard;
 mod planned;
 mod planner;
 mod ramp;
+mod sides;
 mod stream;
 mod zones;
 

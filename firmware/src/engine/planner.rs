@@ -4,7 +4,7 @@ use super::extra::{Extra, Motion};
 use super::planned::{Axis, Kind, Law, Planned, Timing};
 use super::ramp::{FIRST, SECOND, THIRD, clock_step};
 use super::stream::{StreamNeeds, StreamPlan};
-use super::zones::{Asked, ZoneError, Zones};
+use super::zones::{Asked, Built, ZoneError, Zones};
 use core::f64::consts::TAU;
 use giotto_shared::angle::{phase_from_rad, sincos};
 use giotto_shared::fixed::to_fixed;
@@ -344,7 +344,9 @@ impl Planner {
             }
         }
         segment.proven = match self.zones.choose(&asked) {
-            Some(zone) if segment.corrected => self.slew_proven(&zone.operator, &segment, round.radius),
+            Some(zone) if segment.corrected => {
+                (!segment.extended || segment.extra.fits()) && self.bounds_proven(&zone, &segment, round)
+            }
             // No correction, no change of it.
             _ => true,
         };
@@ -397,11 +399,17 @@ impl Planner {
         Some((Law { k1, k2, k3, k4, k5, k6, k7, k8, end_term_q1: 0 }, steady.radial))
     }
 
-    /// Whether offset and change of offset of the operator stay within their bounds all along, with a tenth to spare.
-    fn slew_proven(&self, operator: &Operator<f64>, segment: &Planned, radius: f64) -> bool {
+    /// Whether offset and change of offset stay within their bounds all along, with a tenth to spare.
+    fn bounds_proven(&self, zone: &Built, segment: &Planned, round: &Round) -> bool {
         let tick_s = self.config.tick_s();
-        let rate = segment.timing.step as f64 / TURN * TAU / tick_s;
-        let t = f64::from(segment.timing.ramp_ticks) * tick_s;
+        let (operator, radius) = (&zone.operator, round.radius);
+        let motion = self.motion(&segment.timing, TAU);
+        let [offset_m, slew_m_s] = zone.profile.as_ref().map_or([0.0; 2], |profile| {
+            let centre = seen_from(round.centre, zone.reference_m.unwrap_or(round.centre));
+            Extra::worst_on_arc(profile, &motion, radius, centre)
+        });
+        let rate = motion.rate;
+        let t = motion.ramp_s;
         let ramp = FeedRamp { from_m_s: 0.0, to_m_s: rate, duration_s: t };
         let gain = |i: u32| {
             let [_, rate, acceleration, jerk, snap] = ramp.at(t * f64::from(i) / 128.0);
@@ -413,9 +421,9 @@ impl Planner {
             let ((_, a, b), (rate, c, d)) = (gain(i), gain(i + 1));
             let per_s = 128.0 / t;
             let slew = libm::hypot((c - a) * per_s - rate * d, (d - b) * per_s + rate * c);
-            let nm = 1.1e9 * radius;
-            nm * libm::hypot(c, d) <= f64::from(segment.offset_nm)
-                && nm * slew * tick_s <= f64::from(segment.slew_nm)
+            let nm = |metres: f64| 1.1e9 * metres;
+            nm(radius * libm::hypot(c, d) + offset_m) <= f64::from(segment.offset_nm)
+                && nm((radius * slew + slew_m_s) * tick_s) <= f64::from(segment.slew_nm)
         })
     }
 

@@ -7,7 +7,7 @@
 //! before, bit for bit, and so is corrected while the correction is disengaged.
 //!
 //! A set-point that is missing, late or further from the one before than the feed allows is replaced by carrying on
-//! at the last velocity, for [`StreamPlan::hold_ticks`] at most ("hold"); a set-point that comes in that time is
+//! at the last velocity and acceleration, for [`StreamPlan::hold_ticks`] at most ("hold"); a set-point that comes in that time is
 //! joined without a step. After that the path comes to rest along its tangent within the acceleration limit while
 //! the correction is ramped out, and [`StreamState::Fault`] is latched. Nothing jumps at any time.
 use super::engage::Engage;
@@ -37,7 +37,7 @@ pub struct StreamSample {
 pub enum StreamState {
     /// Set-points come as they should.
     Running,
-    /// One or more are missing; carries on at the last velocity.
+    /// One or more are missing; carries on at the last velocity and acceleration.
     Holding,
     /// Coming to rest, correction being ramped out.
     Stopping,
@@ -166,8 +166,9 @@ pub struct Stream {
     place: u32,
     /// Number of the set-point that may be taken as it is, or [`CARE`].
     regular: u32,
-    /// Velocity per tick where regular set-points ended; meant only while care is needed.
+    /// Velocity per tick and its change per tick where regular set-points ended; meant only while care is needed.
     velocity: [i32; 3],
+    change: [i32; 3],
     state: StreamState,
     sequence: u16,
     missing: u32,
@@ -208,6 +209,7 @@ impl Stream {
             place: 0,
             regular: u32::from(sequence),
             velocity: [0; 3],
+            change: [0; 3],
             state: StreamState::Running,
             sequence,
             missing: 0,
@@ -271,7 +273,7 @@ impl Stream {
     fn careful_tick(&mut self, sample: Option<StreamSample>) -> Output {
         if self.regular != CARE {
             self.sequence = self.regular as u16;
-            self.velocity = self.last_velocity();
+            self.look_back();
         }
         let [x, y, z] = self.irregular(sample);
         let regular = self.state == StreamState::Running && !self.joining;
@@ -310,18 +312,27 @@ impl Stream {
 
     /// The newest set-point, nm.
     fn last_nm(&self) -> [i32; 3] {
-        let [_, [x, ..], [y, ..], [z, ..]] = self.kept[(self.place % MAX_STRIDE) as usize];
-        [x, y, z]
+        self.back(0)
     }
 
-    /// Way of the newest set-point from the one before, nm.
-    fn last_velocity(&self) -> [i32; 3] {
-        // The one before is in the place before, or where a stride is but one tick long, one stride before.
-        let place = self.place.checked_sub(1).unwrap_or(self.plan.stride.wrapping_sub(1));
-        let before = usize::from(self.plan.stride == 1);
-        let before = self.kept[(place % MAX_STRIDE) as usize].map(|axis| axis[before]);
-        let ([x, y, z], [_, bx, by, bz]) = (self.last_nm(), before);
-        [x.wrapping_sub(bx), y.wrapping_sub(by), z.wrapping_sub(bz)]
+    /// The set-point of so many ticks ago, three strides at most, nm.
+    fn back(&self, ticks: u32) -> [i32; 3] {
+        let (mut place, mut strides) = (self.place, 0);
+        for _ in 0..ticks {
+            place = place.checked_sub(1).unwrap_or(self.plan.stride.wrapping_sub(1));
+            strides += usize::from(place == self.place);
+        }
+        let [_, x, y, z] = &self.kept[(place % MAX_STRIDE) as usize];
+        [x[strides & 3], y[strides & 3], z[strides & 3]]
+    }
+
+    /// Velocity and its change where regular set-points ended.
+    fn look_back(&mut self) {
+        let (now, before, first) = (self.back(0), self.back(1), self.back(2));
+        for i in 0..3 {
+            self.velocity[i] = now[i].wrapping_sub(before[i]);
+            self.change[i] = self.velocity[i].wrapping_sub(before[i].wrapping_sub(first[i]));
+        }
     }
 
     /// As [`Self::filter`] when bounds or engagement may change what goes out.
@@ -410,9 +421,13 @@ impl Stream {
         s.position_nm.iter().zip(last).all(|(p, last)| p.wrapping_sub(last).unsigned_abs() <= most)
     }
 
-    fn carry_on(&self) -> [i32; 3] {
-        let ([x, y, z], [vx, vy, vz]) = (self.last_nm(), self.velocity);
-        [x.wrapping_add(vx), y.wrapping_add(vy), z.wrapping_add(vz)]
+    fn carry_on(&mut self) -> [i32; 3] {
+        let mut next = self.last_nm();
+        for ((n, v), c) in next.iter_mut().zip(&mut self.velocity).zip(self.change) {
+            *v = v.wrapping_add(c);
+            *n = n.wrapping_add(*v);
+        }
+        next
     }
 
     fn begin_rest(&mut self, then: StreamState) {

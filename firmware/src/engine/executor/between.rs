@@ -1,0 +1,146 @@
+//! Ticks between motions: the top of a ramp, standstill, rest, settling, dwelling.
+use super::{Executor, Inbox, Mode};
+use crate::engine::planned::Kind;
+use crate::engine::ramp::{Clock, shapes};
+use crate::engine::{Fault, Output, flag};
+
+impl Executor {
+    /// Top of a rising ramp: the phase is set to its exact value, one step early for the cruise to make.
+    #[inline(never)]
+    pub(super) fn top(&mut self) -> Output {
+        self.set_phase(self.segment.timing.up);
+        let (before, wrapped) = self.phase.overflowing_sub(self.segment.timing.step);
+        (self.phase, self.turns) = (before, self.turns.wrapping_sub(i32::from(wrapped)));
+        self.left = self.segment.timing.cruise_ticks.wrapping_add(1);
+        let mut out = match self.mode {
+            Mode::ArcRise => {
+                self.mode = Mode::ArcCruise;
+                self.arc_cruise::<false>()
+            }
+            Mode::TermRise => {
+                self.mode = Mode::TermCruise;
+                self.arc_cruise::<true>()
+            }
+            _ => {
+                self.mode = Mode::Cruise;
+                self.cruise()
+            }
+        };
+        // The last tick of the ramp is not yet one at constant feed.
+        out.flags &= !flag::CRUISE;
+        out
+    }
+
+    #[inline(never)]
+    pub(super) fn standstill(&mut self) -> Output {
+        self.counters.segments = self.counters.segments.wrapping_add(1);
+        self.set_phase(self.end);
+        self.mode = Mode::Rest;
+        let phase_q32 = (self.phase >> 32) as u32;
+        let (c, s) = self.weights(phase_q32);
+        self.rest_nm = self.place(c, s, phase_q32);
+        if self.end == self.segment.timing.end {
+            self.rest_nm = self.segment.end_nm;
+        }
+        self.rest_offset_nm = self.standing_offset(c, s);
+        self.finish(self.rest_nm, self.rest_offset_nm, flag::MOVING)
+    }
+
+    #[inline(always)]
+    pub(super) fn begin_fall(&mut self) {
+        self.mode = match self.mode {
+            Mode::ArcCruise => Mode::ArcFall,
+            Mode::TermCruise => Mode::TermFall,
+            _ => Mode::Fall,
+        };
+        self.clock = Clock::falling(self.segment.timing.clock_step);
+        // So that the sum of steps less half the last one is the phase.
+        self.advance(self.segment.timing.step >> 1);
+    }
+
+    #[inline(never)]
+    pub(super) fn rest(&mut self, inbox: &mut impl Inbox) -> Output {
+        self.halting = false;
+        if let Some(next) = inbox.take() {
+            if next.epoch != self.epoch || self.fault.is_some() {
+                self.counters.dropped = self.counters.dropped.wrapping_add(1);
+            } else if next.start_nm != self.rest_nm {
+                self.counters.dropped = self.counters.dropped.wrapping_add(1);
+                self.fault = Some(Fault::Discontinuity);
+            } else {
+                self.segment = next;
+                self.begin_settle();
+                return self.finish(self.rest_nm, self.rest_offset_nm, flag::SETTLING);
+            }
+        }
+        self.finish(self.rest_nm, self.rest_offset_nm, 0)
+    }
+
+    fn begin_settle(&mut self) {
+        self.guard.set(self.segment.offset_nm, self.segment.slew_nm);
+        self.guard.watch(!self.engage.full());
+        let uncorrected = u32::from(!self.segment.corrected);
+        self.counters.uncorrected = self.counters.uncorrected.wrapping_add(uncorrected);
+        self.mode = Mode::Settle;
+        self.clock = Clock::rising(self.segment.settle_step);
+        self.target_nm = self.rest_offset_nm;
+        if self.segment.kind != Kind::Dwell {
+            let (c, s) = self.weights((self.segment.timing.start >> 32) as u32);
+            if self.segment.extended {
+                let extra = &self.segment.extra;
+                // A line moves from its first tick on as it does at its end.
+                let ahead = if self.segment.kind == Kind::Line { (i32::MAX, 0) } else { (c, s) };
+                self.sides.begin(extra, extra.ahead_at(ahead.0, ahead.1));
+            }
+            self.target_nm = self.standing_offset(c, s);
+        }
+    }
+
+    /// Moves the offset from what it is to what the segment starts with, then lets the segment begin.
+    #[inline(never)]
+    pub(super) fn settle(&mut self) -> Output {
+        let target = self.target_nm;
+        let (x, end) = self.clock.rise();
+        let share = shapes(&self.ramp, x).s_q31;
+        if end || self.rest_offset_nm == target {
+            self.rest_offset_nm = target;
+            self.begin_segment();
+            return self.finish(self.rest_nm, target, flag::SETTLING);
+        }
+        let mut offset = self.rest_offset_nm;
+        for (o, t) in offset.iter_mut().zip(target) {
+            let way = i64::from(t).wrapping_sub(i64::from(*o)).wrapping_mul(i64::from(share));
+            *o = o.wrapping_add((way >> 31) as i32);
+        }
+        self.finish(self.rest_nm, offset, flag::SETTLING)
+    }
+
+    fn begin_segment(&mut self) {
+        let timing = self.segment.timing;
+        self.left = timing.cruise_ticks;
+        self.mode = match self.segment.kind {
+            _ if self.segment.epoch != self.epoch => Mode::Rest,
+            Kind::Dwell => Mode::Dwell,
+            Kind::Arc if self.segment.proven && self.segment.extended => Mode::TermRise,
+            Kind::Arc if self.segment.proven => Mode::ArcRise,
+            Kind::Arc | Kind::Line | Kind::Helix => Mode::Rise,
+        };
+        if self.mode.proven() {
+            self.guard.rely_on_plan();
+        }
+        self.clock = Clock::rising(timing.clock_step);
+        self.phase = timing.start;
+        self.turns = 0;
+        self.end = timing.end;
+    }
+
+    #[inline(never)]
+    pub(super) fn dwell(&mut self) -> Output {
+        self.left = self.left.wrapping_sub(1);
+        if self.left == 0 || self.segment.epoch != self.epoch {
+            self.mode = Mode::Rest;
+            self.counters.segments = self.counters.segments.wrapping_add(1);
+        }
+        self.finish(self.rest_nm, self.rest_offset_nm, 0)
+    }
+}

@@ -1,0 +1,298 @@
+//! The tick: one set-point for each axis, every time it is called.
+//!
+//! Timing contract: [`Executor::tick`] is called once per period from the highest-priority interrupt. It has no loop
+//! whose length depends on data, no division, no `f64`, no allocation, and cannot panic; its longest path is counted
+//! in instructions by `giotto-hil ticks`. What it runs was prepared by the planner in the background and comes
+//! through an [`Inbox`] by value, so that a new table never acts inside a segment.
+mod arc;
+mod between;
+mod curve;
+mod phase;
+
+use crate::engine::engage::Engage;
+use crate::engine::guard::Guard;
+use crate::engine::planned::Planned;
+use crate::engine::ramp::{Clock, POLYNOMIAL};
+use crate::engine::sides::Sides;
+use crate::engine::{Counters, Fault, Output, flag};
+use giotto_shared::angle::SINCOS;
+
+/// Where the next segment comes from: the receiving end of a lock-free queue.
+pub trait Inbox {
+    /// The next segment, if there is one.
+    fn take(&mut self) -> Option<Planned>;
+}
+
+impl<const N: usize> Inbox for heapless::spsc::Queue<Planned, N> {
+    fn take(&mut self) -> Option<Planned> {
+        self.dequeue()
+    }
+}
+
+impl Inbox for heapless::spsc::Consumer<'_, Planned> {
+    fn take(&mut self) -> Option<Planned> {
+        self.dequeue()
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mode {
+    /// Stands still, nothing in hand.
+    Rest,
+    /// Stands still while the offset moves to what the segment in hand starts with.
+    Settle,
+    /// Stands still for a time.
+    Dwell,
+    /// Arc without profile terms at constant rate, its bounds proven by the planner.
+    ArcCruise,
+    /// The same in a rising ramp.
+    ArcRise,
+    /// The same in a falling ramp.
+    ArcFall,
+    /// Arc with profile terms at constant rate.
+    TermCruise,
+    /// The same in a rising ramp.
+    TermRise,
+    /// The same in a falling ramp.
+    TermFall,
+    /// Any segment at constant rate.
+    Cruise,
+    /// Any segment in a rising ramp.
+    Rise,
+    /// Any segment in a falling ramp.
+    Fall,
+    /// Stopped while rising: the rising ramp runs on, a falling one is laid over it. Each has four continuous
+    /// derivatives, so their sum has; it never runs backwards because the second is never ahead of the first.
+    Both,
+}
+
+impl Mode {
+    /// Whether the planner proved the bounds of what runs.
+    fn proven(self) -> bool {
+        matches!(
+            self,
+            Self::ArcRise
+                | Self::ArcCruise
+                | Self::ArcFall
+                | Self::TermRise
+                | Self::TermCruise
+                | Self::TermFall
+        )
+    }
+}
+
+/// The engine's fast half: what runs in the timer interrupt.
+#[derive(Clone, Debug)]
+pub struct Executor {
+    mode: Mode,
+    left: u32,
+    /// Phase; in a ramp the running sum of the steps.
+    phase: u64,
+    clock: Clock,
+    segment: Planned,
+    ramp: [i32; 4],
+    sincos: [i32; 2],
+    guard: Guard,
+    engage: Engage,
+    counters: Counters,
+    /// Phase where the fall in hand ends.
+    end: u64,
+    /// Whole turns, for the rise of a helix.
+    turns: i32,
+    second: Clock,
+    /// Programmed position where it stands or last stood.
+    rest_nm: [i32; 3],
+    /// Offset wanted there, before engagement, and what the next segment wants there.
+    rest_offset_nm: [i32; 3],
+    target_nm: [i32; 3],
+    /// Programmed position and wanted offset of a tick with profile terms, while it is being made.
+    at_nm: [i32; 3],
+    wanted_nm: [i32; 3],
+    /// Of the vectors of an arc, as long: radial and tangential, and what X and Y take with opposite signs.
+    shares: [i32; 4],
+    sides: Sides,
+    /// Segments planned before the last stop carry an older epoch and are thrown away.
+    epoch: u8,
+    /// On the way to a standstill that was asked for.
+    halting: bool,
+    fault: Option<Fault>,
+}
+
+impl Executor {
+    /// Standing at a position, correction engaged or bypassed from the start.
+    pub fn new(position_nm: [i32; 3], engage_ticks: u32, bypass: bool) -> Self {
+        Self {
+            mode: Mode::Rest,
+            left: 0,
+            phase: 0,
+            clock: Clock::default(),
+            segment: Planned::default(),
+            ramp: POLYNOMIAL,
+            sincos: SINCOS,
+            // Bounds of 0 take the careful way, which also minds the engagement.
+            guard: Guard::new(0, 0),
+            engage: Engage::new(engage_ticks, !bypass),
+            counters: Counters::default(),
+            end: 0,
+            turns: 0,
+            second: Clock::default(),
+            rest_nm: position_nm,
+            rest_offset_nm: [0; 3],
+            target_nm: [0; 3],
+            at_nm: [0; 3],
+            wanted_nm: [0; 3],
+            shares: [0; 4],
+            sides: Sides::default(),
+            epoch: 0,
+            halting: false,
+            fault: None,
+        }
+    }
+
+    /// Programmed position where the machine stands, or last stood, nm.
+    pub const fn rest_nm(&self) -> [i32; 3] {
+        self.rest_nm
+    }
+
+    /// Nothing in hand.
+    pub fn idle(&self) -> bool {
+        self.mode == Mode::Rest
+    }
+
+    /// Epoch that a planned segment must carry to be run; grows with each stop.
+    pub const fn epoch(&self) -> u8 {
+        self.epoch
+    }
+
+    /// Counts since start.
+    pub const fn counters(&self) -> &Counters {
+        &self.counters
+    }
+
+    /// Why nothing runs, if so.
+    pub const fn fault(&self) -> Option<Fault> {
+        self.fault
+    }
+
+    /// Declares the position while standing still. `false` (and no effect) while moving.
+    pub fn set_position(&mut self, position_nm: [i32; 3]) -> bool {
+        if self.idle() {
+            self.rest_nm = position_nm;
+        }
+        self.idle()
+    }
+
+    /// Disengages (`true`) or engages (`false`) the correction, without a step.
+    pub fn set_bypass(&mut self, bypass: bool) {
+        self.engage.set(!bypass);
+        self.guard.watch(!self.engage.full());
+    }
+
+    /// Whether the correction is disengaged or on its way to be.
+    pub const fn bypass(&self) -> bool {
+        !self.engage.is_on()
+    }
+
+    /// The board saw that a tick came late or was lost: stops, and runs nothing more until [`Self::clear_fault`].
+    pub fn overrun(&mut self) {
+        self.counters.overruns = self.counters.overruns.wrapping_add(1);
+        self.fault = Some(Fault::Overrun);
+        self.stop();
+    }
+
+    /// A stop was asked for and the machine still moves.
+    pub fn stopping(&self) -> bool {
+        self.halting && !self.idle()
+    }
+
+    /// Accepts segments again after a fault; `false` while still moving.
+    pub fn clear_fault(&mut self) -> bool {
+        if self.idle() {
+            self.fault = None;
+        }
+        self.idle()
+    }
+
+    /// Stops within the limits, beginning with the next tick; what is queued is thrown away.
+    pub fn stop(&mut self) {
+        if self.stopping() {
+            return;
+        }
+        self.halting = true;
+        self.epoch = self.epoch.wrapping_add(1);
+        self.counters.stops = self.counters.stops.wrapping_add(1);
+        let timing = &self.segment.timing;
+        match self.mode {
+            Mode::ArcCruise | Mode::TermCruise | Mode::Cruise => {
+                let distance = (timing.step >> 1).wrapping_mul(u64::from(timing.ramp_ticks));
+                self.end = self.phase.wrapping_add(distance);
+                self.begin_fall();
+            }
+            Mode::ArcRise | Mode::TermRise | Mode::Rise => {
+                // ∫ of the two ramps together: one step for each tick between their starts.
+                let apart = self.clock.elapsed();
+                self.end = timing.start.wrapping_add(timing.step.wrapping_mul(u64::from(apart)));
+                self.second = Clock::rising(timing.clock_step);
+                self.mode = if apart == 0 { Mode::Rest } else { Mode::Both };
+            }
+            // At the end of a settling or dwelling in hand the segment is seen to be of an old epoch.
+            _ => {}
+        }
+    }
+
+    /// Makes all but so many of the constant-rate ticks in hand in one step: the same integers, one product.
+    #[cfg(test)]
+    pub(crate) fn skip_cruise(&mut self, but: u32) -> u32 {
+        let skipped = self.left.saturating_sub(but);
+        self.left -= skipped;
+        self.phase = self.phase.wrapping_add(self.segment.timing.step.wrapping_mul(u64::from(skipped)));
+        skipped
+    }
+
+    /// One tick. See the module for its contract.
+    #[inline]
+    pub fn tick(&mut self, inbox: &mut impl Inbox) -> Output {
+        match self.mode {
+            Mode::ArcCruise => self.arc_cruise::<false>(),
+            Mode::ArcRise => self.arc_ramp::<false, false>(),
+            Mode::ArcFall => self.arc_ramp::<false, true>(),
+            Mode::TermCruise => self.arc_cruise::<true>(),
+            Mode::TermRise => self.arc_ramp::<true, false>(),
+            Mode::TermFall => self.arc_ramp::<true, true>(),
+            Mode::Cruise => self.cruise(),
+            Mode::Rise => self.any_ramp(false),
+            Mode::Fall => self.any_ramp(true),
+            Mode::Both => self.both(),
+            Mode::Settle => self.settle(),
+            Mode::Dwell => self.dwell(),
+            Mode::Rest => self.rest(inbox),
+        }
+    }
+
+    /// Engagement, bounds, and out: the quick way if it will do.
+    #[inline(always)]
+    fn out(&mut self, nominal: [i32; 3], wanted: [i32; 3], flags: u16) -> Output {
+        if self.guard.pass_easily(wanted) {
+            return Output::new(nominal, wanted, flags);
+        }
+        self.finish(nominal, wanted, flags)
+    }
+
+    /// Engagement, bounds, and out.
+    #[inline(never)]
+    fn finish(&mut self, nominal: [i32; 3], wanted: [i32; 3], flags: u16) -> Output {
+        let wanted = self.engage.apply(wanted);
+        let (offset, verdict) = self.guard.pass(wanted);
+        self.guard.watch(!self.engage.full());
+        if self.mode.proven() {
+            self.guard.rely_on_plan_if_easy();
+        }
+        let mut flags = flags;
+        if verdict.offset_cut | verdict.slew_cut {
+            self.counters.offset_cuts = self.counters.offset_cuts.wrapping_add(u32::from(verdict.offset_cut));
+            self.counters.slew_cuts = self.counters.slew_cuts.wrapping_add(u32::from(verdict.slew_cut));
+            flags |= flag::CUT;
+        }
+        Output::new(nominal, offset, flags)
+    }
+}

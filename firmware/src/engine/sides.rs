@@ -1,0 +1,178 @@
+//! The senses in which X and Y travel, and what hangs on them: play, lateral play and friction pulses.
+//!
+//! A reversal is seen half a take-up time ahead of the axis. Over the take-up time the offset then moves from one side to
+//! the other by the smoothstep of degree 5, S′ = (15/8)·w² with w = 1 − x², added up tick by tick at the middle of each
+//! tick; what the sum leaves (2e-4 of the way at 8 ticks, with the fourth power of their number) is set right at the end.
+//! The friction pulse rises with it and then decays. One axis turns at a time: the other's turn begins when that is over.
+use super::extra::Extra;
+use core::sync::atomic::{Ordering, compiler_fence};
+use giotto_shared::fixed::{mulh, mulh_add};
+
+/// Fraction bits of offsets here, of nm.
+pub(crate) const FINE: u32 = 8;
+/// Indicators below this, nm, do not turn a side: the axis stands, or stands as good as still.
+const DEAD_NM: i32 = 16;
+
+/// Kept from segment to segment: play stays on its side at rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub(crate) struct Sides {
+    side: [Side; 2],
+    /// Offset of X and Y by the sides and by what is constant, in [`FINE`] nm.
+    base: [i32; 2],
+    /// The same when both sides are settled: X backward adds 1 to the place, Y backward 2.
+    settled: [[i32; 2]; 4],
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+struct Side {
+    /// 0 while the axis travels forward, −1 backward; in a turn, what it turns to.
+    mask: i32,
+    /// An indicator below this, turned over by `mask`, is a reversal.
+    limit: i32,
+    /// Friction pulse and its change per tick as a share of itself (Q32), in [`FINE`] nm.
+    pulse: i32,
+    fade: i32,
+    /// Ticks of a turn still to come; 0: none under way.
+    left: u32,
+    /// Middle of the turn's next tick, Q31.
+    x: i32,
+    /// What a turn adds per tick to the pulse, and to the offset of X and Y, at w² = 1 (Q31).
+    rise: i32,
+    jump: [i32; 2],
+    /// The axis has moved: its sense is known.
+    known: bool,
+}
+
+impl Sides {
+    /// Before a segment whose indicators are `ahead` where it begins. An axis that never moved takes the side that
+    /// the segment begins with.
+    pub(crate) fn begin(&mut self, extra: &Extra, ahead: [i32; 2]) {
+        let t = &extra.turning;
+        for (axis, side) in self.side.iter_mut().enumerate() {
+            let moves = extra.ahead[axis].iter().any(|nm| nm.unsigned_abs() > DEAD_NM as u32);
+            if !side.known && moves {
+                (side.known, side.mask) = (true, if ahead[axis] >= 0 { 0 } else { -1 });
+            }
+            side.limit = if extra.sided() && moves { DEAD_NM.wrapping_neg() } else { i32::MIN };
+            side.fade = t.fade[axis];
+            side.jump = t.jump[axis].map(|jump| jump ^ side.mask);
+        }
+        self.settled =
+            [[0, 0], [-1, 0], [0, -1], [-1, -1]].map(|[x, y]| self.offset(extra, [sense(x), sense(y)]));
+        self.base = self.offset(extra, self.side.map(|side| side.sense(t.dx)));
+    }
+
+    /// Offset of X and Y at these senses (Q31), as far as they are known.
+    fn offset(&self, extra: &Extra, senses: [i32; 2]) -> [i32; 2] {
+        let mut offset = extra.constant_fine;
+        for ((side, by), sense) in self.side.iter().zip(extra.turning.side).zip(senses) {
+            for (o, by) in offset.iter_mut().zip(by) {
+                *o = mulh_add(*o, by, if side.known { sense } else { 0 });
+            }
+        }
+        offset
+    }
+
+    /// Offset of X and Y as it stands, nm.
+    pub(crate) fn standing(&self) -> [i32; 2] {
+        let [x, y] = &self.side;
+        let [bx, by] = self.base;
+        [bx.wrapping_add(x.pulse) >> FINE, by.wrapping_add(y.pulse) >> FINE]
+    }
+
+    /// Offset of X and Y, nm, one tick later, at these weights of the curve's vectors.
+    #[inline(always)]
+    pub(crate) fn tick(&mut self, extra: &Extra, c: i32, s: i32) -> [i32; 2] {
+        let [ahead_x, ahead_y] = extra.ahead_at(c, s);
+        let [x, y] = &mut self.side;
+        x.pulse = mulh_add(x.pulse, x.pulse, x.fade);
+        y.pulse = mulh_add(y.pulse, y.pulse, y.fade);
+        // What is put away is loaded again: carried over the branches it would have to be put away twice.
+        compiler_fence(Ordering::AcqRel);
+        let mut ended = false;
+        if x.left != 0 {
+            ended = x.turn(&mut self.base, extra.turning.dx);
+        } else if y.left != 0 {
+            ended = y.turn(&mut self.base, extra.turning.dx);
+        } else if (ahead_x ^ x.mask) < x.limit {
+            x.reverse(extra, 0);
+        } else if (ahead_y ^ y.mask) < y.limit {
+            y.reverse(extra, 1);
+        }
+        if ended {
+            let place = (x.mask & 1) | (y.mask & 2);
+            self.base = self.settled[(place & 3) as usize];
+        }
+        compiler_fence(Ordering::AcqRel);
+        self.standing()
+    }
+}
+
+impl Side {
+    /// Begins a turn.
+    #[inline(always)]
+    fn reverse(&mut self, extra: &Extra, axis: usize) {
+        let t = &extra.turning;
+        self.mask = !self.mask;
+        // The axis lags behind its new sense: the correction goes ahead with it. What is left of the last pulse goes.
+        let height = t.spike[axis] ^ self.mask;
+        self.rise = mulh(height.wrapping_sub(self.pulse), t.share_q30).wrapping_mul(4);
+        self.jump = [t.jump[axis][0] ^ self.mask, t.jump[axis][1] ^ self.mask];
+        (self.left, self.x) = (t.ticks, t.first_x);
+    }
+
+    /// One tick of a turn; whether it was the last.
+    #[inline(always)]
+    fn turn(&mut self, base: &mut [i32; 2], dx: i32) -> bool {
+        let x = self.x;
+        self.x = x.wrapping_add(dx);
+        let w = mulh(x, x).wrapping_mul(2) ^ i32::MAX;
+        let w2_q31 = mulh(w, w).wrapping_mul(2);
+        let ([bx, by], [jx, jy]) = (*base, self.jump);
+        *base = [mulh_add(bx, jx, w2_q31), mulh_add(by, jy, w2_q31)];
+        self.pulse = mulh_add(self.pulse, self.rise, w2_q31);
+        self.left = self.left.wrapping_sub(1);
+        self.left == 0
+    }
+
+    /// Sense now, Q31.
+    fn sense(&self, dx: i32) -> i32 {
+        if self.left == 0 {
+            return sense(self.mask);
+        }
+        // 2S − 1 = (15/8)(x − 2x³/3 + x⁵/5) where the last tick ended.
+        let x = self.x.wrapping_sub(dx >> 1);
+        let x2 = mulh(x, x).wrapping_mul(2);
+        let slope = 1_006_632_960i32
+            .wrapping_sub(mulh(x2, 1_342_177_280))
+            .wrapping_add(mulh(mulh(x2, x2).wrapping_mul(2), 402_653_184));
+        let share = mulh(x, slope).clamp(-(1 << 28), (1 << 28) - 1).wrapping_mul(8);
+        share ^ self.mask
+    }
+}
+
+/// Q31.
+const fn sense(mask: i32) -> i32 {
+    i32::MAX ^ mask
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turn_under_way_is_the_smoothstep() {
+        let dx = 1 << 20;
+        for i in -2047..2047 {
+            for mask in [0, -1] {
+                let at = f64::from(i) / 2048.0;
+                let x = (at * 2_147_483_648.0) as i32;
+                let side = Side { left: 1, x: x + (dx >> 1), mask, ..Side::default() };
+                let way = 1.875 * (at - 2.0 / 3.0 * at.powi(3) + at.powi(5) / 5.0);
+                let expected = if mask == 0 { way } else { -way };
+                let got = f64::from(side.sense(dx)) / 2_147_483_648.0;
+                assert!((got - expected).abs() < 2e-8, "{at}: {got} {expected}");
+            }
+        }
+    }
+}
