@@ -1,6 +1,6 @@
 //! The ticks whose instructions `giotto-hil ticks` counts, ready to be called one by one.
 //!
-//! Counted is the call alone, inputs prepared before it. All circles lie in a tilted plane ("in space"); the
+//! Counted is the call alone, inputs prepared before it. All arcs lie in a tilted plane ("in space"); the
 //! first tick with [`flag::MOVING`](super::flag::MOVING) begins what counts, ticks without it (rest, settling) do not.
 use super::planner::Planner;
 use super::{Config, Executor, Output, Planned, Stream, StreamSample};
@@ -17,9 +17,8 @@ const FEED_M_S: f64 = 0.5;
 /// The source paper's robot.
 const CUMULANTS: Cumulants<f32> = Cumulants { kappa2_s2: 46.58e-6, kappa4_s4: -5.5265e-6 };
 
-/// Eight profile terms, reversal pulses on both axes among them.
+/// Eight profile terms, the dearest there are: reversal pulses and play of both axes, a periodic error.
 pub const TERMS: [Term<f32>; 8] = [
-    Term::ScaleMismatch { relative: 100e-6 },
     Term::Squareness { shear_rad: 80e-6 },
     Term::ServoMismatch { delta_tau_s: 100e-6 },
     Term::BandwidthMismatch { delta_kappa2_s2: 5e-6 },
@@ -27,9 +26,24 @@ pub const TERMS: [Term<f32>; 8] = [
     Term::Backlash { axis: Axis::Y, step_m: 12e-6 },
     Term::ReversalSpike { axis: Axis::X, peak_m: 8e-6, decay_s: 0.05 },
     Term::ReversalSpike { axis: Axis::Y, peak_m: 6e-6, decay_s: 0.04 },
+    Term::Cyclic { axis: Axis::X, amplitude_m: 2e-6, pitch_m: 0.01, phase_rad: 0.5 },
 ];
 
-/// A planned circle and the executor that runs it (first, where one load reaches two of its words).
+fn table(extended: bool) -> Table {
+    let terms = if extended { TERMS.iter().copied().collect() } else { heapless::Vec::new() };
+    let zone = Zone {
+        place_m: None,
+        radius_m: [0.001, 1.0],
+        feed_m_s: [0.001, 2.0],
+        travel: Travel::Both,
+        cumulants: CUMULANTS,
+        terms,
+    };
+    let limits = Limits { offset_m: 0.02, slew_m_s: 0.2 };
+    Table { machine: heapless::String::new(), zones: [zone].into_iter().collect(), limits }
+}
+
+/// A planned arc and the executor that runs it (first, where one load reaches two of its words).
 #[repr(C)]
 pub struct Arc {
     executor: Executor,
@@ -37,36 +51,23 @@ pub struct Arc {
 }
 
 impl Arc {
-    /// One and a half turns with the β model alone, or with [`TERMS`] as well.
+    /// One and a half turns with the β model alone, or with [`TERMS`] as well. Each axis reverses at constant feed, and X
+    /// in the rising ramp too.
     pub fn new(extended: bool) -> Self {
-        let mut zone = Zone {
-            place_m: None,
-            radius_m: [0.001, 1.0],
-            feed_m_s: [0.001, 2.0],
-            travel: Travel::Both,
-            cumulants: CUMULANTS,
-            terms: heapless::Vec::new(),
-        };
-        if extended {
-            zone.terms = TERMS.iter().copied().collect();
-        }
-        let table = Table {
-            machine: heapless::String::new(),
-            zones: [zone].into_iter().collect(),
-            limits: Limits { offset_m: 0.02, slew_m_s: 0.2 },
-        };
         let config = Config::robot(1000);
-        let start = [CENTRE_M[0] + RADIUS_M, CENTRE_M[1], CENTRE_M[2]].map(|m| (m * 1e9) as i32);
+        let normal = [0.0, 0.5, 1.0];
+        // cos and sin of −0.3 rad along two vectors of the plane: X, and the normal crossed with it.
+        let (cos, sin, length) = (0.955_336_5, -0.295_520_2, 1.118_034);
+        let arm = [cos, sin * normal[2] / length, -sin * normal[1] / length];
+        let mut start = [0; 3];
+        for ((nm, centre), arm) in start.iter_mut().zip(CENTRE_M).zip(arm) {
+            *nm = ((centre + RADIUS_M * arm) * 1e9) as i32;
+        }
         let mut planner = Planner::new(&config, start);
         let mut queue = heapless::spsc::Queue::new();
-        let arc = Segment::Arc {
-            centre_m: CENTRE_M,
-            normal: [0.0, 0.5, 1.0],
-            sweep_rad: 3.0 * core::f64::consts::PI,
-            rise_m: 0.0,
-            feed_m_s: FEED_M_S,
-        };
-        if planner.set_table(Some(&table)).is_ok()
+        let sweep_rad = 3.0 * core::f64::consts::PI;
+        let arc = Segment::Arc { centre_m: CENTRE_M, normal, sweep_rad, rise_m: 0.0, feed_m_s: FEED_M_S };
+        if planner.set_table(Some(&table(extended))).is_ok()
             && let Ok(planned) = planner.segment(&arc)
         {
             // The queue is empty.
@@ -86,7 +87,7 @@ impl Arc {
         self.executor.idle() && self.queue.is_empty()
     }
 
-    /// The circle was planned and every tick stayed within its bounds.
+    /// The arc was planned and every tick stayed within its bounds.
     pub fn sound(&self) -> bool {
         let c = self.executor.counters();
         c.segments == 1 && c.uncorrected == 0 && c.offset_cuts == 0 && c.slew_cuts == 0
@@ -103,20 +104,7 @@ impl Streamed {
     /// At rest at the start; `None` if the configuration were wrong.
     pub fn new() -> Option<Self> {
         let mut planner = Planner::new(&Config::robot(1000), position(0));
-        let zone = Zone {
-            place_m: None,
-            radius_m: [0.001, 1.0],
-            feed_m_s: [0.001, 2.0],
-            travel: Travel::Both,
-            cumulants: CUMULANTS,
-            terms: heapless::Vec::new(),
-        };
-        let table = Table {
-            machine: heapless::String::new(),
-            zones: [zone].into_iter().collect(),
-            limits: Limits { offset_m: 0.02, slew_m_s: 0.2 },
-        };
-        planner.set_table(Some(&table)).ok()?;
+        planner.set_table(Some(&table(false))).ok()?;
         let plan = planner.stream(1.0).ok()?;
         Some(Self { stream: Stream::new(&plan, position(0), 0, false), sequence: 0 })
     }
@@ -132,6 +120,12 @@ impl Streamed {
     #[inline(never)]
     pub fn tick(&mut self, sample: Option<StreamSample>) -> Output {
         self.stream.tick(sample)
+    }
+
+    /// Every set-point was taken and every tick stayed within its bounds.
+    pub fn sound(&self) -> bool {
+        let c = self.stream.counters();
+        c.missing == 0 && c.rejected == 0 && c.bounds.offset_cuts == 0 && c.bounds.slew_cuts == 0
     }
 }
 

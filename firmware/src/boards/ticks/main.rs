@@ -11,11 +11,7 @@ fn main() {
 }
 
 #[cfg(target_os = "none")]
-mod naive;
-
-#[cfg(target_os = "none")]
 mod image {
-    use super::naive;
     use core::fmt::{self, Write};
     use core::hint::black_box;
     use core::ptr;
@@ -23,13 +19,8 @@ mod image {
     use cortex_m::peripheral::syst::SystClkSource;
     use cortex_m_rt::entry;
     use defmt as _;
-    use giotto_firmware::engine::{Config, Executor, Output, Planned, Planner, Segment, flag};
-    use giotto_firmware::engine::{Stream, StreamSample};
-    use giotto_shared::Axis;
-    use giotto_shared::model::Cumulants;
-    use giotto_shared::table::{Limits, Table, Travel, Zone};
-    use giotto_shared::term::Term;
-    use heapless::spsc::Queue;
+    use giotto_firmware::engine::bench::{Arc, Plain, Streamed};
+    use giotto_firmware::engine::flag;
 
     /// Nothing logs here.
     #[defmt::global_logger]
@@ -114,12 +105,6 @@ mod image {
         let _ = writeln!(Uart, "{name} {} {}", range.0, range.1);
     }
 
-    /// The tick as the interrupt makes it.
-    #[inline(never)]
-    fn tick(executor: &mut Executor, queue: &mut Queue<Planned, 2>) -> Output {
-        executor.tick(queue)
-    }
-
     /// What it costs to measure nothing.
     fn overhead() -> u32 {
         let mut least = u32::MAX;
@@ -130,118 +115,58 @@ mod image {
         least
     }
 
-    fn table(terms: &[Term<f32>]) -> Table {
-        let mut table = Table::empty();
-        table.limits = Limits { offset_m: 2e-3, slew_m_s: 0.1 };
-        let mut zone = Zone {
-            place_m: None,
-            radius_m: [0.05, 0.3],
-            feed_m_s: [0.02, 0.7],
-            travel: Travel::Both,
-            cumulants: Cumulants { kappa2_s2: 46.58e-6, kappa4_s4: -5.53e-6 },
-            terms: heapless::Vec::new(),
-        };
-        for term in terms {
-            let _ = zone.terms.push(*term);
-        }
-        let _ = table.zones.push(zone);
-        table
-    }
-
-    /// One turn and more of an arc tilted in space, from rest to rest. `at`: all ticks under way, and those at
-    /// constant feed.
-    fn arc(planner: &mut Planner, executor: &mut Executor, floor: u32) -> Option<[Range; 2]> {
-        let arc = Segment::Arc {
-            centre_m: [-0.1, 0.0, 0.0],
-            normal: [0.0, 0.3, 1.0],
-            sweep_rad: 7.0,
-            rise_m: 0.0,
-            feed_m_s: 0.5,
-        };
-        let planned = planner.segment(&arc).ok()?;
-        let mut queue = Queue::new();
-        queue.enqueue(planned).ok()?;
+    /// From rest to rest. All ticks under way, and those at constant feed.
+    fn arc(extended: bool, floor: u32) -> Option<[Range; 2]> {
+        let mut arc = Arc::new(extended);
         let mut ranges = [Range::NONE, Range::NONE];
-        loop {
+        while !arc.done() {
             let before = SYST::get_current();
-            let output = tick(executor, &mut queue);
-            let after = SYST::get_current();
-            let count = between(before, after).saturating_sub(floor);
+            let output = arc.tick();
+            let count = between(before, SYST::get_current()).saturating_sub(floor);
             if output.flags & flag::MOVING != 0 {
                 ranges[0].add(count);
             }
             if output.flags & flag::CRUISE != 0 {
                 ranges[1].add(count);
             }
-            if executor.idle() && queue.is_empty() {
-                return Some(ranges);
-            }
         }
+        arc.sound().then_some(ranges)
     }
 
-    fn stream(planner: &Planner, floor: u32) -> Option<Range> {
-        let plan = planner.stream(0.5).ok()?;
-        let start = [100_000_000, 0, 0];
-        let mut stream = Stream::new(&plan, start, 0, false);
+    fn stream(floor: u32) -> Option<Range> {
+        let mut streamed = Streamed::new()?;
         let mut range = Range::NONE;
-        for sequence in 0..2000_u16 {
-            let [x, y, z] = start;
-            let position_nm = [x, y + i32::from(sequence) * 50_000, z];
-            let sample = Some(StreamSample { sequence, position_nm });
+        for _ in 0..2000_u16 {
+            let sample = Some(streamed.sample());
             let before = SYST::get_current();
-            black_box(stream_tick(&mut stream, sample));
+            black_box(streamed.tick(sample));
             range.add(between(before, SYST::get_current()).saturating_sub(floor));
         }
-        Some(range)
+        streamed.sound().then_some(range)
     }
 
-    #[inline(never)]
-    fn stream_tick(stream: &mut Stream, sample: Option<StreamSample>) -> Output {
-        stream.tick(sample)
-    }
-
-    /// Eight terms, the spikes of both axes among them.
-    fn eight_terms() -> [Term<f32>; 8] {
-        [
-            Term::Squareness { shear_rad: 1e-4 },
-            Term::ScaleMismatch { relative: 1e-4 },
-            Term::ServoMismatch { delta_tau_s: 1e-4 },
-            Term::Backlash { axis: Axis::X, step_m: 1e-5 },
-            Term::Backlash { axis: Axis::Y, step_m: 1e-5 },
-            Term::ReversalSpike { axis: Axis::X, peak_m: 5e-6, decay_s: 0.02 },
-            Term::ReversalSpike { axis: Axis::Y, peak_m: 5e-6, decay_s: 0.02 },
-            Term::Cyclic { axis: Axis::X, amplitude_m: 2e-6, pitch_m: 0.01, phase_rad: 0.5 },
-        ]
+    fn plain(floor: u32) -> Range {
+        let mut plain = Plain::new();
+        let mut range = Range::NONE;
+        // To the end of its ramp.
+        for _ in 0..400_u16 {
+            let before = SYST::get_current();
+            black_box(plain.tick());
+            range.add(between(before, SYST::get_current()).saturating_sub(floor));
+        }
+        range
     }
 
     fn measure() -> Option<()> {
         let floor = overhead();
-        let config = Config::robot(8000);
-        let mut planner = Planner::new(&config, [0; 3]);
-        let executor = || Executor::new([0; 3], config.engage_ticks(), false);
-        planner.set_table(Some(&table(&[]))).ok()?;
-        let [all, steady] = arc(&mut planner, &mut executor(), floor)?;
+        let [all, steady] = arc(false, floor)?;
         say("arc_beta", &all);
         say("arc_beta_steady", &steady);
-        // A stream comes at the rate of the image; the window of its differentiator is too long for 8 kHz.
-        let mut streaming = Planner::new(&Config::robot(1000), [0; 3]);
-        streaming.set_table(Some(&table(&[]))).ok()?;
-        if let Some(range) = stream(&streaming, floor) {
-            say("stream", &range);
-        }
-        let mut planner = Planner::new(&config, [0; 3]);
-        planner.set_table(Some(&table(&eight_terms()))).ok()?;
-        let [all, steady] = arc(&mut planner, &mut executor(), floor)?;
+        say("stream", &stream(floor)?);
+        let [all, steady] = arc(true, floor)?;
         say("arc_extended", &all);
         say("arc_extended_steady", &steady);
-        let mut range = Range::NONE;
-        for step in 0..200_u16 {
-            let time = f32::from(step) * 1e-3;
-            let before = SYST::get_current();
-            black_box(naive::tick(black_box(time)));
-            range.add(between(before, SYST::get_current()).saturating_sub(floor));
-        }
-        say("naive_libm", &range);
+        say("naive_libm", &plain(floor));
         Some(())
     }
 
