@@ -83,6 +83,15 @@ fn relinked(name: &str, text: &str) -> String {
             link.split_once('#').map_or((link, String::new()), |(p, a)| (p, format!("#{a}")));
         match path.strip_suffix(".md").filter(|p| !p.contains("://")) {
             Some(page) => out += &format!("{}{anchor}", address(name, page)),
+            // A file beside the guide has no place in the documentation: its name stays, the link goes.
+            None if !link.contains("://") && !path.is_empty() => {
+                out.truncate(out.len() - 2);
+                if let Some(open) = out.rfind('[') {
+                    out.remove(open);
+                }
+                rest = &after[end + 1..];
+                continue;
+            }
             None => out += link,
         }
         rest = &after[end..];
