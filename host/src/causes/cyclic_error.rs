@@ -21,6 +21,12 @@ const WORDS: Words = Words {
     not_compensable: None,
 };
 
+/// Waves a metre of the shortest pitch that is looked for: 300 to the diameter of the largest circle, 1 mm at least.
+pub fn finest_wave_per_m(views: &[RunView]) -> f64 {
+    let travel = 2.0 * views.iter().map(|view| view.radius_m).fold(0.0, f64::max);
+    1.0 / (travel / 300.0).max(1e-3)
+}
+
 impl CauseModel for CyclicError {
     fn cause(&self) -> Cause {
         Cause::CyclicError
@@ -41,18 +47,13 @@ impl CauseModel for CyclicError {
     /// Pitches so close that neighbours stay in step over the diameter of the largest circle.
     fn shapes(&self, views: &[RunView]) -> Vec<Vec<f64>> {
         let travel = 2.0 * views.iter().map(|view| view.radius_m).fold(0.0, f64::max);
-        let shortest = (travel / 300.0).max(1e-3);
         let mut shapes = Vec::new();
         let mut wave_per_m = 1.0 / (0.5 * travel).max(1e-3);
-        while wave_per_m <= 1.0 / shortest && travel > 0.0 {
+        while wave_per_m <= finest_wave_per_m(views) && travel > 0.0 {
             shapes.push(vec![1.0 / wave_per_m]);
             wave_per_m += 0.35 / travel;
         }
         shapes
-    }
-
-    fn fixed_in_place(&self) -> bool {
-        true
     }
 
     fn columns(&self) -> usize {

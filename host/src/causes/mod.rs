@@ -4,7 +4,7 @@
 //! To add a cause: write its file, add it to [`Cause`] and to [`ALL`].
 mod backlash;
 mod bandwidth_mismatch;
-mod cyclic_error;
+pub mod cyclic_error;
 mod feed_clamp;
 mod higher_order_dynamics;
 mod interpolation_chord;
@@ -166,11 +166,6 @@ pub trait CauseModel: Sync {
     /// Starting points for the shape parameters, over the runs at hand.
     fn shapes(&self, _views: &[RunView]) -> Vec<Vec<f64>> {
         vec![Vec::new()]
-    }
-
-    /// Whether the signature depends on place and radius alone, so that runs may be averaged to scan its shape.
-    fn fixed_in_place(&self) -> bool {
-        false
     }
 
     /// Number of linear columns: 2 where the phase of the signature is free.

@@ -16,6 +16,15 @@ pub type Samples = Vec<Vec<f64>>;
 struct Entry {
     samples: Samples,
     coordinates: Vec<[f64; COLUMNS]>,
+    /// What lies outside the low orders; empty for the many columns that lie wholly within them.
+    outside: Samples,
+}
+
+/// A column that is only tried, over some of the runs.
+#[derive(Clone, Debug)]
+pub struct Trial {
+    samples: Samples,
+    coordinates: Vec<[f64; COLUMNS]>,
 }
 
 /// Products of columns; column 0 is the data.
@@ -101,59 +110,87 @@ impl Ledger {
         &self.plain[run]
     }
 
-    /// White products of a column outside the ledger with the columns `with`, and with itself, over `over` runs.
-    pub fn probe(
-        &self,
-        runs: &[Prepared],
-        column: &[Vec<f64>],
-        with: &[usize],
-        over: &[usize],
-    ) -> (Vec<f64>, f64) {
-        let mut out = vec![0.0; with.len()];
-        let mut own = 0.0;
-        for (samples, &run) in column.iter().zip(over) {
-            let coordinates = runs[run].basis.coordinates(samples);
-            let discount = &self.discounts[run];
-            let discounted = |other: &[f64; COLUMNS]| -> f64 {
-                (0..COLUMNS).map(|k| discount[k] * coordinates[k] * other[k]).sum()
-            };
-            own += (dot(samples, samples) - discounted(&coordinates)) / self.noise_m2;
-            for (out, &at) in out.iter_mut().zip(with) {
-                let entry = &self.entries[at];
-                *out +=
-                    (dot(samples, &entry.samples[run]) - discounted(&entry.coordinates[run])) / self.noise_m2;
-            }
-        }
-        (out, own)
+    /// A column outside the ledger over the runs `over`, one vector of samples for each.
+    pub fn trial(&self, runs: &[Prepared], over: &[usize], samples: Samples) -> Trial {
+        let coordinates = over.iter().zip(&samples).map(|(&run, s)| runs[run].basis.coordinates(s)).collect();
+        Trial { samples, coordinates }
     }
 
-    /// White product of two columns outside the ledger, over `over` runs.
-    pub fn outside(&self, runs: &[Prepared], a: &[Vec<f64>], b: &[Vec<f64>], over: &[usize]) -> f64 {
-        a.iter()
-            .zip(b)
-            .zip(over)
-            .map(|((a, b), &run)| {
-                let (ca, cb) = (runs[run].basis.coordinates(a), runs[run].basis.coordinates(b));
+    /// White products of a trial with the columns `with`, and with itself.
+    pub fn probe(&self, trial: &Trial, with: &[usize], over: &[usize]) -> (Vec<f64>, f64) {
+        let mut out = vec![0.0; with.len()];
+        for (at, &run) in over.iter().enumerate() {
+            let (samples, coordinates) = (&trial.samples[at], &trial.coordinates[at]);
+            for (out, &column) in out.iter_mut().zip(with) {
+                let entry = &self.entries[column];
+                let outside = entry.outside.get(run).map_or(0.0, |outside| dot(samples, outside));
+                *out += kept(coordinates, &entry.coordinates[run], &self.discounts[run]) + outside;
+            }
+        }
+        out.iter_mut().for_each(|value| *value /= self.noise_m2);
+        (out, self.between(trial, trial, over))
+    }
+
+    /// White product of two trials.
+    pub fn between(&self, a: &Trial, b: &Trial, over: &[usize]) -> f64 {
+        let sum: f64 = over
+            .iter()
+            .enumerate()
+            .map(|(at, &run)| {
                 let discount = &self.discounts[run];
+                let (ca, cb) = (&a.coordinates[at], &b.coordinates[at]);
                 let scatter: f64 = (0..COLUMNS).map(|k| discount[k] * ca[k] * cb[k]).sum();
-                (dot(a, b) - scatter) / self.noise_m2
+                dot(&a.samples[at], &b.samples[at]) - scatter
             })
-            .sum()
+            .sum();
+        sum / self.noise_m2
     }
 }
 
+/// A column counts as within the low orders below this share of its energy outside.
+const WITHIN: f64 = 1e-20;
+
 fn entry(runs: &[Prepared], samples: Samples) -> Entry {
-    let coordinates = runs.par_iter().zip(&samples).map(|(run, s)| run.basis.coordinates(s)).collect();
-    Entry { samples, coordinates }
+    let parts: Vec<([f64; COLUMNS], Vec<f64>, [f64; 2])> = runs
+        .par_iter()
+        .zip(&samples)
+        .map(|(run, samples)| {
+            let coordinates = run.basis.coordinates(samples);
+            let mut outside = samples.clone();
+            for (k, amount) in coordinates.iter().enumerate() {
+                run.basis.add(k, -amount, &mut outside);
+            }
+            let energy = [dot(&outside, &outside), dot(samples, samples)];
+            (coordinates, outside, energy)
+        })
+        .collect();
+    let energy = parts.iter().fold([0.0; 2], |sum, part| [sum[0] + part.2[0], sum[1] + part.2[1]]);
+    let keep = energy[0] > WITHIN * energy[1];
+    let mut coordinates = Vec::with_capacity(parts.len());
+    let mut outside = Samples::new();
+    for part in parts {
+        coordinates.push(part.0);
+        if keep {
+            outside.push(part.1);
+        }
+    }
+    Entry { samples, coordinates, outside }
+}
+
+/// Product of what scatter between runs leaves of the low orders.
+fn kept(a: &[f64; COLUMNS], b: &[f64; COLUMNS], discount: &[f64; COLUMNS]) -> f64 {
+    (0..COLUMNS).map(|k| (1.0 - discount[k]) * a[k] * b[k]).sum()
 }
 
 fn products(a: &Entry, b: &Entry, run: usize, discount: &[f64; COLUMNS], noise_m2: f64) -> (f64, f64) {
-    let whole = dot(&a.samples[run], &b.samples[run]);
     let (ca, cb) = (&a.coordinates[run], &b.coordinates[run]);
-    let scatter: f64 = (0..COLUMNS).map(|k| discount[k] * ca[k] * cb[k]).sum();
-    // The centre is the operator's, not the machine's.
-    let centre = ca[1] * cb[1] + ca[2] * cb[2];
-    ((whole - scatter) / noise_m2, whole - centre)
+    let outside = match (a.outside.get(run), b.outside.get(run)) {
+        (Some(a), Some(b)) => dot(a, b),
+        _ => 0.0,
+    };
+    // The centre, order 1, is the operator's, not the machine's.
+    let plain = ca[0] * cb[0] + (3..COLUMNS).map(|k| ca[k] * cb[k]).sum::<f64>();
+    ((kept(ca, cb, discount) + outside) / noise_m2, plain + outside)
 }
 
 fn total(matrices: &[DMatrix<f64>], weights: &[f64]) -> DMatrix<f64> {

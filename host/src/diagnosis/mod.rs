@@ -15,6 +15,7 @@ pub mod linear;
 pub mod misfit;
 pub mod pattern;
 pub mod picture;
+pub mod pitch;
 pub mod roughness;
 pub mod search;
 pub mod shape;

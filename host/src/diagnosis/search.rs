@@ -4,7 +4,7 @@
 //! each member. The price grows with the number of competitors and of shapes tried (extended BIC, Chen &
 //! Chen 2008, doi 10.1093/biomet/asn034), so that pure noise is left alone. Members enter one by one, leave
 //! when others make them needless, and are exchanged for better ones until nothing improves.
-use super::linear::solve;
+use super::linear::Factor;
 use super::pattern::Pattern;
 use crate::causes::Cause;
 use giotto_shared::Axis;
@@ -58,9 +58,8 @@ const MOST: usize = 14;
 
 /// Evidence of a set: `None` where its columns are not independent in these runs.
 pub fn evidence(products: &DMatrix<f64>, nuisance: &[usize], items: &[Item], set: &[usize]) -> Option<f64> {
-    let columns = columns_of(nuisance, items, set);
     let price: f64 = set.iter().map(|&i| items[i].price).sum();
-    solve(products, &columns).map(|solution| solution.gain - price)
+    Factor::new(products, &columns_of(nuisance, items, set)).map(|factor| factor.gain() - price)
 }
 
 /// Columns of nuisance and set.
@@ -76,41 +75,40 @@ pub fn select(
     start: &[usize],
     barred: &[usize],
 ) -> Vec<usize> {
-    let score = |set: &[usize]| evidence(products, nuisance, items, set).unwrap_or(f64::NEG_INFINITY);
+    let price = |set: &[usize]| set.iter().map(|&i| items[i].price).sum::<f64>();
+    let factor = |set: &[usize]| Factor::new(products, &columns_of(nuisance, items, set));
     let mut set = start.to_vec();
-    let mut best = score(&set);
-    if best == f64::NEG_INFINITY {
+    // A start that these runs cannot tell apart is no start.
+    if factor(&set).is_none() {
         set.clear();
-        best = score(&set);
     }
     for _ in 0..4 * MOST {
-        let mut next: Option<(f64, Vec<usize>)> = None;
-        let consider = |candidate: Vec<usize>, next: &mut Option<(f64, Vec<usize>)>| {
-            let value = score(&candidate);
-            if value > best + 1e-6 && next.as_ref().is_none_or(|(other, _)| value > *other) {
-                *next = Some((value, candidate));
-            }
-        };
-        for at in 0..set.len() {
-            consider(without(&set, at), &mut next);
-        }
+        let best = factor(&set).map_or(f64::NEG_INFINITY, |factor| factor.gain() - price(&set));
         let outside: Vec<usize> =
             (0..items.len()).filter(|i| !set.contains(i) && !barred.contains(i)).collect();
-        for &candidate in &outside {
-            if set.len() < MOST {
-                let mut grown = set.clone();
-                grown.push(candidate);
-                consider(grown, &mut next);
+        let mut next: Option<(f64, Vec<usize>)> = None;
+        let mut consider = |value: f64, base: &[usize], further: Option<usize>| {
+            if value > best + 1e-6 && next.as_ref().is_none_or(|(other, _)| value > *other) {
+                next = Some((value, base.iter().copied().chain(further).collect()));
             }
-            for at in 0..set.len() {
-                let mut exchanged = set.clone();
-                exchanged[at] = candidate;
-                consider(exchanged, &mut next);
+        };
+        // Without one of the members (or all kept), alone and with one from outside.
+        for at in (0..set.len()).map(Some).chain([None]) {
+            let base = at.map_or_else(|| set.clone(), |at| without(&set, at));
+            let Some(mut factor) = factor(&base) else { continue };
+            let paid = price(&base);
+            consider(factor.gain() - paid, &base, None);
+            if base.len() == MOST {
+                continue;
+            }
+            for &candidate in &outside {
+                if let Some(gain) = factor.gain_with(&items[candidate].columns) {
+                    consider(gain - paid - items[candidate].price, &base, Some(candidate));
+                }
             }
         }
-        let Some((value, candidate)) = next else { break };
-        best = value;
-        set = candidate;
+        let Some((_, better)) = next else { break };
+        set = better;
     }
     set
 }

@@ -3,12 +3,12 @@
 //! A coarse scan on a stratified part of the runs, then a simplex on all of them; each trial costs one column,
 //! not one refit of everything.
 use super::explain::{Explained, column, residual, width};
-use super::ledger::Samples;
-use super::linear::solve;
+use super::ledger::{Samples, Trial};
+use super::linear::Factor;
+use super::pitch;
 use super::search::{Kind, columns_of};
 use super::survey::Prepared;
 use crate::causes::{Cause, RunView};
-use giotto_shared::Axis;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -35,7 +35,6 @@ pub fn improve(found: &mut Explained, runs: &[Prepared]) {
     let sample = stratified(runs);
     let all: Vec<usize> = (0..runs.len()).collect();
     let whitened = whitened_residual(found, runs);
-    let digest = digest(runs, &whitened);
     for item in 0..found.items.len() {
         let Kind::Cause { cause, axis, shape } = found.items[item].kind.clone() else { continue };
         let model = cause.model();
@@ -61,17 +60,15 @@ pub fn improve(found: &mut Explained, runs: &[Prepared]) {
         let start = if found.chosen.contains(&item) {
             shape.clone()
         } else {
-            let candidates = model.shapes(&views);
             // A scan of a part of the runs sees that part of the gain.
-            let share =
-                if model.fixed_in_place() { 1.0 } else { runs.len() as f64 / sample.len().max(1) as f64 };
-            let best = if model.fixed_in_place() {
-                candidates
-                    .into_par_iter()
-                    .map(|shape| (digest_gain(&digest, cause, axis, &shape, found.spread.noise_m2), shape))
-                    .max_by(|a, b| a.0.total_cmp(&b.0))
-            } else {
-                best_of(candidates, &sample)
+            let share = runs.len() as f64 / sample.len().max(1) as f64;
+            let best = match (cause, axis) {
+                (Cause::CyclicError, Some(axis)) => {
+                    let finest = crate::causes::cyclic_error::finest_wave_per_m(&views);
+                    pitch::scan(runs, &whitened, found.spread.noise_m2, axis, finest)
+                        .map(|found| (found.gain / share, vec![found.pitch_m]))
+                }
+                _ => best_of(model.shapes(&views), &sample),
             };
             match best {
                 Some((coarse, start)) if coarse * share > PROMISING * found.items[item].price => start,
@@ -81,7 +78,7 @@ pub fn improve(found: &mut Explained, runs: &[Prepared]) {
         let polished = if discrete(&start) || model.shape_names() == ["turned"] {
             best_of(model.shapes(&views), &all).map_or(start, |(_, shape)| shape)
         } else {
-            let first_step = if model.fixed_in_place() {
+            let first_step = if cause == Cause::CyclicError {
                 // A pitch lives on a narrow peak: neighbours fall out of step over the diameter.
                 0.1 * start[0] / (2.0 * views.iter().map(|view| view.radius_m).fold(1e-3, f64::max))
             } else {
@@ -116,55 +113,6 @@ fn whitened_residual(found: &Explained, runs: &[Prepared]) -> Samples {
         left.iter_mut().for_each(|x| *x /= found.spread.noise_m2);
     });
     left
-}
-
-/// Runs of one radius folded into bins of the machine angle.
-struct Folded {
-    view: RunView,
-    pull: Vec<f64>,
-    count: Vec<f64>,
-}
-
-/// Bins of a fold: as fine as a ballbar samples.
-const FOLDS: usize = 1000;
-
-fn digest(runs: &[Prepared], whitened: &Samples) -> Vec<Folded> {
-    let mut folded: Vec<Folded> = Vec::new();
-    for (run, pull) in runs.iter().zip(whitened) {
-        let same = |other: &Folded| (other.view.radius_m / run.view.radius_m - 1.0).abs() < 1e-6;
-        let at = folded.iter().position(same).unwrap_or_else(|| {
-            let bin = std::f64::consts::TAU / FOLDS as f64;
-            let mut view = run.view.clone();
-            view.place((0..FOLDS).map(|i| bin * (i as f64 + 0.5)).collect());
-            folded.push(Folded { view, pull: vec![0.0; FOLDS], count: vec![0.0; FOLDS] });
-            folded.len() - 1
-        });
-        for (psi, pull) in run.view.psi_rad.iter().zip(pull) {
-            let bin = ((psi / std::f64::consts::TAU).rem_euclid(1.0) * FOLDS as f64) as usize % FOLDS;
-            folded[at].pull[bin] += pull;
-            folded[at].count[bin] += 1.0;
-        }
-    }
-    folded
-}
-
-/// Approximate gain of a place-fixed signature: pull²/own, columns taken as orthogonal.
-fn digest_gain(digest: &[Folded], cause: Cause, axis: Option<Axis>, shape: &[f64], noise_m2: f64) -> f64 {
-    let model = cause.model();
-    let mut out = vec![0.0; FOLDS];
-    let mut gain = 0.0;
-    for index in 0..model.columns() {
-        let (mut pull, mut own) = (0.0, 0.0);
-        for folded in digest {
-            model.signature(axis, shape, index, &folded.view, &mut out);
-            for ((value, p), n) in out.iter().zip(&folded.pull).zip(&folded.count) {
-                pull += value * p;
-                own += n * value * value;
-            }
-        }
-        gain += if own > 0.0 { pull * pull * noise_m2 / own } else { 0.0 };
-    }
-    gain
 }
 
 /// Shapes that are choices, not amounts.
@@ -202,7 +150,7 @@ fn gain(found: &Explained, runs: &[Prepared], kind: &Kind, with: &[usize], over:
             }
         }
     }
-    let mut columns: Vec<Samples> = Vec::with_capacity(wide);
+    let mut trials: Vec<Trial> = Vec::with_capacity(wide);
     for index in 0..wide {
         let samples: Samples = over
             .iter()
@@ -211,28 +159,28 @@ fn gain(found: &Explained, runs: &[Prepared], kind: &Kind, with: &[usize], over:
                 if let Kind::Cause { cause, axis, shape } = kind {
                     cause.model().signature(*axis, shape, index, &runs[run].view, &mut out);
                 }
+                runs[run].mask(&mut out);
                 out
             })
             .collect();
-        let (cross, own) = found.ledger.probe(runs, &samples, &base, over);
+        let trial = found.ledger.trial(runs, over, samples);
+        let (cross, own) = found.ledger.probe(&trial, &base, over);
         for (i, value) in cross.iter().enumerate() {
             products[(i, known + index)] = *value;
             products[(known + index, i)] = *value;
         }
         products[(known + index, known + index)] = own;
-        for (earlier, other) in columns.iter().enumerate() {
-            let value = found.ledger.outside(runs, other, &samples, over);
+        for (earlier, other) in trials.iter().enumerate() {
+            let value = found.ledger.between(other, &trial, over);
             products[(known + earlier, known + index)] = value;
             products[(known + index, known + earlier)] = value;
         }
-        columns.push(samples);
+        trials.push(trial);
     }
-    let without: Vec<usize> = (1..known).collect();
-    let whole: Vec<usize> = (1..known + wide).collect();
-    match (solve(&products, &whole), solve(&products, &without)) {
-        (Some(whole), Some(without)) => whole.gain - without.gain,
-        _ => 0.0,
-    }
+    let (without, further): (Vec<usize>, Vec<usize>) =
+        ((1..known).collect(), (known..known + wide).collect());
+    let gain = |mut factor: Factor<'_>| Some(factor.gain_with(&further)? - factor.gain());
+    Factor::new(&products, &without).and_then(gain).unwrap_or(0.0)
 }
 
 /// Nelder–Mead upwards; each parameter first moves by a share of itself, or by 1 ms (or mm) from zero.
