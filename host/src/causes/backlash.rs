@@ -47,13 +47,14 @@ impl CauseModel for Backlash {
     fn signature(&self, axis: Option<Axis>, shape: &[f64], _column: usize, view: &RunView, out: &mut [f64]) {
         let play_m = shape.first().copied().unwrap_or(0.0);
         // For Y turn the circle by −90°: its reversals lie where those of X would.
-        let quarter = if axis == Some(Axis::Y) { std::f64::consts::FRAC_PI_2 } else { 0.0 };
-        for (out, psi) in out.iter_mut().zip(&view.psi_rad) {
-            // u: angle since the reversal, in the direction of travel, 0…π.
-            let u = (view.sign * (psi - quarter)).rem_euclid(std::f64::consts::PI);
-            let back_m = view.radius_m * (1.0 - u.cos());
+        let (at, quarter) = if axis == Some(Axis::Y) { (1, std::f64::consts::FRAC_PI_2) } else { (0, 0.0) };
+        for ((out, psi), direction) in out.iter_mut().zip(&view.psi_rad).zip(&view.direction) {
+            let (_, side) = view.since_reversal(*psi, quarter);
+            // cos u, u the angle since the reversal in the direction of travel, 0…π.
+            let cos = side * direction[at];
+            let back_m = view.radius_m * (1.0 - cos);
             let crossed = if play_m > 0.0 { (back_m / play_m).min(1.0) } else { 1.0 };
-            *out = 0.5e-3 * u.cos() * (2.0 * crossed - 1.0);
+            *out = 0.5e-3 * cos * (2.0 * crossed - 1.0);
         }
     }
 

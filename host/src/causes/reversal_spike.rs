@@ -57,16 +57,14 @@ impl CauseModel for ReversalSpike {
     fn signature(&self, axis: Option<Axis>, shape: &[f64], _column: usize, view: &RunView, out: &mut [f64]) {
         let &[decay_s, rise_s, presliding_m] = shape else { return };
         let pulse = Pulse::new(decay_s, rise_s, presliding_m, view);
+        let half_turn_s = view.half_turn_s();
         let at = usize::from(axis == Some(Axis::Y));
         let quarter = if at == 1 { std::f64::consts::FRAC_PI_2 } else { 0.0 };
         for ((out, psi), direction) in out.iter_mut().zip(&view.psi_rad).zip(&view.direction) {
-            let since = view.since_reversal_s(*psi, quarter);
+            let (share, side) = view.since_reversal(*psi, quarter);
             // Against the new direction of travel, seen along the radius.
-            let along = view.sign * (psi - quarter);
-            let side =
-                if along.rem_euclid(std::f64::consts::TAU) < std::f64::consts::PI { 1.0 } else { -1.0 };
             let facing = side * direction[at];
-            *out = 1e-6 * facing * pulse.at(since);
+            *out = 1e-6 * facing * pulse.at(share * half_turn_s);
         }
     }
 
@@ -104,7 +102,7 @@ impl Pulse {
         let decay_s = decay_s.abs().max(1e-4);
         let rise_s = rise_s.abs().clamp(1e-5, 0.95 * decay_s);
         let presliding_m = presliding_m.abs().max(1e-8);
-        let half_turn_s = std::f64::consts::PI / view.omega_rad_s;
+        let half_turn_s = view.half_turn_s();
         // Time to slide five presliding lengths: x = ½(f²/R)t².
         let slide_s = (10.0 * presliding_m * view.radius_m).sqrt() / view.feed_m_s;
         let end_s = (14.0 * decay_s + slide_s).min(half_turn_s);

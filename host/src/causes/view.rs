@@ -36,10 +36,19 @@ impl RunView {
         self.psi_rad = psi_rad;
     }
 
-    /// Time since the last reversal of the axis whose reversals lie at `first_rad` + kπ, s, for a machine
-    /// angle ψ: always in [0, π/ω).
-    pub fn since_reversal_s(&self, psi_rad: f64, first_rad: f64) -> f64 {
-        (self.sign * (psi_rad - first_rad)).rem_euclid(std::f64::consts::PI) / self.omega_rad_s
+    /// Where the machine angle ψ stands between reversals of the axis whose reversals lie at `first_rad` + kπ:
+    /// the share of the half turn since the last one, 0…1, and the sign of the half turn (+1 from `first_rad` on).
+    pub fn since_reversal(&self, psi_rad: f64, first_rad: f64) -> (f64, f64) {
+        let halves = self.sign * (psi_rad - first_rad) * std::f64::consts::FRAC_1_PI;
+        // `floor` without a call; angles are a few turns at most.
+        let cut = halves as i64;
+        let whole = cut - i64::from((cut as f64) > halves);
+        (halves - whole as f64, if whole % 2 == 0 { 1.0 } else { -1.0 })
+    }
+
+    /// Duration of half a turn, s.
+    pub fn half_turn_s(&self) -> f64 {
+        std::f64::consts::PI / self.omega_rad_s
     }
 }
 

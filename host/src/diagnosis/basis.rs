@@ -99,13 +99,16 @@ pub const fn order_of(column: usize) -> usize {
     column.div_ceil(2)
 }
 
-/// Scalar product, four sums at a time.
+/// Sums that run side by side in a scalar product: additions of one sum wait for each other.
+const LANES: usize = 16;
+
+/// Scalar product.
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 4];
-    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(a, b)| a * b).sum();
-    for (a, b) in a4.zip(b4) {
-        for lane in 0..4 {
+    let mut sums = [0.0; LANES];
+    let (a_lanes, b_lanes) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    let rest: f64 = a_lanes.remainder().iter().zip(b_lanes.remainder()).map(|(a, b)| a * b).sum();
+    for (a, b) in a_lanes.zip(b_lanes) {
+        for lane in 0..LANES {
             sums[lane] += a[lane] * b[lane];
         }
     }

@@ -72,7 +72,7 @@ fn find_on(
         .map(|(run, left)| {
             let (mut sums, mut counts) = ([0.0; BINS], [0.0; BINS]);
             for i in 1..left.len().saturating_sub(1) {
-                let near = run.view.since_reversal_s(run.view.psi_rad[i], quarter);
+                let near = run.view.since_reversal(run.view.psi_rad[i], quarter).0 * run.view.half_turn_s();
                 let facing = run.view.direction[i][axis.index()].abs();
                 if near < SPIKE_S || facing < 0.3 || known.is_some_and(|known| known.covers(run, i)) {
                     continue;
