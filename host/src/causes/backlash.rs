@@ -58,6 +58,11 @@ impl CauseModel for Backlash {
         }
     }
 
+    /// The servo smooths the step; the closed form does not.
+    fn relative_doubt(&self) -> f64 {
+        0.004
+    }
+
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
         for axis in axes_of(effect) {
             machine.backlash_m[axis.index()] += effect.value * 1e-3;

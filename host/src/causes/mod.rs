@@ -184,6 +184,12 @@ pub trait CauseModel: Sync {
     ) {
     }
 
+    /// Standard error of the closed form itself, as a share of the value: a perfect measurement would still be
+    /// this uncertain. Measured against machines that move in the time domain.
+    fn relative_doubt(&self) -> f64 {
+        0.002
+    }
+
     /// Puts the effect into a simulated machine.
     fn apply(&self, effect: &Effect, machine: &mut Machine);
 

@@ -68,6 +68,11 @@ impl CauseModel for ReversalSpike {
         }
     }
 
+    /// The height of a spike hangs on the shape of its rise, which differs from friction law to friction law.
+    fn relative_doubt(&self) -> f64 {
+        0.02
+    }
+
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
         for axis in axes_of(effect) {
             let mut friction = machine.friction[axis.index()].unwrap_or_default();

@@ -205,12 +205,17 @@ fn estimate(found: &Explained, item: usize) -> (f64, f64) {
     let robust = robust_variances(found, &columns);
     let value: Vec<f64> = at.iter().map(|&i| found.solution.coefficients[i]).collect();
     let variance = |i: usize| found.solution.covariance[(i, i)].max(robust.get(i).copied().unwrap_or(0.0));
+    let doubt = match &found.items[item].kind {
+        Kind::Cause { cause, .. } => cause.model().relative_doubt(),
+        Kind::Pattern(_) => 0.0,
+    };
+    let half = |value: f64, se: f64| (t * se).hypot(1.96 * doubt * value);
     match (value.as_slice(), at.as_slice()) {
-        ([only], [i]) => (*only, t * variance(*i).sqrt()),
+        ([only], [i]) => (*only, half(*only, variance(*i).sqrt())),
         ([a, b], [i, j]) => {
             let size = a.hypot(*b).max(f64::MIN_POSITIVE);
             let se = ((a / size).powi(2) * variance(*i) + (b / size).powi(2) * variance(*j)).sqrt();
-            (size, t * se)
+            (size, half(size, se))
         }
         _ => (f64::NAN, f64::NAN),
     }

@@ -220,7 +220,8 @@ fn merged(mut machine: Machine, base: &Machine, alone: &Machine) -> Machine {
     machine
 }
 
-/// Gives the residual of each run (measured minus base machine) to another run with as many samples.
+/// Gives the residual of each run (measured minus base machine) to another run with as many samples, place by place
+/// on the circle: a turn in the other direction is dealt backwards, or what flips with the direction would go along.
 fn deal_residuals(campaign: &mut Campaign, base: &Machine, plan: &Plan, instrument: &Instrument, seed: u64) {
     use rand::{SeedableRng, seq::SliceRandom};
     let bare =
@@ -234,12 +235,15 @@ fn deal_residuals(campaign: &mut Campaign, base: &Machine, plan: &Plan, instrume
         .collect();
     let mut order: Vec<usize> = (0..residuals.len()).collect();
     order.shuffle(&mut rand_chacha::ChaCha8Rng::seed_from_u64(seed ^ 0x6465_616c));
+    let signs: Vec<f64> = campaign.runs.iter().map(|run| run.sign()).collect();
     for (i, run) in campaign.runs.iter_mut().enumerate() {
         let n = run.samples.deviation_m.len();
         // The next in the shuffled order that is as long as this run; itself if none is.
         let from = order.iter().position(|k| residuals[*k].len() == n).map_or(i, |k| order.remove(k));
+        let backwards = signs[i] != signs[from];
         for (k, x) in run.samples.deviation_m.iter_mut().enumerate() {
-            *x = bare.runs[i].samples.deviation_m[k] + residuals[from].get(k).copied().unwrap_or(0.0);
+            let place = if backwards { (n - k) % n } else { k };
+            *x = bare.runs[i].samples.deviation_m[k] + residuals[from].get(place).copied().unwrap_or(0.0);
         }
     }
 }
