@@ -113,7 +113,7 @@ fn panel(svg: &mut String, x: f64, title: &str, runs: &[&Measured], scale: f64, 
         |of: fn(&Measured) -> f64| runs.iter().map(|r| of(r)).sum::<f64>() / runs.len().max(1) as f64 * 1e6;
     let _ = writeln!(
         svg,
-        r##"<text y="-6" text-anchor="middle">radius {:+.2} µm</text><text y="12" text-anchor="middle">form {:.1} µm</text><text y="150" text-anchor="middle" fill="#666">dashed: ±{:.0} µm</text></g>"##,
+        r##"<g paint-order="stroke" stroke="#fff" stroke-width="4"><text y="-6" text-anchor="middle">radius {:+.2} µm</text><text y="12" text-anchor="middle">form {:.1} µm</text></g><text y="150" text-anchor="middle" fill="#666">dashed: ±{:.0} µm</text></g>"##,
         mean(|r| r.analysis.radius_error_m),
         mean(|r| r.analysis.out_of_roundness_m),
         ring_m * 1e6
