@@ -157,9 +157,10 @@ fn say(args: &Args, result: &Compensated, document: &Document, out: Output) -> R
             Fate::Left(Left::Negligible) => negligible += 1,
             Fate::Left(left) => _ = reasons.insert(report.line, left),
             Fate::Corrected { radius_mm, feed_mm_s, delta_mm, blocks } => out.say(format_args!(
-                "  {name}:{}: R {radius_mm:.3} mm at {feed_mm_s:.1} mm/s: {:+.1} µm, {blocks} blocks",
+                "  {name}:{}: R {radius_mm:.3} mm at {feed_mm_s:.1} mm/s: {:+.1} µm, {blocks} block{}",
                 report.line,
-                delta_mm * 1e3
+                delta_mm * 1e3,
+                if blocks == 1 { "" } else { "s" }
             )),
         }
     }

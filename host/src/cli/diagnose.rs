@@ -4,7 +4,7 @@ use super::output::Output;
 use super::source::Source;
 use crate::diagnosis::{Diagnosis, Finding, Options, diagnose};
 use crate::model_file::ModelFile;
-use comfy_table::{Table, presets};
+use comfy_table::{CellAlignment, Table, presets};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `giotto diagnose`.
@@ -59,7 +59,7 @@ fn show(name: &str, d: &Diagnosis, extended: Option<&Path>, out: &Output) {
     out.say(format_args!("Simulation: {}", d.baseline.name));
     let m = &d.misfit;
     let mut table = Table::new();
-    table.load_style(presets::UTF8_HORIZONTAL_ONLY).set_header(["misfit of the simulation", "µm rms"]);
+    table.load_style(presets::NOTHING).set_header(["misfit of the simulation", "µm rms"]);
     for (kind, value) in [
         ("size of the circles", m.size_um),
         ("  of which follows campaign time", m.drift_um),
@@ -71,12 +71,13 @@ fn show(name: &str, d: &Diagnosis, extended: Option<&Path>, out: &Output) {
     ] {
         table.add_row([kind.to_string(), format!("{value:.2}")]);
     }
+    right(&mut table, 1);
     out.say(&table);
     if d.findings.is_empty() && !d.unexplained.present && d.cannot_tell.is_empty() {
         out.say("Nothing found: the simulation explains the data.");
     } else if !d.findings.is_empty() {
         let mut table = Table::new();
-        table.load_style(presets::UTF8_HORIZONTAL_ONLY).set_header([
+        table.load_style(presets::NOTHING).set_header([
             "cause",
             "axis",
             "size",
@@ -88,7 +89,10 @@ fn show(name: &str, d: &Diagnosis, extended: Option<&Path>, out: &Output) {
         for f in &d.findings {
             table.add_row(row(f));
         }
+        right(&mut table, 2);
+        out.say("");
         out.say(&table);
+        out.say("");
         for f in &d.findings {
             let words = f.cause.model().words();
             out.say(format_args!(
@@ -133,6 +137,11 @@ fn show(name: &str, d: &Diagnosis, extended: Option<&Path>, out: &Output) {
         ));
     }
     out.say(format_args!("Next: {}", recommendation(d, extended)));
+}
+
+/// Numbers to the right: every column from `first` on.
+fn right(table: &mut Table, first: usize) {
+    table.column_iter_mut().skip(first).for_each(|column| column.set_cell_alignment(CellAlignment::Right));
 }
 
 fn row(f: &Finding) -> [String; 7] {

@@ -6,7 +6,7 @@ use crate::causes::Cause;
 use crate::diagnosis::{Options, diagnose};
 use crate::model_file::ModelFile;
 use crate::planning::{self, Limits, Plan, Purpose};
-use comfy_table::{Table, presets};
+use comfy_table::{CellAlignment, Table, presets};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `giotto plan`.
@@ -120,7 +120,7 @@ fn show(plan: &Plan, out: Output) {
         return;
     }
     let mut table = Table::new();
-    table.load_style(presets::UTF8_HORIZONTAL_ONLY).set_header(["run", "R mm", "f mm/s", "direction", "for"]);
+    table.load_style(presets::NOTHING).set_header(["run", "R mm", "f mm/s", "direction", "for"]);
     for (i, step) in plan.runs.iter().enumerate() {
         table.add_row([
             (i + 1).to_string(),
@@ -138,6 +138,7 @@ fn show(plan: &Plan, out: Output) {
             .to_string(),
         ]);
     }
+    table.column_iter_mut().take(3).for_each(|column| column.set_cell_alignment(CellAlignment::Right));
     out.say(&table);
     for s in &plan.separations {
         let [a, b] = &s.pair;

@@ -84,9 +84,13 @@ impl Stretch {
 /// Chains of feed moves in the plane that are passed without a stop, with the line each starts in.
 fn chains(program: &[u8]) -> Vec<Vec<Stretch>> {
     let mut state = State::new();
+    chains_of(word::lines(program).iter().map(|line| state.step(line)))
+}
+
+fn chains_of(actions: impl Iterator<Item = Action>) -> Vec<Vec<Stretch>> {
     let mut list: Vec<Vec<Stretch>> = vec![Vec::new()];
-    for line in word::lines(program) {
-        let stretch = match state.step(&line) {
+    for action in actions {
+        let stretch = match action {
             Action::Nothing => continue,
             Action::Line(l) => match (l.start, l.end) {
                 ([Some(a), Some(b), _], [Some(c), Some(d), _]) if (c - a).hypot(d - b) > 1e-9 => {
@@ -151,8 +155,7 @@ fn travelled(machine: &Machine, chain: &[Stretch]) -> Vec<[f64; 2]> {
 }
 
 /// Contour errors of a program against the chains of the original, µm: rms and largest of each chain.
-fn contour_um(machine: &Machine, program: &[u8], nominal: &[Vec<Stretch>]) -> Vec<[f64; 2]> {
-    let chains = chains(program);
+fn contour_um(machine: &Machine, chains: &[Vec<Stretch>], nominal: &[Vec<Stretch>]) -> Vec<[f64; 2]> {
     assert_eq!(chains.len(), nominal.len());
     let errors = |(chain, nominal): (&Vec<Stretch>, &Vec<Stretch>)| {
         let off = travelled(machine, chain)
@@ -176,11 +179,63 @@ fn corrected(model: &ModelFile) -> Compensated {
 fn contour_error_of_the_part() {
     let nominal = chains(PLATE.as_bytes());
     for (name, machine, model) in machines() {
-        let before = contour_um(&machine, PLATE.as_bytes(), &nominal);
-        let after = contour_um(&machine, &corrected(&model).program, &nominal);
+        let before = contour_um(&machine, &nominal, &nominal);
+        let after = contour_um(&machine, &chains(&corrected(&model).program), &nominal);
         let worst = |v: &[[f64; 2]], i: usize| v.iter().map(|e| e[i]).fold(0.0, f64::max);
         let [rms, max] = [0, 1].map(|i| 100.0 * worst(&after, i) / worst(&before, i));
         println!("{name}: {before:.2?} -> {after:.2?}: rms {rms:.1} %, max {max:.1} %");
+        assert!(rms <= 5.0 && max <= 5.0, "{name}: rms {rms:.2} %, max {max:.2} %");
+    }
+}
+
+/// The same part as a RAPID module: its lines and arcs as MoveL and MoveC.
+fn module(nominal: &[Vec<Stretch>]) -> String {
+    let target =
+        |[x, y]: [f64; 2]| format!("[[{x:.9},{y:.9},0],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]");
+    let mut text = "MODULE plate\nPROC main()\n".to_owned();
+    for chain in nominal {
+        text += &format!("MoveJ {},v500,fine,tool0;\n", target(chain[0].at(0.0)));
+        for (k, stretch) in chain.iter().enumerate() {
+            let zone = if k + 1 == chain.len() { "fine" } else { "z0" };
+            // Half turns at most in one instruction.
+            let parts = if matches!(stretch, Stretch::Arc { sweep_rad, .. } if sweep_rad.abs() > 3.2) {
+                2
+            } else {
+                1
+            };
+            for part in 0..parts {
+                let at =
+                    |u: f64| target(stretch.at(stretch.length() * (f64::from(part) + u) / f64::from(parts)));
+                let via = if matches!(stretch, Stretch::Arc { .. }) {
+                    format!("C {},", at(0.5))
+                } else {
+                    "L ".into()
+                };
+                text += &format!("Move{via}{},[25,500,5000,1000],{zone},tool0;\n", at(1.0));
+            }
+        }
+    }
+    text + "ENDPROC\nENDMODULE\n"
+}
+
+/// Where the robot goes by a module; a stop ends a chain.
+fn module_chains(program: &[u8]) -> Vec<Vec<Stretch>> {
+    chains_of(super::rapid::actions(program).into_iter())
+}
+
+#[test]
+fn contour_error_of_the_part_in_rapid() {
+    let nominal = chains(PLATE.as_bytes());
+    let original = module(&nominal);
+    let options = Options { acceleration_mm_s2: ACCELERATION_MM_S2, ..Options::default() };
+    for (name, machine, model) in machines() {
+        let result = super::rapid::compensate(original.as_bytes(), &model, &options);
+        assert!(result.arcs.iter().all(|a| matches!(a.fate, Fate::Corrected { .. })), "{:?}", result.arcs);
+        let before = contour_um(&machine, &module_chains(original.as_bytes()), &nominal);
+        let after = contour_um(&machine, &module_chains(&result.program), &nominal);
+        let worst = |v: &[[f64; 2]], i: usize| v.iter().map(|e| e[i]).fold(0.0, f64::max);
+        let [rms, max] = [0, 1].map(|i| 100.0 * worst(&after, i) / worst(&before, i));
+        println!("{name}: rms {rms:.1} %, max {max:.1} %");
         assert!(rms <= 5.0 && max <= 5.0, "{name}: rms {rms:.2} %, max {max:.2} %");
     }
 }

@@ -82,6 +82,14 @@ pub fn compensate(program: &[u8], model: &ModelFile, options: &Options) -> Compe
     out
 }
 
+/// What the lines of a module do, with the stops between them.
+#[cfg(test)]
+pub(super) fn actions(program: &[u8]) -> Vec<Action> {
+    let mut reader = Reader::default();
+    let read = program.split_inclusive(|b| *b == b'\n').map(|line| reader.step(line));
+    read.flat_map(|read| std::iter::once(read.action).chain(read.stops.then_some(Action::Other))).collect()
+}
+
 /// The instructions that take the place of an arc.
 fn blocks(
     arc: &Arc,
