@@ -161,10 +161,10 @@ fn row(f: &Finding) -> [String; 7] {
 /// Four digits, in the form that is short.
 fn number(value: f64) -> String {
     if value != 0.0 && (value.abs() < 1e-3 || value.abs() >= 1e5) {
-        format!("{value:.3e}")
-    } else {
-        format!("{value:.4}")
+        return format!("{value:.3e}");
     }
+    let before_point = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
+    format!("{value:.*}", (3 - before_point).clamp(0, 6) as usize)
 }
 
 /// The one thing to do now, and what it should bring.
