@@ -20,7 +20,7 @@ const RAM: u32 = 32 * 1024;
 const BOARDS: [Memory; 3] = [
     // SSRAM1 as code memory, SSRAM2 as data memory (ARM DAI0386). The flash stand-in is at 0x0010_0000.
     Memory { feature: "CARGO_FEATURE_MPS2_AN386", flash: (0x0000_0000, TEXT), ram: (0x2000_0000, RAM) },
-    // Sectors 0 to 4 of the flash; tables are in 10 and 11 (RM0090 3.3). The first of two RAMs (RM0090 2.3).
+    // Sectors 0 to 4 of the flash; key and tables are in 9 to 11 (RM0090 3.3). The first of two RAMs (RM0090 2.3).
     Memory { feature: "CARGO_FEATURE_STM32F405", flash: (0x0800_0000, TEXT), ram: (0x2000_0000, RAM) },
     Memory { feature: "CARGO_FEATURE_TICKS", flash: (0x0000_0000, 2 * TEXT), ram: (0x2000_0000, 4 * RAM) },
 ];

@@ -62,6 +62,9 @@ enum Command {
         /// The board: `mps2_an386` or `stm32f405`; only the first one's stack can be measured.
         #[arg(long, default_value = "mps2_an386")]
         board: String,
+        /// The image that checks signatures of tables.
+        #[arg(long)]
+        signed: bool,
         /// One JSON document.
         #[arg(long)]
         json: bool,
@@ -90,7 +93,7 @@ fn main() -> ExitCode {
             run_scenarios(&port, &OpenOptions { image, baud }, worn_flash, json)
         }
         Command::Rate { json, check } => run_rate(json, check),
-        Command::Size { board, json, check } => run_size(&board, json, check),
+        Command::Size { board, signed, json, check } => run_size(&board, signed, json, check),
         Command::Faults { frames, share, seed } => run_faults(frames, share, seed),
     };
     match done {
@@ -199,12 +202,13 @@ fn run_rate(as_json: bool, check: bool) -> Result<ExitCode, ControllerError> {
     Ok(if check && !report.meets_bars() { ExitCode::from(5) } else { ExitCode::SUCCESS })
 }
 
-fn run_size(board: &str, as_json: bool, check: bool) -> Result<ExitCode, ControllerError> {
+fn run_size(board: &str, signed: bool, as_json: bool, check: bool) -> Result<ExitCode, ControllerError> {
     let Some(board) = Board::named(board) else {
         eprintln!("error: no board {board}: there are mps2_an386 and stm32f405");
         return Ok(ExitCode::from(2));
     };
-    let report = size::measure(board, &mut |text: &str| eprintln!("{text}"))?;
+    let report =
+        size::measure(board, if signed { &["signed"] } else { &[] }, &mut |text: &str| eprintln!("{text}"))?;
     if as_json {
         println!("{:#}", report.document());
     } else {

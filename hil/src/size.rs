@@ -74,12 +74,16 @@ impl Report {
     }
 }
 
-/// Measures the image of a board: reads the file, and boots it to see how deep its stack goes.
+/// Measures the image of a board with these features: reads the file, and boots it to see how deep its stack goes.
 ///
 /// # Errors
 /// Any [`ControllerError`].
-pub fn measure(board: Board, note: &mut dyn FnMut(&str)) -> Result<Report, ControllerError> {
-    let path = image::ensure(board, note)?;
+pub fn measure(
+    board: Board,
+    features: &[&str],
+    note: &mut dyn FnMut(&str),
+) -> Result<Report, ControllerError> {
+    let path = image::ensure_with(board, features, note)?;
     let stack = deepest_stack(board, &path, note)?;
     let failed = |reason: String| ControllerError::Emulator { reason };
     let image = Image::read(&path).map_err(|error| failed(error.to_string()))?;

@@ -9,7 +9,7 @@ const RAM_GUARD: u32 = 22 * 1024;
 
 #[test]
 fn the_image_keeps_its_size_and_its_tick_cannot_panic() {
-    let report = measure(Board::Mps2An386, &mut |note| eprintln!("{note}")).unwrap();
+    let report = measure(Board::Mps2An386, &[], &mut |note| eprintln!("{note}")).unwrap();
     println!("{:#}", report.document());
     assert!(report.text <= TEXT_GUARD.max(TEXT_BAR), "{} bytes of text", report.text);
     assert!(report.ram() <= RAM_GUARD.max(RAM_BAR), "{} bytes of RAM", report.ram());

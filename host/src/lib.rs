@@ -13,6 +13,7 @@ pub mod gcode;
 pub mod model_file;
 pub mod planning;
 pub mod report;
+pub mod signing;
 pub mod simulation;
 pub mod table_from_model;
 pub mod toml_file;

@@ -7,6 +7,7 @@
 //! buffer of an upload. The order of an update is `WriteBegin`, `WriteChunk`…, `WriteEnd` (the table is
 //! checked in memory, only then is the slot not in use programmed and compared), `Commit` (the engine, at
 //! rest, takes it over on probation), `Confirm` (it is what boots from now on).
+mod authority;
 mod motion;
 mod session;
 mod supervision;
@@ -19,7 +20,7 @@ mod tests;
 
 pub use motion::{Motion, Snapshot, TimedSetPoint};
 
-use crate::store::{ImageBuffer, Layout, Store};
+use crate::store::{ImageBuffer, Layout, Store, StoredKey};
 use core::ops::DerefMut;
 use embedded_storage::nor_flash::NorFlash;
 use giotto_shared::table::{FORMAT_VERSION, MAX_IMAGE_BYTES, SCHEMA_HASH, bounds};
@@ -85,6 +86,7 @@ impl Buffers {
 pub struct Server<F, M, B> {
     board: Board,
     store: Store<F>,
+    key: StoredKey,
     motion: M,
     buffers: B,
     session: Session,
@@ -110,10 +112,12 @@ pub struct Server<F, M, B> {
 impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     /// Boots: the newest confirmed table that this image reads goes to the engine; if there is none, bypass.
     pub fn boot(board: Board, flash: F, layout: Layout, motion: M, mut buffers: B) -> Self {
-        let store = Store::open(flash, layout, &mut buffers.image);
+        let mut store = Store::open(flash, layout, &mut buffers.image);
+        let key = store.key();
         let mut server = Self {
             board,
             store,
+            key,
             motion,
             buffers,
             session: Session::new(),
@@ -272,7 +276,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
                 self.reset = true;
             }
             Command::Supervise { after_ms } => self.supervision.set(after_ms),
-            Command::Provision { .. } => return Err(Refusal::NoSignatures),
+            Command::Provision { key } => self.provision(key)?,
         }
         Ok(Reply::Done)
     }
@@ -334,7 +338,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             schema_hash: SCHEMA_HASH,
             max_image_bytes: MAX_IMAGE_BYTES as u16,
             tick_hz: self.board.tick_hz,
-            signed_only: false,
+            signed_only: self.signed_only(),
         }
     }
 

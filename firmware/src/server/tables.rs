@@ -12,7 +12,10 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
         self.upload.abort();
         let image = self.store.load(slot, &mut self.buffers.image).map_err(Refusal::Flash)?;
         table::check(image).map_err(Refusal::Table)?;
-        self.motion.install(Some(image)).inspect_err(|refusal| {
+        let length = image.len();
+        self.authorised(length)?;
+        let image = self.buffers.image.get(..length);
+        self.motion.install(image).inspect_err(|refusal| {
             if !matches!(refusal, Refusal::Motion(MotionRefusal::Busy)) {
                 self.active = None;
             }
@@ -50,6 +53,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
         let length = self.upload.end(&self.buffers.image)?;
         let image = self.buffers.image.get(..length).ok_or(Refusal::UploadIncomplete)?;
         table::check(image).map_err(Refusal::Table)?;
+        self.authorised(length)?;
         let slot = match self.last_good() {
             Some(0) => 1,
             _ => 0,

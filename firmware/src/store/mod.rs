@@ -1,6 +1,7 @@
 //! Two slots of NOR flash, one table each, and never half a one.
 //!
 //! ```text
+//! key  = one erase unit, if the board has one for it: up to 4 places of 40 bytes (see `key`)
 //! slot = one or more erase units
 //!   0                the image of the table, padded with FF to the write size
 //!   size - 128       16 confirmations of 8 bytes: generation u32, check u32 (little endian)
@@ -21,6 +22,7 @@
 //! No word is programmed twice between erasures (parts with ECC forbid it): the image goes once into a
 //! slot just erased, each confirmation into a place still blank. `sequential-storage` was considered; its map
 //! moves items between pages and erases on its own accord, and costs four times the text for two items.
+mod key;
 mod record;
 
 pub mod power_cut;
@@ -29,7 +31,10 @@ pub mod ram;
 use embedded_storage::nor_flash::NorFlash;
 use giotto_shared::table::{Header, MAX_IMAGE_BYTES, image::FORMAT_VERSION};
 use giotto_shared::wire::{FlashFault, SlotState, TableInfo};
+use key::{KEY_BYTES, KEYS};
 use record::{RECORD_BYTES, Record};
+
+pub use key::{PublicKey, StoredKey};
 
 /// Places for confirmations in a slot.
 pub const RECORDS: usize = 16;
@@ -48,6 +53,8 @@ pub struct Layout {
     pub base: [u32; 2],
     /// Bytes of each slot.
     pub size: u32,
+    /// First byte of the erase unit that keeps the key; `None`: no key can be provisioned.
+    pub key: Option<u32>,
 }
 
 impl Layout {
@@ -58,7 +65,16 @@ impl Layout {
     pub const fn new(base: [u32; 2], size: u32) -> Self {
         assert!(size >= MAX_IMAGE_BYTES as u32 + RECORDS_BYTES, "slot too short");
         assert!(base[0] + size <= base[1], "slots overlap");
-        Self { base, size }
+        Self { base, size, key: None }
+    }
+
+    /// With a place for a key at `at`, in an erase unit of its own.
+    ///
+    /// # Panics
+    /// At compile time, if used for a constant: a place inside a slot.
+    pub const fn with_key(self, at: u32) -> Self {
+        assert!(at < self.base[0] || at >= self.base[1] + self.size, "key inside a slot");
+        Self { key: Some(at), ..self }
     }
 }
 
@@ -81,6 +97,7 @@ pub struct Store<F> {
 impl<F: NorFlash> Store<F> {
     const FITS: () = assert!(
         RECORD_BYTES.is_multiple_of(F::WRITE_SIZE)
+            && KEY_BYTES.is_multiple_of(F::WRITE_SIZE)
             && PIECE.is_multiple_of(F::WRITE_SIZE)
             && F::READ_SIZE == 1,
         "flash geometry not supported"
@@ -138,6 +155,44 @@ impl<F: NorFlash> Store<F> {
 
     fn record_at(&self, slot: u8, index: usize) -> u32 {
         self.base(slot) + self.layout.size - RECORDS_BYTES + (index * RECORD_BYTES) as u32
+    }
+
+    /// The key that tables have to be signed with. One that cannot be read is not one that is not there.
+    pub fn key(&mut self) -> StoredKey {
+        let Some(base) = self.layout.key else { return StoredKey::None };
+        for place in 0..KEYS {
+            let mut bytes = [0; KEY_BYTES];
+            if self.flash.read(base + (place * KEY_BYTES) as u32, &mut bytes).is_err() {
+                return StoredKey::Unreadable;
+            }
+            if let Some(key) = key::read(&bytes) {
+                return StoredKey::Key(key);
+            }
+        }
+        StoredKey::None
+    }
+
+    /// Keeps a key for good. A place that a cut of power has spoilt is left behind.
+    ///
+    /// # Errors
+    /// [`FlashFault::Full`] if there is no blank place, [`FlashFault::Read`], [`FlashFault::Program`],
+    /// [`FlashFault::ReadBack`].
+    pub fn keep_key(&mut self, key: &PublicKey) -> Result<(), FlashFault> {
+        let base = self.layout.key.ok_or(FlashFault::Full)?;
+        for place in 0..KEYS {
+            let at = base + (place * KEY_BYTES) as u32;
+            let mut bytes = [0; KEY_BYTES];
+            self.flash.read(at, &mut bytes).map_err(|_| FlashFault::Read)?;
+            if bytes != [0xff; KEY_BYTES] {
+                continue;
+            }
+            self.flash.write(at, &key::write(key)).map_err(|_| FlashFault::Program)?;
+            return match self.key() {
+                StoredKey::Key(found) if found == *key => Ok(()),
+                _ => Err(FlashFault::ReadBack { offset: at }),
+            };
+        }
+        Err(FlashFault::Full)
     }
 
     /// Bytes of a slot.

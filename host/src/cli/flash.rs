@@ -1,6 +1,6 @@
 //! `giotto flash`: write a table to a controller: inactive slot, read back, commit, confirm.
 use super::port::PortArgs;
-use super::{Failure, Output, table_file};
+use super::{Failure, Output, key, table_file};
 use crate::controller::flash::Progress;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
@@ -11,13 +11,21 @@ use std::path::PathBuf;
 pub struct Args {
     /// Model (MODEL.toml) or table (TABLE.bin).
     file: PathBuf,
+    /// Secret key to sign the table with, for a controller that takes signed ones only (`giotto key`).
+    #[arg(long, value_name = "FILE")]
+    key: Option<PathBuf>,
     #[command(flatten)]
     port: PortArgs,
 }
 
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
-    let file = table_file::read(&args.file, out)?;
+    let mut file = table_file::read(&args.file, out)?;
+    if let Some(key) = &args.key {
+        let signed = key::load(key)?.sign(&file.image);
+        file.image =
+            signed.map_err(|error| Failure::input(format_args!("{}: {error}", args.file.display())))?;
+    }
     let mut controller = args.port.open(out)?;
     let bar = if out.draws() { ProgressBar::new(file.image.len() as u64) } else { ProgressBar::hidden() };
     if let Ok(style) = ProgressStyle::with_template("{msg:12} {bar:32} {bytes}/{total_bytes}") {

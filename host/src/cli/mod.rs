@@ -9,6 +9,7 @@ mod diagnose;
 mod fit;
 mod flash;
 mod import;
+mod key;
 mod man;
 mod monitor;
 mod plan;
@@ -72,6 +73,8 @@ enum Command {
     Table(table::Args),
     /// Write a table to a controller: inactive slot, read back, commit, confirm.
     Flash(flash::Args),
+    /// Keys that tables are signed with.
+    Key(key::Args),
     /// The controller's state and slots.
     Status(status::Args),
     /// Return to the last good table.
@@ -106,6 +109,7 @@ fn dispatch(command: Command, out: Output) -> Result<(), Failure> {
         Command::Compensate(args) => compensate::run(args, out),
         Command::Table(args) => table::run(args, out),
         Command::Flash(args) => flash::run(args, out),
+        Command::Key(args) => key::run(args, out),
         Command::Status(args) => status::run(args, out),
         Command::Rollback(args) => rollback::run(args, out),
         Command::Verify(args) => verify::run(args, out),

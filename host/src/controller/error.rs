@@ -149,6 +149,11 @@ fn refusal_help(refusal: &Refusal) -> Option<&'static str> {
         Refusal::NoTable => "flash a table first",
         Refusal::Motion(MotionRefusal::OutOfBounds { .. }) => "choose a radius and feed inside the bounds",
         Refusal::Flash(_) => "the table in use is untouched; flash again, and replace worn flash",
+        Refusal::Table(TableError::Unsigned | TableError::BadSignature) => {
+            "sign it with the key of this controller: `giotto flash TABLE --key FILE`"
+        }
+        Refusal::KeyProvisioned => "a controller keeps its first key; sign with that one",
+        Refusal::NoSignatures => "build the firmware with its feature `signed`",
         Refusal::Motion(MotionRefusal::StopInput) => "release the stop input",
         Refusal::Motion(MotionRefusal::Fault) => "`giotto status` names the fault; reset the controller",
         Refusal::NotUnderstood => "use the giotto and the firmware of the same release",

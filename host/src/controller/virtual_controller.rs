@@ -18,12 +18,12 @@ use std::time::{Duration, Instant};
 pub const TICK_HZ: u32 = 1000;
 /// Bytes of a slot.
 const SLOT: usize = 4096;
-/// Two slots, each one erase unit.
-const LAYOUT: Layout = Layout::new([0, SLOT as u32], SLOT as u32);
+/// Two slots and the key, each one erase unit.
+const LAYOUT: Layout = Layout::new([0, SLOT as u32], SLOT as u32).with_key(2 * SLOT as u32);
 const BOARD: Board = Board { name: "virtual", build: env!("CARGO_PKG_VERSION"), tick_hz: TICK_HZ };
 
 /// Flash of a virtual controller.
-pub type Flash = RamFlash<{ 2 * SLOT }, SLOT>;
+pub type Flash = RamFlash<{ 3 * SLOT }, SLOT>;
 
 /// A queue whose two ends are in one process.
 #[derive(Debug)]

@@ -1,4 +1,4 @@
-//! The last two sectors of the flash (RM0090 3.6), 128 KiB each, one a slot. Whatever is erased or programmed is read
+//! The last three sectors of the flash (RM0090 3.6), 128 KiB each: the key, and one for each slot. Whatever is erased or programmed is read
 //! back at once: a controller that says "done" is not believed.
 //!
 //! Interrupts are masked meanwhile: the part has one bank, so a core that fetches from it stands still anyway, and the tick
@@ -28,17 +28,17 @@ const BY_WORDS: u32 = 0b10 << 8;
 /// How often the controller is asked whether it is done; the core stands still during most of it.
 const PATIENCE: u32 = 10_000_000;
 
-/// First byte of sector 10.
-const BASE: usize = 0x080c_0000;
-const FIRST_SECTOR: u32 = 10;
+/// First byte of sector 9.
+const BASE: usize = 0x080a_0000;
+const FIRST_SECTOR: u32 = 9;
 const SECTOR: u32 = 128 * 1024;
-const SIZE: usize = 2 * SECTOR as usize;
+const SIZE: usize = 3 * SECTOR as usize;
 const WORD: usize = 4;
 
 /// Where the slots are.
-pub const LAYOUT: Layout = Layout::new([0, SECTOR], SECTOR);
+pub const LAYOUT: Layout = Layout::new([SECTOR, 2 * SECTOR], SECTOR).with_key(0);
 
-/// The two sectors. Nothing else of the image uses them.
+/// The three sectors. Nothing else of the image uses them.
 pub struct Sectors(());
 
 #[allow(unsafe_code, reason = "memory that no Rust object owns")]

@@ -7,7 +7,7 @@
 //! | PC6 (D6) | USART6, the log, in defmt's encoding |
 //! | PC3 (D11) | stop input: a closed contact to ground lets it run; open, or a broken wire, stops |
 //!
-//! Tables are in the last two sectors of the flash. While one is erased the core stands still for a second or two, and so
+//! Key and tables are in the last three sectors of the flash. While one is erased the core stands still for a second or two, and so
 //! does the tick: it happens at rest only, and the watchdog waits for four.
 //!
 //! **Never run on a real board**: what QEMU does not emulate (clock, flash, pins) follows the reference manual (RM0090) and

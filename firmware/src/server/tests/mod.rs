@@ -15,8 +15,8 @@ use std::vec::Vec;
 
 const SLOT: usize = 2048;
 const ERASE: usize = 512;
-const CELLS: usize = 2 * SLOT;
-const LAYOUT: Layout = Layout::new([0, SLOT as u32], SLOT as u32);
+const CELLS: usize = 2 * SLOT + ERASE;
+const LAYOUT: Layout = Layout::new([0, SLOT as u32], SLOT as u32).with_key(2 * SLOT as u32);
 const BOARD: Board = Board { name: "bench", build: "0", tick_hz: 1000 };
 
 type Cells = RamFlash<CELLS, ERASE>;

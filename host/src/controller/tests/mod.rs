@@ -128,3 +128,44 @@ fn a_second_run_waits_for_the_first() {
     }
     controller.run_circle(&circle(0.1, 0.4, Direction::Ccw, 1), 1).unwrap();
 }
+
+fn table_refusal(result: Result<flash::Flashed, ControllerError>) -> table::TableError {
+    match result {
+        Err(ControllerError::Refused(Refusal::Table(error))) => error,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Off until a key is provisioned; from then on, and after a reset, only what it has signed.
+#[test]
+fn only_signed_tables_once_a_key_is_provisioned() {
+    use crate::signing::SigningKey;
+    let (key, other) = (SigningKey::generate(), SigningKey::generate());
+    let mut controller = sim();
+    controller.flash(&image(1.0), &mut |_| {}).unwrap();
+    controller.flash(&key.sign(&image(1.1)).unwrap(), &mut |_| {}).unwrap();
+    controller.flash(&image(1.2), &mut |_| {}).unwrap();
+    controller.command(Command::Provision { key: key.public() }).unwrap();
+    // The unsigned table in use is gone, the signed one before it is back.
+    assert_eq!(controller.verify(&key.sign(&image(1.1)).unwrap()).unwrap(), flash::Verdict::Same { slot: 1 });
+    controller.reset().unwrap();
+    assert!(controller.identity().signed_only);
+    let good = key.sign(&image(1.3)).unwrap();
+    assert_eq!(table_refusal(controller.flash(&image(1.3), &mut |_| {})), table::TableError::Unsigned);
+    let strange = other.sign(&image(1.3)).unwrap();
+    assert_eq!(table_refusal(controller.flash(&strange, &mut |_| {})), table::TableError::BadSignature);
+    // Altered after it was signed, its CRC set right.
+    let mut altered = image(1.4);
+    let signature = &good[good.len() - table::image::SIGNATURE_BYTES..];
+    altered.resize(altered.len() + signature.len(), 0);
+    let length = altered.len() - signature.len();
+    table::image::attach_signature(&mut altered, length, |_, _| signature.try_into().unwrap()).unwrap();
+    assert_eq!(table_refusal(controller.flash(&altered, &mut |_| {})), table::TableError::BadSignature);
+    assert_eq!(controller.verify(&key.sign(&image(1.1)).unwrap()).unwrap(), flash::Verdict::Same { slot: 1 });
+    // Once: the same key again changes nothing, another one is refused.
+    controller.command(Command::Provision { key: key.public() }).unwrap();
+    let again = controller.command(Command::Provision { key: other.public() });
+    assert!(matches!(again, Err(ControllerError::Refused(Refusal::KeyProvisioned))));
+    controller.flash(&good, &mut |_| {}).unwrap();
+    assert_eq!(controller.verify(&good).unwrap(), flash::Verdict::Same { slot: 0 });
+}
