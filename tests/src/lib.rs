@@ -6,6 +6,7 @@
 pub mod command;
 pub mod effects;
 pub mod files;
+pub mod fuzz;
 pub mod machine;
 pub mod paper;
 pub mod study;

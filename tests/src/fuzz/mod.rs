@@ -1,0 +1,32 @@
+//! What is fuzzed: each takes any bytes and panics if something is not as it must be. Run by `tests/fuzz` (libFuzzer, guided
+//! by coverage) and by the binary `fuzz` (random, seeded, everywhere).
+//!
+//! | target | what the bytes are |
+//! |---|---|
+//! | [`frame`] | bytes on the link |
+//! | [`server`] | a conversation: frames, raw bytes, time, resets |
+//! | [`table`] | a table, its header made right if the first byte says so |
+//! | [`boot`] | what the flash holds when the power comes |
+mod bench;
+pub mod boot;
+pub mod frame;
+pub mod server;
+pub mod table;
+
+/// A target: its name, what it does, and bytes to begin with.
+pub struct Target {
+    /// Its name.
+    pub name: &'static str,
+    /// Takes any bytes; panics on a defect.
+    pub run: fn(&[u8]),
+    /// Bytes from which something interesting is near.
+    pub seeds: fn() -> Vec<Vec<u8>>,
+}
+
+/// All targets.
+pub const TARGETS: [Target; 4] = [
+    Target { name: "frame", run: frame::run, seeds: frame::seeds },
+    Target { name: "server", run: server::run, seeds: server::seeds },
+    Target { name: "table", run: table::run, seeds: table::seeds },
+    Target { name: "boot", run: boot::run, seeds: boot::seeds },
+];
