@@ -4,27 +4,29 @@ use crate::campaign::import::{self, Added, Format, Laps, Options};
 use crate::campaign::{Campaign, Direction, Manifest, read_with_notes};
 use std::path::{Path, PathBuf};
 
+/// Heading of these options; given one by one, since a heading for the struct would go on behind it.
+const FOREIGN: &str = "What a foreign file does not say of itself";
+
 /// What a foreign file does not say of itself.
 #[derive(clap::Args, Clone, Debug, Default)]
-#[command(next_help_heading = "A foreign file instead of a campaign")]
 pub struct Foreign {
     /// Programmed radius.
-    #[arg(long, value_name = "MM", value_parser = length)]
+    #[arg(long, help_heading = FOREIGN, value_name = "MM", value_parser = length)]
     radius: Option<f64>,
     /// Programmed feed.
-    #[arg(long, value_name = "MM_S", value_parser = length)]
+    #[arg(long, help_heading = FOREIGN, value_name = "MM_S", value_parser = length)]
     feed: Option<f64>,
     /// Direction of travel; positions tell it themselves.
-    #[arg(long, value_parser = direction, value_name = "ccw|cw")]
+    #[arg(long, help_heading = FOREIGN, value_parser = direction, value_name = "ccw|cw")]
     direction: Option<Direction>,
     /// Layout of the file.
-    #[arg(long, value_enum, default_value = "auto")]
+    #[arg(long, help_heading = FOREIGN, value_enum, default_value = "auto")]
     format: Option<Format>,
     /// Columns by name, - for one to skip, as in time_s,-,x_mm,y_mm.
-    #[arg(long, value_name = "NAMES")]
+    #[arg(long, help_heading = FOREIGN, value_name = "NAMES")]
     columns: Option<String>,
     /// Polar angle of the first sample, for deviations over time.
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    #[arg(long, help_heading = FOREIGN, value_name = "DEG", allow_negative_numbers = true)]
     start_angle: Option<f64>,
 }
 
