@@ -79,7 +79,7 @@ pub(crate) struct Timing {
 /// The operator in a ramp, in fixed point. `W` is the share of the constant rate.
 ///
 /// On an arc the complex gain δ + ib (Q32, |k| < 2³¹):
-/// δ = W²(k1 + k2 W²) + k3 W·xw³ + (k4 w⁴) w⁴, b = w⁴(k5 + k6 W²) + k7 w² + k8 w³.
+/// δ = W²(k1 + k2 W²) + k3 W·xw³ + (k4 w⁴ + k9 W) w⁴, b = w⁴(k5 + k6 W²) + k7 w² + k8 w³.
 /// On a line the offset along it, nm·2: k5 w⁴ + k7 w² + k8 w³.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub(crate) struct Law {
@@ -99,6 +99,8 @@ pub(crate) struct Law {
     pub(crate) k7: i32,
     /// Q31; on a line nm·2³.
     pub(crate) k8: i32,
+    /// Q30.
+    pub(crate) k9: i32,
     /// What the sum of rates lacks of the phase (Euler–Maclaurin), units of 2⁻³² turn at w⁴ = 1, Q1.
     pub(crate) end_term_q1: i32,
 }
@@ -111,6 +113,7 @@ impl Law {
             k6: -self.k6,
             k7: -self.k7,
             k8: -self.k8,
+            k9: -self.k9,
             end_term_q1: -self.end_term_q1,
             ..self
         }
@@ -128,7 +131,8 @@ impl Law {
         let rate2 = mulh(f.s_q31, f.s_q31).wrapping_mul(2);
         let main = mulh(mulh_add(self.k1, self.k2, rate2), rate2);
         let jerk = mulh(f.s_q31, f.xw3_q29);
-        let fine = mulh_add(mulh(self.k3, jerk), mulh(self.k4, f.w4_q31), f.w4_q31);
+        let change = mulh_add(mulh(self.k4, f.w4_q31), self.k9, f.s_q31);
+        let fine = mulh_add(mulh(self.k3, jerk), change, f.w4_q31);
         let radial = main.wrapping_add(fine.wrapping_mul(16));
         let ahead = mulh(mulh_add(self.k5, self.k6, rate2), f.w4_q31);
         let snap = mulh_add(mulh(self.k7, f.w2_q31), self.k8, f.w3_q30);

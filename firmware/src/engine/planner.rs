@@ -320,7 +320,7 @@ impl Planner {
             let mut ramp = ramp_ticks;
             for _ in 0..6 {
                 let slower = timing(ramp);
-                if let Some((law, radial)) = self.law_on_arc(&zone.operator, &slower) {
+                if let Some((law, radial)) = self.law_on_arc(zone, &slower) {
                     (segment.rise, segment.timing) = (law, slower);
                     self.bound(&mut segment);
                     for axis in &mut segment.axes {
@@ -367,7 +367,8 @@ impl Planner {
     }
 
     /// The operator's fixed-point form on a circle, and its gain at constant rate; `None` if a gain is beyond [`MAX_GAIN`].
-    fn law_on_arc(&self, operator: &Operator<f64>, timing: &Timing) -> Option<(Law, f64)> {
+    fn law_on_arc(&self, zone: &Built, timing: &Timing) -> Option<(Law, f64)> {
+        let (operator, third_s3) = (&zone.operator, zone.third_s3);
         let rate = timing.step as f64 / TURN * TAU / self.config.tick_s();
         let t = f64::from(timing.ramp_ticks) * self.config.tick_s();
         let steady = operator.gain(&AngularMotion { rate, ..Default::default() });
@@ -390,13 +391,15 @@ impl Planner {
             (-6.0 * b * rate * rate * rate * FIRST / t, 34),
             (snap, 30),
             (-7.0 / 6.0 * snap, 31),
+            // (κ3/6) p‴ along the radius: Re(iω)³ and the rest of it only delay.
+            (-3.0 * third_s3 * rate * rate * FIRST / t, 30),
         ];
         let fits = k.iter().all(|&(k, bits)| libm::fabs(k) * (1u64 << bits) as f64 <= 0.98 * 2_147_483_648.0);
         if !(worst <= MAX_GAIN && fits) {
             return None;
         }
-        let [k1, k2, k3, k4, k5, k6, k7, k8] = k.map(|(k, bits)| to_fixed(k, bits));
-        Some((Law { k1, k2, k3, k4, k5, k6, k7, k8, end_term_q1: 0 }, steady.radial))
+        let [k1, k2, k3, k4, k5, k6, k7, k8, k9] = k.map(|(k, bits)| to_fixed(k, bits));
+        Some((Law { k1, k2, k3, k4, k5, k6, k7, k8, k9, end_term_q1: 0 }, steady.radial))
     }
 
     /// Whether offset and change of offset stay within their bounds all along, with a tenth to spare.

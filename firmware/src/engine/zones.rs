@@ -26,6 +26,8 @@ pub(crate) struct Asked {
 #[derive(Clone, Debug)]
 pub(crate) struct Built {
     pub(crate) operator: Operator<f64>,
+    /// κ3/6, s³, assumed (see [`Cumulants::third_of_lag_and_average`]): used where the feed changes on an arc.
+    pub(crate) third_s3: f64,
     /// `None`: no profile terms.
     pub(crate) profile: Option<Profile<f64>>,
     /// Where position errors are counted from: the middle of the zone's place.
@@ -56,7 +58,8 @@ impl Built {
             [middle(0), middle(1), middle(2)]
         });
         let profile = (!terms.is_empty()).then_some(profile);
-        Ok(Self { operator: Operator::new(&cumulants), profile, reference_m })
+        let third_s3 = cumulants.third_of_lag_and_average() / 6.0;
+        Ok(Self { operator: Operator::new(&cumulants), third_s3, profile, reference_m })
     }
 }
 
