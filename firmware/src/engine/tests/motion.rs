@@ -74,8 +74,8 @@ fn pieces_join_exactly_and_the_path_closes() {
     no_jump(&out, 0.24 * DT);
     let (nominal, corrected) = accelerations(&out);
     std::println!("rounded rectangle, 0.2 m/s: programmed {nominal:.3} m/s², commanded {corrected:.3} m/s²");
-    // 0.2²/0.01 = 4 m/s² in the corners; the path limit is 5 m/s².
-    assert!(nominal < 5.0 && corrected < 5.0 * 1.5, "{nominal} {corrected}");
+    // 0.2²/0.01 = 4 m/s² in the corners; the limit is 5 m/s².
+    assert!(nominal <= 5.0 && corrected <= 5.0, "{nominal} {corrected}");
 }
 
 #[test]
