@@ -122,12 +122,16 @@ impl Planner {
         // Centripetal acceleration, with what the correction adds, takes at most nine tenths of the limit.
         let limit = self.config.motion.acceleration_m_s2;
         let feed = feed.min(libm::sqrt(0.9 / (1.0 + MAX_GAIN) * limit * radius));
+        // The feed is that in the plane: a steep helix is slower, so that feed and acceleration hold along its axis too.
+        let slope = libm::fabs(rise) / (sweep * radius);
+        let feed = feed.min(self.config.motion.feed_m_s / slope.max(1e-9));
+        let steep = libm::sqrt(1.0 + slope * slope);
         let mut stretch = 1.0;
         let mut segment = loop {
             let (ramp_ticks, cruise_ticks) = self.profile(sweep * radius, feed, stretch)?;
             let timing = |ramp_ticks| share_out(whole, ramp_ticks, cruise_ticks);
             let (segment, worst) = self.round(&round, ramp_ticks, timing)?;
-            match self.stretch(stretch, worst.acceleration_per_s2 * radius, limit) {
+            match self.stretch(stretch, worst.acceleration_per_s2 * radius * steep, limit) {
                 Some(longer) => stretch = longer,
                 None => break segment,
             }

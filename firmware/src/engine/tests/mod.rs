@@ -1,6 +1,7 @@
 //! Set-points against an independent `f64` statement of the law.
 extern crate std;
 mod contour;
+mod endurance;
 mod motion;
 mod terms;
 
