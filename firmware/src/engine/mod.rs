@@ -8,6 +8,27 @@
 //!
 //! Positions are `i32` nanometres in machine coordinates (±2.147 m), so that bypass equals the input bit for bit and
 //! nothing is lost at 1 m. Phases are integers: no drift however long a run.
+//!
+//! What a program may ask for, and what it gets: the feed along the path is the one asked for, or less where the length
+//! or, on arcs of a program, the centripetal acceleration does not allow it (a [`CircleRun`] keeps its feed: it is there
+//! to be measured). Segments join at an exact stop. Ramps are long enough that the *commanded* path, with what the operator
+//! adds, keeps the configured acceleration; play taken up and friction pulses come on top of it.
+//!
+//! Measured, in simulation:
+//!
+//! | what | bar | measured | by |
+//! |---|---|---|---|
+//! | set-point against the law in `f64`, R ≤ 1 m | 0.1 µm | 0.013 µm | `set_points_are_the_law…` |
+//! | sine and cosine over all 2³² phases | 5e-7 | SINCOS_RESULT | `cargo test --release -p giotto-shared -- --ignored sincos` |
+//! | contour error left, of the uncorrected: circle; ellipse, figure of eight (stream) | 1, 2, 5 % | 0.03, 1.2, 3.7 % | `contour` |
+//! | arc between lines, rounded rectangle; the same on a machine of two lags | 5 % | 0.2, 0.4 %; 0.6, 0.8 % | `contour` |
+//! | commanded acceleration in 150 random programs | 5 m/s² | 4.91 m/s² | `random_programs_keep…` |
+//! | random programs with stops, bypass and overruns | 1e9 ticks | ENDURE_RESULT | `cargo test --release -p giotto-firmware -- --ignored endurance` |
+//!
+//! On arcs with joints the residue was the third cumulant, which no circle shows: it is assumed to be that of a lag
+//! and a moving average with the table's κ2 and κ4, if there are such
+//! ([`third_of_lag_and_average`](giotto_shared::model::Cumulants::third_of_lag_and_average)), and acts only where the
+//! feed changes on an arc. At constant feed the set-points are those of κ2 and κ4 alone.
 pub mod bench;
 mod config;
 mod engage;

@@ -145,10 +145,13 @@ impl Executor {
 
     #[inline(never)]
     fn on_helix(&self, flat: [i32; 3], phase_q32: u32) -> [i32; 3] {
-        // A ramp's sum of steps runs ahead of the phase and may have passed a whole turn before it.
+        // In a ramp the sum of steps is a little ahead of the phase, at its very end a little behind: the one may have
+        // passed a whole turn and the other not.
         let sum_q32 = (self.phase >> 32) as u32;
-        let early = sum_q32 < phase_q32 && phase_q32.wrapping_sub(sum_q32) > 1 << 31;
-        let turns = self.turns.wrapping_sub(i32::from(early));
+        let ahead = sum_q32.wrapping_sub(phase_q32) as i32;
+        let early = ahead > 0 && sum_q32 < phase_q32;
+        let late = ahead < 0 && sum_q32 > phase_q32;
+        let turns = self.turns.wrapping_add(i32::from(late)).wrapping_sub(i32::from(early));
         let [x, y, z] = self.segment.risen(turns, phase_q32);
         let [bx, by, bz] = self.segment.risen(0, (self.segment.timing.start >> 32) as u32);
         let [fx, fy, fz] = flat;

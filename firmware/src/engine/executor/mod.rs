@@ -1,9 +1,22 @@
 //! The tick: one set-point for each axis, every time it is called.
 //!
 //! Timing contract: [`Executor::tick`] is called once per period from the highest-priority interrupt. It has no loop
-//! whose length depends on data, no division, no `f64`, no allocation, and cannot panic; its longest path is counted
-//! in instructions by `giotto-hil ticks`. What it runs was prepared by the planner in the background and comes
-//! through an [`Inbox`] by value, so that a new table never acts inside a segment.
+//! whose length depends on data, no division, no `f64`, no allocation, and cannot panic. Phases are integers; one sine and
+//! cosine serve position, correction and all linear terms, and each periodic error takes one more. What it runs was
+//! prepared by the planner in the background and comes through an [`Inbox`] by value, so that a new table never
+//! acts inside a segment.
+//!
+//! Longest ticks on a Cortex-M4F, in instructions (`giotto-hil ticks` counts them; the wider bars are those of its issue):
+//!
+//! | tick | steady | at most |
+//! |---|---|---|
+//! | arc, β model (`arc`) | 96 | 149, in a ramp |
+//! | arc with eight profile terms, both axes with play and friction pulses (`arc`) | 191 | 281, in a ramp in which an axis reverses |
+//! | set-point of a stream ([`super::Stream`]) | 144 | 150 |
+//!
+//! These are arcs whose bounds the planner proved; all else (lines, helices, arcs at their bounds, stops in a ramp,
+//! engagement) runs in `curve` and `between` and takes longer, a helix with the same eight terms 556 at most; between two
+//! ticks of 8 kHz at 25 MHz are 3125.
 mod arc;
 mod between;
 mod curve;

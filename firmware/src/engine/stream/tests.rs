@@ -77,6 +77,23 @@ fn the_correction_is_the_operator() {
     assert!(worst < 10.0, "{worst} nm");
 }
 
+#[test]
+fn noise_comes_out_as_often_as_stated() {
+    let plan = plan();
+    let mut stream = Stream::new(&plan, [0; 3], 0, false);
+    let (mut state, mut noise, mut offset) = (1u32, 0.0, 0.0);
+    for n in 0..100_000u32 {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let x = (state >> 16) as i32 - (1 << 15);
+        let out = stream.tick(Some(StreamSample { sequence: n as u16, position_nm: [x, 0, 0] }));
+        noise += f64::from(x).powi(2);
+        offset += f64::from(out.corrected_nm[0] - out.nominal_nm[0]).powi(2);
+    }
+    let (measured, stated) = ((offset / noise).sqrt(), plan.noise_gain());
+    std::println!("noise gain {measured:.3}, stated {stated:.3}");
+    assert!((measured / stated - 1.0).abs() < 0.02);
+}
+
 fn largest_steps(out: &[Output]) -> (f64, f64) {
     let mut speed = 0.0f64;
     let mut acceleration = 0.0f64;
