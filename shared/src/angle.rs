@@ -6,7 +6,7 @@ use core::f64::consts::{PI, TAU};
 pub const RAD_PER_UNIT: f64 = 2.0 * PI / 4_294_967_296.0;
 
 /// Largest error of [`sincos`] over all 2³² phases, of full scale 1.
-pub const SINCOS_ERROR: f64 = 2.2e-9;
+pub const SINCOS_ERROR: f64 = 2.3e-9;
 
 /// Bits of the phase that choose a place of the table.
 const BITS: u32 = 8;

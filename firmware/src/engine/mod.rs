@@ -19,11 +19,11 @@
 //! | what | bar | measured | by |
 //! |---|---|---|---|
 //! | set-point against the law in `f64`, R ≤ 1 m | 0.1 µm | 0.013 µm | `set_points_are_the_law…` |
-//! | sine and cosine over all 2³² phases | 5e-7 | SINCOS_RESULT | `cargo test --release -p giotto-shared -- --ignored sincos` |
+//! | sine and cosine over all 2³² phases | 5e-7 | 2.26e-9 | `cargo test --release -p giotto-shared -- --ignored sincos` |
 //! | contour error left, of the uncorrected: circle; ellipse, figure of eight (stream) | 1, 2, 5 % | 0.03, 1.2, 3.7 % | `contour` |
 //! | arc between lines, rounded rectangle; the same on a machine of two lags | 5 % | 0.2, 0.4 %; 0.6, 0.8 % | `contour` |
 //! | commanded acceleration in 150 random programs | 5 m/s² | 4.91 m/s² | `random_programs_keep…` |
-//! | random programs with stops, bypass and overruns | 1e9 ticks | ENDURE_RESULT | `cargo test --release -p giotto-firmware -- --ignored endurance` |
+//! | random programs with stops, bypass and overruns | 1e9 ticks | 1.0e9 ticks of 72,599 programs (seed 1): no fault without its cause, 55,538 undisturbed ends exact to the nanometre | `cargo test --release -p giotto-firmware -- --ignored endurance` |
 //!
 //! On arcs with joints the residue was the third cumulant, which no circle shows: it is assumed to be that of a lag
 //! and a moving average with the table's κ2 and κ4, if there are such

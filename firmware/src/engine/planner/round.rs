@@ -117,6 +117,10 @@ impl Planner {
         }
         let v = cross(n, u).map(|a| a * sign);
         let rise_per_turn = n.map(|a| a * rise * TAU / sweep);
+        // Steeper than that it is more of a line: the travel of a whole turn would not fit into a coordinate.
+        if rise_per_turn.iter().any(|travel| libm::fabs(*travel) > MAX_POSITION_M) {
+            return Err(Refused::OutOfBounds("rise"));
+        }
         let round = Round { centre, u, v, radius, rise_per_turn, feed, ccw: n[2] * sign >= 0.0 };
         let whole = (sweep / TAU * TURN) as u128;
         // Centripetal acceleration, with what the correction adds, takes at most nine tenths of the limit.

@@ -89,7 +89,9 @@ fn random_programs_keep_the_configured_acceleration_on_the_commanded_path() {
         let from_m = engine.planner.position_nm().map(|nm| f64::from(nm) * 1e-9);
         let pieces = [segment(&mut random, from_m), Segment::Line { to_m: random.point(), feed_m_s: 0.9 }];
         for piece in pieces {
-            engine.push(&piece).unwrap();
+            // Helices too steep are refused.
+            let refused = engine.push(&piece).err();
+            assert!(refused.is_none_or(|why| why == Refused::OutOfBounds("rise")), "{refused:?}");
         }
         let out = run_out(&mut engine);
         let (nominal, corrected) = accelerations(&out);
