@@ -38,6 +38,8 @@ pub struct Explained {
     pub teeth: Vec<Teeth>,
     /// A tone in time, if there is one.
     pub tone: Option<Tone>,
+    /// Energy of what was taken out before the search, teeth and tone, m².
+    pub apart_m2: f64,
 }
 
 /// What stands before the search.
@@ -259,7 +261,10 @@ fn pass(
         }
     }
     let all = vec![1.0; runs.len()];
+    let apart_m2 = seen.tone.iter().flat_map(|tone| &tone.energy_m2).sum::<f64>()
+        + seen.teeth.iter().map(|teeth| roughness::energy_m2(teeth, &runs)).sum::<f64>();
     let mut found = Explained {
+        apart_m2,
         solution: Solution {
             coefficients: Vec::new(),
             covariance: nalgebra::DMatrix::zeros(0, 0),
@@ -357,6 +362,8 @@ pub fn prune(found: &Explained, weights: &[f64], mut set: Vec<usize>, barred: &m
     let count: f64 = found.ledger.samples(0).iter().zip(weights).map(|(run, w)| w * run.len() as f64).sum();
     loop {
         let (each, whole) = energies_of(found, weights, &set);
+        // Beside what was taken out before, too, the search's own may be the error of another's form.
+        let whole = whole + found.apart_m2 * weights.iter().sum::<f64>() / weights.len().max(1) as f64;
         let smallest = each
             .iter()
             .enumerate()

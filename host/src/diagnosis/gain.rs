@@ -246,7 +246,9 @@ fn fold(
             let x = run.feed_m_s.powi(2) / run.radius_m;
             let size = beta[0] * x + beta[1] * x * x / run.radius_m;
             let flat = |value: f64| left(&vec![value; run.samples.deviation_m.len()]);
-            let scatter = found.spread.order_m2[0] + found.spread.order_m2[2..].iter().sum::<f64>();
+            // The phase of a tone is new in each run: no model could foretell it.
+            let tone = found.tone.as_ref().map_or(0.0, |tone| tone.energy_m2[i].max(0.0)) / samples;
+            let scatter = tone + found.spread.order_m2[0] + found.spread.order_m2[2..].iter().sum::<f64>();
             Errors {
                 run: i,
                 extended: extended.as_ref().map_or(base, &simulated),

@@ -32,6 +32,8 @@ const SPIKE_S: f64 = 0.25;
 /// Variance ratio above which a bin is rough, and the significance it needs.
 const ROUGH: f64 = 1.6;
 const SIGNIFICANT: f64 = 8.0;
+/// Variance ratio of the slow parts of runs that have fast parts too.
+const CONTRAST: f64 = 1.25;
 
 /// Looks for teeth on both axes.
 pub fn find(runs: &[Prepared], residual: &Samples, spread: &Spread) -> Vec<Teeth> {
@@ -113,6 +115,9 @@ fn find_on(
     }
     let significance = rough.iter().map(|&bin| excess(bin).1).fold(0.0, f64::max);
     let below_m_s = FIRST_EDGE_M_S * 2f64.powf(0.5 * (highest + 1) as f64);
+    if !contrast(axis, below_m_s, runs, residual, spread.noise_m2) {
+        return None;
+    }
     // Height from each run with enough of the zone.
     let heights: Vec<(f64, f64)> = runs
         .iter()
@@ -144,8 +149,42 @@ fn find_on(
     }
     let height_m = heights.iter().map(|h| h.0 * h.1).sum::<f64>() / weight;
     let variance = heights.iter().map(|h| h.1 * (h.0 - height_m).powi(2)).sum::<f64>() / weight;
-    let se_m = (variance / (heights.len() - 1) as f64).sqrt().max(0.05 * height_m);
+    let se_m = (variance / (heights.len() - 1) as f64).sqrt().max(0.07 * height_m);
     Some(Teeth { axis, below_m_s, height_m, se_m, significance })
+}
+
+/// Runs in which the axis is both slow and fast have to be rough where it is slow and smooth where it is fast: a
+/// tone seen by a slow sampling is rough all around its run, and slow runs are those in which the axis is slow.
+fn contrast(axis: Axis, below_m_s: f64, runs: &[Prepared], residual: &Samples, noise_m2: f64) -> bool {
+    let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
+    for (run, left) in runs.iter().zip(residual) {
+        let (mut own, mut count) = ([0.0; 2], [0.0; 2]);
+        for i in 1..left.len().saturating_sub(1) {
+            let speed = axis_speed(run, axis, i);
+            if (0.6 * below_m_s..1.5 * below_m_s).contains(&speed) {
+                continue;
+            }
+            let at = usize::from(speed > below_m_s);
+            own[at] += ((left[i - 1] - 2.0 * left[i] + left[i + 1]).powi(2) / 6.0).min(400.0 * noise_m2);
+            count[at] += 1.0;
+        }
+        if count.iter().all(|n| *n >= 20.0) {
+            for at in 0..2 {
+                sums[at] += own[at];
+                counts[at] += count[at];
+            }
+        }
+    }
+    let ratio = |at: usize| sums[at] / (counts[at] * noise_m2).max(f64::MIN_POSITIVE);
+    counts[0] >= 50.0 && ratio(0) > CONTRAST && ratio(0) - 1.0 > 2.0 * (ratio(1) - 1.0).max(0.0)
+}
+
+/// Energy of the teeth on the samples that are hidden for them, m².
+pub fn energy_m2(teeth: &Teeth, runs: &[Prepared]) -> f64 {
+    let hidden: usize =
+        runs.iter().map(|run| (0..run.hidden.len()).filter(|&i| teeth.covers(run, i)).count()).sum();
+    // A ramp from nothing to the height, seen along the radius.
+    hidden as f64 * teeth.height_m.powi(2) / 3.0 * 0.5
 }
 
 impl Teeth {

@@ -3,6 +3,7 @@ use super::duration::Clamp;
 use super::explain::{Explained, energies};
 use super::finding::{Estimate, Finding};
 use super::linear::solve;
+use super::roughness;
 use super::search::{Kind, columns_of, evidence, select};
 use super::tone::{Amplitude, Tone};
 use crate::causes::{Cause, Effect};
@@ -19,18 +20,8 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
     let samples: f64 = found.runs.iter().map(|run| run.deviation_m.len() as f64).sum();
     let (each, _) = energies(found, &weights);
     let tone_energy: f64 = found.tone.iter().flat_map(|tone| &tone.energy_m2).sum::<f64>().max(0.0);
-    let teeth_energy: Vec<f64> = found
-        .teeth
-        .iter()
-        .map(|teeth| {
-            let hidden: usize = found
-                .runs
-                .iter()
-                .map(|run| (0..run.hidden.len()).filter(|&i| teeth.covers(run, i)).count())
-                .sum();
-            hidden as f64 * teeth.height_m.powi(2) / 3.0 * 0.5
-        })
-        .collect();
+    let teeth_energy: Vec<f64> =
+        found.teeth.iter().map(|teeth| roughness::energy_m2(teeth, &found.runs)).collect();
     let total = each.iter().sum::<f64>()
         + tone_energy
         + teeth_energy.iter().sum::<f64>()
@@ -124,7 +115,13 @@ fn without_bent(findings: Vec<Finding>, (pieces, energy): (usize, f64), found: &
         .filter(|f| {
             let flexible = !f.cause.model().shape_names().is_empty() || f.cause == Cause::LateralPlay;
             let piece = flexible && pieces >= PIECES && f.rms_um < 3.0 * unexplained_um;
-            f.probability >= 0.5 && !piece
+            // Teeth smear out of the zone in which they are hidden.
+            let smear = flexible
+                && found.teeth.iter().filter(|teeth| f.axis == Some(teeth.axis)).any(|teeth| {
+                    let teeth_um = (roughness::energy_m2(teeth, &found.runs) / samples).sqrt() * 1e6;
+                    f.rms_um < 0.25 * teeth_um
+                });
+            f.probability >= 0.5 && !piece && !smear
         })
         .collect()
 }
