@@ -198,18 +198,21 @@ impl Extra {
                 extra.turning.fade[i] = to_fixed(libm::expm1(-m.tick_s / spike.decay_s), 32);
             }
         }
-        for c in p.cyclic.iter().filter(|c| c.amplitude_m != 0.0) {
+        let mut periodic = 0;
+        let cyclic = p.cyclic.iter().filter(|c| c.amplitude_m != 0.0);
+        for (built, c) in extra.cyclic.iter_mut().zip(cyclic) {
             let axis = |value: i32| if c.axis == 1 { [0, value] } else { [value, 0] };
             let per_nm = 4.294_967_296 / c.pitch_m;
             let whole = libm::round(per_nm);
-            extra.cyclic[usize::from(extra.periodic)] = Cyclic {
+            *built = Cyclic {
                 amplitude: axis(nm2(-c.amplitude_m)),
                 per_nm: axis(whole as i64 as i32),
                 rest_q32: axis(to_fixed(per_nm - whole, 32)),
                 phase: phase_from_rad(c.phase_rad),
             };
-            extra.periodic += 1;
+            periodic += 1;
         }
+        extra.periodic = periodic;
         extra.sided = sides != [[0.0; 2]; 2] || extra.turning.spike != [0; 2];
         extra
     }
