@@ -1,9 +1,16 @@
 //! A link that breaks bytes on purpose: flip, drop, duplicate, delay, truncate, split, join, burst. Seeded.
+use crate::ticks::largest_table;
+use giotto::controller::flash::Verdict;
 use giotto::controller::link::Link;
+use giotto::controller::virtual_controller::VirtualLink;
+use giotto::controller::{Controller, ControllerError};
+use giotto_shared::table::{self, MAX_IMAGE_BYTES};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::collections::VecDeque;
 use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
 /// A way to break a piece of the stream.
@@ -41,19 +48,43 @@ impl Fault {
     ];
 }
 
+/// What has passed and what was broken, both ways.
+#[derive(Debug, Default)]
+pub struct Tally {
+    pieces: AtomicU64,
+    to_controller: AtomicU64,
+    broken: [AtomicU64; Fault::ALL.len()],
+}
+
+impl Tally {
+    /// Pieces that passed, broken or not.
+    pub fn pieces(&self) -> u64 {
+        self.pieces.load(Relaxed)
+    }
+
+    /// Those of them that hold a frame for the controller.
+    pub fn frames_sent(&self) -> u64 {
+        self.to_controller.load(Relaxed)
+    }
+
+    /// Pieces broken, by kind.
+    pub fn broken(&self) -> [(Fault, u64); Fault::ALL.len()] {
+        std::array::from_fn(|kind| (Fault::ALL[kind], self.broken[kind].load(Relaxed)))
+    }
+}
+
 /// What breaks pieces of one direction.
 #[derive(Debug)]
 struct Breaker {
     random: ChaCha8Rng,
     share: f64,
     delayed: Vec<u8>,
-    pieces: u64,
-    broken: u64,
+    tally: Arc<Tally>,
 }
 
 impl Breaker {
-    fn new(seed: u64, share: f64) -> Self {
-        Self { random: ChaCha8Rng::seed_from_u64(seed), share, delayed: Vec::new(), pieces: 0, broken: 0 }
+    fn new(seed: u64, share: f64, tally: Arc<Tally>) -> Self {
+        Self { random: ChaCha8Rng::seed_from_u64(seed), share, delayed: Vec::new(), tally }
     }
 
     /// A place in the piece.
@@ -62,13 +93,14 @@ impl Breaker {
     }
 
     fn pass(&mut self, piece: &[u8]) -> Vec<u8> {
-        self.pieces += 1;
+        self.tally.pieces.fetch_add(1, Relaxed);
         let mut out = piece.to_vec();
         let held = std::mem::take(&mut self.delayed);
         if !piece.is_empty() && self.random.random_bool(self.share) {
-            self.broken += 1;
             let at = self.place(piece);
-            match Fault::ALL[self.random.random_range(0..Fault::ALL.len())] {
+            let kind = self.random.random_range(0..Fault::ALL.len());
+            self.tally.broken[kind].fetch_add(1, Relaxed);
+            match Fault::ALL[kind] {
                 Fault::Flip => out[at] ^= 1 << self.random.random_range(0..8),
                 Fault::Drop => drop(out.remove(at)),
                 Fault::Duplicate => out.extend_from_slice(piece),
@@ -100,19 +132,22 @@ pub struct FaultyLink<L> {
 impl<L: Link> FaultyLink<L> {
     /// Breaks `share` of the pieces that pass, each way.
     pub fn new(inner: L, seed: u64, share: f64) -> Self {
-        let (to_controller, to_host) = (Breaker::new(seed, share), Breaker::new(!seed, share));
-        Self { inner, to_controller, to_host, pending: VecDeque::new() }
+        let tally = Arc::new(Tally::default());
+        let breaker = |seed| Breaker::new(seed, share, Arc::clone(&tally));
+        Self { inner, to_controller: breaker(seed), to_host: breaker(!seed), pending: VecDeque::new() }
     }
 
-    /// Pieces that passed, and those that were broken.
-    pub fn counts(&self) -> (u64, u64) {
-        let [a, b] = [&self.to_controller, &self.to_host];
-        (a.pieces + b.pieces, a.broken + b.broken)
+    /// The counts, which go on while the link is in use.
+    pub fn tally(&self) -> Arc<Tally> {
+        Arc::clone(&self.to_host.tally)
     }
 }
 
 impl<L: Link> Link for FaultyLink<L> {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        // The zero that a client sends before a frame is a piece, but no frame.
+        let frame = u64::from(bytes.len() > 1);
+        self.to_controller.tally.to_controller.fetch_add(frame, Relaxed);
         let broken = self.to_controller.pass(bytes);
         self.inner.send(&broken)
     }
@@ -137,4 +172,60 @@ impl<L: Link> Link for FaultyLink<L> {
     fn now(&self) -> Duration {
         self.inner.now()
     }
+}
+
+/// What came of flashing over a link that breaks what passes.
+#[derive(Debug)]
+pub struct Report {
+    /// Tables flashed.
+    pub flashes: u64,
+    /// Flashes that were given up, and begun anew.
+    pub retries: u64,
+    /// Requests repeated.
+    pub repeats: u32,
+    /// Times that a table was in use that is neither the old nor the new one.
+    pub wrong: u64,
+    /// What passed.
+    pub tally: Arc<Tally>,
+}
+
+/// The largest table, with a number for its name.
+fn table(number: u64) -> Vec<u8> {
+    let mut image = largest_table();
+    let Ok(mut table) = table::decode(&image) else { return image };
+    table.machine = number.to_string().chars().collect();
+    image.resize(MAX_IMAGE_BYTES, 0);
+    let length = table::encode(&table, &mut image).unwrap_or(0);
+    image.truncate(length);
+    image
+}
+
+/// Flashes one table after the other until so many frames have been sent to the virtual controller, and looks after each
+/// which table is in use.
+///
+/// # Errors
+/// Those of opening the session.
+pub fn flash_over_faults(frames: u64, share: f64, seed: u64) -> Result<Report, ControllerError> {
+    let link = FaultyLink::new(VirtualLink::new(), seed, share);
+    let tally = link.tally();
+    let mut controller = Controller::connect(Box::new(link), "sim with faults", 1)?;
+    let mut report = Report { flashes: 0, retries: 0, repeats: 0, wrong: 0, tally };
+    let mut good: Option<Vec<u8>> = None;
+    while report.tally.frames_sent() < frames {
+        let new = table(report.flashes);
+        match controller.flash(&new, &mut |_| {}) {
+            Ok(_) => {
+                report.flashes += 1;
+                good = Some(new.clone());
+            }
+            Err(_) => report.retries += 1,
+        }
+        let verdicts: Vec<_> = good.iter().chain([&new]).map(|image| controller.verify(image)).collect();
+        let same = verdicts.iter().any(|verdict| matches!(verdict, Ok(Verdict::Same { .. })));
+        let unknown = verdicts.iter().all(Result::is_err);
+        let none_yet = good.is_none() && verdicts.iter().any(|verdict| matches!(verdict, Ok(Verdict::None)));
+        report.wrong += u64::from(!(same || unknown || none_yet));
+    }
+    report.repeats = controller.repeats();
+    Ok(report)
 }

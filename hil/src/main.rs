@@ -2,11 +2,9 @@
 #![forbid(unsafe_code)]
 
 use clap::{Parser, Subcommand};
-use giotto::controller::flash::Verdict;
-use giotto::controller::virtual_controller::VirtualLink;
+use giotto::controller::ControllerError;
 use giotto::controller::{Board, OpenOptions, Port, open};
-use giotto::controller::{Controller, ControllerError};
-use giotto_hil::faults::FaultyLink;
+use giotto_hil::faults;
 use giotto_hil::scenarios::{self, Outcome};
 use giotto_hil::ticks::{self, Counts, TERMS};
 use giotto_hil::{rate, size};
@@ -233,52 +231,20 @@ fn names(names: impl Iterator<Item = impl std::fmt::Display>) -> String {
     if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 
-/// The table with `count` in its name.
-fn table(count: u64) -> Vec<u8> {
-    let mut image = ticks::largest_table();
-    let Ok(mut table) = giotto_shared::table::decode(&image) else { return image };
-    table.machine = heapless_name(count);
-    image.resize(giotto_shared::table::MAX_IMAGE_BYTES, 0);
-    let length = giotto_shared::table::encode(&table, &mut image).unwrap_or(0);
-    image.truncate(length);
-    image
-}
-
-fn heapless_name(count: u64) -> giotto_shared::table::Name {
-    let mut name = giotto_shared::table::Name::new();
-    // Twenty digits fit.
-    let _ = name.push_str(&count.to_string());
-    name
-}
-
 fn run_faults(frames: u64, share: f64, seed: u64) -> Result<ExitCode, ControllerError> {
-    let link = FaultyLink::new(VirtualLink::new(), seed, share);
-    let mut controller = Controller::connect(Box::new(link), "sim with faults", 1)?;
-    let (mut sent, mut flashes, mut retries, mut wrong) = (0_u64, 0_u64, 0_u64, 0_u64);
-    let mut good: Option<Vec<u8>> = None;
-    while sent < frames {
-        let new = table(flashes);
-        match controller.flash(&new, &mut |_| {}) {
-            Ok(_) => {
-                flashes += 1;
-                good = Some(new.clone());
-            }
-            Err(_) => retries += 1,
-        }
-        // Requests of a flash: begin, chunks, end, read back, commit, confirm, status.
-        sent += 5 + 2 * (new.len() as u64).div_ceil(128);
-        let expected = good.iter().chain([&new]);
-        let verdicts = expected.map(|image| controller.verify(image)).collect::<Vec<_>>();
-        let same = verdicts.iter().any(|verdict| matches!(verdict, Ok(Verdict::Same { .. })));
-        let unknown = verdicts.iter().all(Result::is_err);
-        let nothing_yet = good.is_none();
-        wrong += u64::from(!(same || unknown || nothing_yet));
-    }
+    let report = faults::flash_over_faults(frames, share, seed)?;
     println!(
-        "seed {seed}: {sent} frames with {:.0} % of pieces broken, {flashes} tables flashed, {retries} tried again, \
-         {} requests repeated, {wrong} wrong tables in use",
+        "seed {seed}: {} frames sent, {:.0} % of {} pieces broken, {} tables flashed, {} flashes begun anew, \
+         {} requests repeated, {} wrong tables in use",
+        report.tally.frames_sent(),
         share * 100.0,
-        controller.repeats()
+        report.tally.pieces(),
+        report.flashes,
+        report.retries,
+        report.repeats,
+        report.wrong
     );
-    Ok(if wrong == 0 && flashes > 0 { ExitCode::SUCCESS } else { ExitCode::from(5) })
+    let kinds = report.tally.broken().map(|(fault, count)| format!("{fault:?} {count}").to_lowercase());
+    println!("broken: {}", kinds.join(", "));
+    Ok(if report.wrong == 0 && report.flashes > 0 { ExitCode::SUCCESS } else { ExitCode::from(5) })
 }
