@@ -4,6 +4,7 @@ use giotto::controller::emulator::{Emulator, Pace};
 use giotto::controller::image::{self, Board};
 use giotto::controller::{Controller, ControllerError, circle};
 use giotto_shared::Direction;
+use giotto_shared::wire::MotionState;
 use serde_json::{Value, json};
 use std::time::Instant;
 
@@ -73,7 +74,7 @@ pub fn measure(note: &mut dyn FnMut(&str)) -> Result<Report, ControllerError> {
     let mut least = f64::INFINITY;
     let begun = controller.status()?.tick;
     let mut status = controller.status()?;
-    while status.motion != giotto_shared::wire::MotionState::Idle {
+    while !matches!(status.motion, MotionState::Idle | MotionState::Fault) {
         // Not the spans before and during the start.
         if status.tick.wrapping_sub(begun) > tick_hz {
             least = status.idle_permille.map_or(least, |permille| least.min(f64::from(permille) / 10.0));
