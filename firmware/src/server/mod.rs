@@ -8,6 +8,7 @@
 //! checked in memory, only then is the slot not in use programmed and compared), `Commit` (the engine, at
 //! rest, takes it over on probation), `Confirm` (it is what boots from now on).
 mod authority;
+mod bounds;
 mod motion;
 mod session;
 mod supervision;
@@ -18,25 +19,20 @@ pub mod link;
 #[cfg(test)]
 mod tests;
 
+pub use bounds::{CENTRIPETAL_MAX_M_S2, MAX_LAPS};
 pub use motion::{Motion, Snapshot, TimedSetPoint};
 
 use crate::store::{ImageBuffer, Layout, Store, StoredKey};
 use core::ops::DerefMut;
 use embedded_storage::nor_flash::NorFlash;
-use giotto_shared::table::{FORMAT_VERSION, MAX_IMAGE_BYTES, SCHEMA_HASH, bounds};
+use giotto_shared::table::{FORMAT_VERSION, MAX_IMAGE_BYTES, SCHEMA_HASH};
 use giotto_shared::wire::{
     self, Accumulator, CHUNK, Chunk, CircleRun, Command, Counters, FromController, Identity, MAX_FRAME,
-    MotionRefusal, MotionState, PROTOCOL_VERSION, Probation, Refusal, Reply, RunField, SET_POINTS,
-    SUPERVISE_MS, SetPoints, Status,
+    MotionState, PROTOCOL_VERSION, Probation, Refusal, Reply, SET_POINTS, SUPERVISE_MS, SetPoints, Status,
 };
 use session::{Session, Turn};
 use supervision::Supervision;
 use upload::Upload;
-
-/// Most turns of one run.
-pub const MAX_LAPS: u32 = 10_000;
-/// Largest centripetal acceleration of a programmed circle, m/s²: five g, above any robot or machine tool.
-pub const CENTRIPETAL_MAX_M_S2: f32 = 50.0;
 
 /// What an image says of itself.
 #[derive(Clone, Copy, Debug)]
@@ -317,7 +313,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     #[inline(never)]
     fn run_circle(&mut self, run: &CircleRun) -> Result<(), Refusal> {
         self.idle()?;
-        check_run(run).map_err(Refusal::Motion)?;
+        bounds::check_run(run).map_err(Refusal::Motion)?;
         if self.probation == Probation::FirstRun {
             return Err(Refusal::ProbationOver);
         }
@@ -387,27 +383,4 @@ fn cut(name: &str) -> heapless::String<16> {
         }
     }
     out
-}
-
-/// Checks a run against the bounds of the image.
-fn check_run(run: &CircleRun) -> Result<(), MotionRefusal> {
-    let within = |field, value: f64, lo: f32, hi: f32| {
-        // Programmed values are decimal, bounds single precision: a bound that was meant to be met is met. Written
-        // so that NaN fails.
-        let (low, high) = (f64::from(lo), f64::from(hi));
-        if value >= low - 1e-6 * low.abs() && value <= high + 1e-6 * high.abs() {
-            Ok(())
-        } else {
-            Err(MotionRefusal::OutOfBounds { field, value: value as f32, lo, hi })
-        }
-    };
-    within(RunField::Radius, run.radius_m, bounds::RADIUS_MIN_M, bounds::RADIUS_MAX_M)?;
-    within(RunField::Feed, run.feed_m_s, bounds::FEED_MIN_M_S, bounds::FEED_MAX_M_S)?;
-    within(RunField::Laps, f64::from(run.laps), 1.0, MAX_LAPS as f32)?;
-    within(RunField::Start, run.start_rad, -bounds::PHASE_MAX_RAD, bounds::PHASE_MAX_RAD)?;
-    for coordinate in run.centre_m {
-        within(RunField::Centre, coordinate, -bounds::PLACE_MAX_M, bounds::PLACE_MAX_M)?;
-    }
-    let centripetal = run.feed_m_s * run.feed_m_s / run.radius_m;
-    within(RunField::Acceleration, centripetal, 0.0, CENTRIPETAL_MAX_M_S2)
 }

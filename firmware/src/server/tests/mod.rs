@@ -8,7 +8,7 @@ use crate::store::ram::RamFlash;
 use giotto_shared::Direction;
 use giotto_shared::model::Cumulants;
 use giotto_shared::table::{self, Limits, Table, Travel, Zone};
-use giotto_shared::wire::{Request, TableInfo};
+use giotto_shared::wire::{MotionRefusal, Request, TableInfo};
 use std::boxed::Box;
 use std::string::{String, ToString};
 use std::vec::Vec;
