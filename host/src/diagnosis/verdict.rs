@@ -104,6 +104,9 @@ fn unexplained_energy(found: &Explained, each: &[f64]) -> (usize, f64) {
 /// So many patterns side by side are pieces of one thing that none of them describes.
 const PIECES: usize = 3;
 
+/// A look-alike that explains these data to the last digit leaves even odds, give or take rounding.
+const EVEN: f64 = 0.5 - 1e-6;
+
 /// Takes out findings that the best set does without, and flexible ones that may be pieces of something
 /// unlisted: where three patterns or more were needed, a cause with shape parameters counts only if it is far larger
 /// than all of them.
@@ -121,7 +124,7 @@ fn without_bent(findings: Vec<Finding>, (pieces, energy): (usize, f64), found: &
                     let teeth_um = (roughness::energy_m2(teeth, &found.runs) / samples).sqrt() * 1e6;
                     f.rms_um < 0.25 * teeth_um
                 });
-            f.probability >= 0.5 && !piece && !smear
+            f.probability >= EVEN && !piece && !smear
         })
         .collect()
 }
