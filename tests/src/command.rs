@@ -3,10 +3,14 @@ use std::path::PathBuf;
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
-/// The binary of this build, brought up to date once a test process.
+/// The binary of this build, brought up to date once a test process; or the one that `GIOTTO_BINARY` names, which
+/// `.ci/check` has just built.
 pub fn giotto() -> Command {
     static BINARY: OnceLock<PathBuf> = OnceLock::new();
     let path = BINARY.get_or_init(|| {
+        if let Some(given) = std::env::var_os("GIOTTO_BINARY") {
+            return PathBuf::from(given);
+        }
         // target/PROFILE/deps/test-hash → target/PROFILE/giotto
         let test = std::env::current_exe().expect("a test knows where it is");
         let profile = test.ancestors().nth(2).expect("tests run from target/PROFILE/deps").to_path_buf();
