@@ -16,6 +16,7 @@
 //! lines below.
 pub mod flash;
 pub mod idle;
+pub mod interrupt;
 pub mod log;
 pub mod port;
 pub mod stack;

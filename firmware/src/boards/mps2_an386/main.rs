@@ -43,7 +43,7 @@ mod image {
     fn main() -> ! {
         let started = cortex_m::Peripherals::take().and_then(|mut core| {
             let link = uart::Uart::link()?;
-            vectors::enable(&mut core.NVIC);
+            common::interrupt::enable::<{ vectors::LINK }>(&mut core.NVIC);
             let desk = common::start(&mut core.SYST, &mut core.SCB, CLOCK_HZ)?;
             Some((link, desk, common::buffers()?))
         });
@@ -54,7 +54,7 @@ mod image {
             stream: Some(uart::Uart::stream()),
             log: uart::Uart::log(),
             feed: watchdog::feed,
-            lost: uart::lost,
+            lost: common::port::lost,
         };
         common::background(BOARD, flash::Window::new(), flash::LAYOUT, (desk, buffers), ports)
     }

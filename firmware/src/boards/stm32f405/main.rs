@@ -51,7 +51,7 @@ mod image {
         stop::prepare();
         let started = cortex_m::Peripherals::take().and_then(|mut core| {
             let link = usart::Usart::link(&clock)?;
-            vectors::enable(&mut core.NVIC);
+            common::interrupt::enable::<{ vectors::LINK }>(&mut core.NVIC);
             let desk = common::start(&mut core.SYST, &mut core.SCB, clock.core_hz)?;
             Some((link, desk, common::buffers()?))
         });
@@ -62,10 +62,10 @@ mod image {
         watchdog::start();
         let ports = common::Ports {
             link,
-            stream: None::<usart::Usart>,
+            stream: None::<common::port::Port<usart::Usart>>,
             log: usart::Usart::log(&clock),
             feed: watchdog::feed,
-            lost: usart::lost,
+            lost: common::port::lost,
         };
         common::background(BOARD, flash::Sectors::new(), flash::LAYOUT, (desk, buffers), ports)
     }
