@@ -3,6 +3,8 @@
 
 pub mod elf;
 pub mod faults;
+pub mod instructions;
+pub mod link;
 pub mod rate;
 pub mod scenarios;
 pub mod size;

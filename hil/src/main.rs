@@ -5,9 +5,10 @@ use clap::{Parser, Subcommand};
 use giotto::controller::ControllerError;
 use giotto::controller::{Board, OpenOptions, Port, open};
 use giotto_hil::faults;
+use giotto_hil::instructions::{self, CountError};
 use giotto_hil::scenarios::{self, Outcome};
 use giotto_hil::ticks::{self, Counts, TERMS};
-use giotto_hil::{rate, size};
+use giotto_hil::{link, rate, size};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -55,6 +56,18 @@ enum Command {
         #[arg(long)]
         check: bool,
     },
+    /// Bytes a second of the largest table on the emulated line, beside a raw echo of as many bytes.
+    Link {
+        /// One JSON document.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Instructions of hot kernels (callgrind) and of the ticks (QEMU), held against the record in host/benches/instructions.toml.
+    Instructions {
+        /// Write the record instead.
+        #[arg(long)]
+        record: bool,
+    },
     /// What an image takes in flash and RAM, its deepest stack, and whether its tick can panic.
     Size {
         /// The board: `mps2_an386` or `stm32f405`; only the first one's stack can be measured.
@@ -90,6 +103,8 @@ fn main() -> ExitCode {
         Command::Run { port, baud, image, worn_flash, json } => {
             run_scenarios(&port, &OpenOptions { image, baud }, worn_flash, json)
         }
+        Command::Link { json } => run_link(json),
+        Command::Instructions { record } => return run_instructions(record),
         Command::Rate { json, check } => run_rate(json, check),
         Command::Size { board, signed, json, check } => run_size(&board, signed, json, check),
         Command::Faults { frames, share, seed } => run_faults(frames, share, seed),
@@ -127,6 +142,8 @@ fn run_ticks(as_json: bool) -> Result<ExitCode, ControllerError> {
             "arc_extended_steady": range(&counts, "arc_extended_steady"),
             "stream": range(&counts, "stream"),
             "naive_libm": range(&counts, "naive_libm"),
+            "naive_nalgebra": range(&counts, "naive_nalgebra"),
+            "naive_idsp": range(&counts, "naive_idsp"),
             "image": { "text_bytes": image.text, "ram_bytes": image.ram, "stack_bytes": image.stack },
         });
         println!("{document:#}");
@@ -173,6 +190,65 @@ fn run_scenarios(
         println!("{document:#}");
     }
     Ok(if failed == 0 { ExitCode::SUCCESS } else { ExitCode::from(5) })
+}
+
+fn run_link(as_json: bool) -> Result<ExitCode, ControllerError> {
+    let report = link::measure(&mut |text: &str| eprintln!("{text}"))?;
+    if as_json {
+        println!("{:#}", report.document());
+    } else {
+        let [table, echo, percent] = report.rates();
+        let bytes = report.table_bytes;
+        println!(
+            "table of {bytes} bytes: {table:.0} bytes/s, raw echo {echo:.0} bytes/s: {percent:.1} % (bar {} %)",
+            link::BAR_PERCENT
+        );
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn run_instructions(record: bool) -> ExitCode {
+    match count_instructions(record) {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(4)
+        }
+    }
+}
+
+fn count_instructions(record: bool) -> Result<ExitCode, CountError> {
+    let failed = |e: std::io::Error| CountError::Other(format!("{}: {e}", instructions::RECORD));
+    let mut counts = instructions::of_ticks(&mut |text: &str| eprintln!("{text}"))?;
+    if instructions::has_valgrind() {
+        counts.extend(instructions::of_kernels()?);
+    } else {
+        println!("kernels: not counted, valgrind is not installed (apt-get install valgrind)");
+    }
+    let compiler = instructions::compiler();
+    if record {
+        std::fs::write(instructions::RECORD, instructions::write(&counts, &compiler)).map_err(failed)?;
+        println!("{} counts recorded", counts.len());
+        return Ok(ExitCode::SUCCESS);
+    }
+    let text = std::fs::read_to_string(instructions::RECORD).map_err(failed)?;
+    let (recorded, with) = instructions::read(&text)?;
+    let mut grown = 0;
+    for (name, &now) in &counts {
+        let growth = instructions::growth_percent(now, recorded.get(name));
+        let too_much = growth.is_none_or(|percent| percent > instructions::TOLERANCE_PERCENT);
+        grown += u32::from(too_much);
+        let words = growth.map_or_else(|| "not recorded".to_owned(), |percent| format!("{percent:+.2} %"));
+        println!("{} {name:28} {now:12} {words}", if too_much { "GROWN" } else { "ok   " });
+    }
+    if grown > 0 {
+        println!(
+            "{grown} more than {} % above the record, which was made with {with}; here {compiler}",
+            instructions::TOLERANCE_PERCENT
+        );
+        println!("if that is meant, write it down: giotto-hil instructions --record");
+    }
+    Ok(if grown == 0 { ExitCode::SUCCESS } else { ExitCode::from(5) })
 }
 
 fn run_rate(as_json: bool, check: bool) -> Result<ExitCode, ControllerError> {

@@ -137,19 +137,41 @@ fn position(n: u16) -> [i32; 3] {
     [CENTRE_M[0] + RADIUS_M * c, CENTRE_M[1] + RADIUS_M * s, CENTRE_M[2]].map(|m| (m * 1e9) as i32)
 }
 
-/// The same arc tick as one would write it down: `f32`, libm, formulas as they stand.
-pub struct Plain {
-    tick: u32,
+/// How a plain tick turns.
+pub trait Turning: Default {
+    /// Goes on by an angle, rad.
+    fn advance(&mut self, by_rad: f32);
+
+    /// (1, 0) and (`re`, `im`) turned by the angle so far, in the plane.
+    fn turned(&self, re: f32, im: f32) -> [[f32; 2]; 2];
+}
+
+/// Angle in `f32`, `libm::sincosf`.
+#[derive(Default)]
+pub struct Libm {
     theta: f32,
 }
 
-impl Plain {
-    /// In the middle of a ramp of 400 ticks.
-    pub const fn new() -> Self {
-        Self { tick: 0, theta: 0.0 }
+impl Turning for Libm {
+    fn advance(&mut self, by_rad: f32) {
+        self.theta += by_rad;
     }
 
-    /// What is counted.
+    fn turned(&self, re: f32, im: f32) -> [[f32; 2]; 2] {
+        let (sin, cos) = libm::sincosf(self.theta);
+        [[cos, sin], [re * cos - im * sin, re * sin + im * cos]]
+    }
+}
+
+/// The same arc tick as one would write it down: `f32`, formulas as they stand.
+#[derive(Default)]
+pub struct Plain<T> {
+    tick: u32,
+    turning: T,
+}
+
+impl<T: Turning> Plain<T> {
+    /// What is counted, from the beginning of a ramp of 400 ticks on.
     #[inline(never)]
     pub fn tick(&mut self) -> Output {
         const RAMP_S: f32 = 0.4;
@@ -160,8 +182,7 @@ impl Plain {
         let full = (FEED_M_S / RADIUS_M) as f32;
         let (w, a) = (full * s.value, full * s.first / RAMP_S);
         let (j, n) = (full * s.second / (RAMP_S * RAMP_S), full * s.third / (RAMP_S * RAMP_S * RAMP_S));
-        self.theta += w * dt;
-        let (sin, cos) = libm::sincosf(self.theta);
+        self.turning.advance(w * dt);
         let (k2, k4) = (CUMULANTS.kappa2_s2, CUMULANTS.kappa4_s4);
         let fourth = k2 * k2 / 8.0 - k4 / 24.0;
         let re = 1.0 + 0.5 * k2 * w * w + fourth * (w * w * w * w - 4.0 * w * j - 3.0 * a * a);
@@ -169,24 +190,14 @@ impl Plain {
         let r = RADIUS_M as f32;
         // A plane tilted as that of `Arc`.
         let (up, along) = (0.447_213_6_f32, 0.894_427_2_f32);
-        let place = |c: f32, s: f32| [r * c, r * s * along, -r * s * up];
-        let nm = |p: [f32; 3]| {
+        let nm = |[c, s]: [f32; 2]| {
             let mut out = [0; 3];
-            for ((o, p), centre) in out.iter_mut().zip(p).zip(CENTRE_M) {
+            for ((o, p), centre) in out.iter_mut().zip([r * c, r * s * along, -r * s * up]).zip(CENTRE_M) {
                 *o = ((p + centre as f32) * 1e9) as i32;
             }
             out
         };
-        Output {
-            nominal_nm: nm(place(cos, sin)),
-            corrected_nm: nm(place(re * cos - im * sin, re * sin + im * cos)),
-            flags: 0,
-        }
-    }
-}
-
-impl Default for Plain {
-    fn default() -> Self {
-        Self::new()
+        let [nominal, corrected] = self.turning.turned(re, im);
+        Output { nominal_nm: nm(nominal), corrected_nm: nm(corrected), flags: 0 }
     }
 }

@@ -5,9 +5,13 @@
 //! a peer that solves another problem stops the bench. The Python peers live in a virtual environment that is made
 //! beside the build (`python3 -m venv`, `pip install`); the last table is in `host/benches/RESULTS.md`.
 //!
-//! `-- circle`, `-- stepwise`, `-- csv` run one part and write nothing.
+//! `-- circle`, `stepwise`, `csv`, `diagnosis`, `plant`, `ticks`, `link` run parts alone and write nothing. What the controller does is
+//! measured under QEMU by `giotto-hil`, which is built on the way.
 mod circle;
+mod controller;
 mod csv;
+mod diagnosis;
+mod plant;
 mod python;
 mod stepwise;
 mod table;
@@ -26,7 +30,15 @@ fn main() -> Result<(), Error> {
         return Ok(());
     }
     let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
-    let parts: [(&str, Part); 3] = [("circle", circle::run), ("stepwise", stepwise::run), ("csv", csv::run)];
+    let parts: [(&str, Part); 7] = [
+        ("circle", circle::run),
+        ("stepwise", stepwise::run),
+        ("csv", csv::run),
+        ("diagnosis", diagnosis::run),
+        ("plant", plant::run),
+        ("ticks", controller::ticks),
+        ("link", controller::link),
+    ];
     let mut peers = Peers::start()?;
     let mut page = table::heading(peers.versions());
     for (name, part) in parts {

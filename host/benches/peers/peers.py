@@ -10,11 +10,14 @@ import time
 from importlib.metadata import version
 
 import circle_fit
+import diagnosis
 import numpy as np
 import pandas as pd
 import polars as pl
 import statsmodels.api as sm
+from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
+from scipy.signal import lsim
 
 loaded = {}
 
@@ -101,7 +104,53 @@ def csv_polars(data):
     return time.perf_counter() - start, [rows, float(total)]
 
 
+def plant(data):
+    """Both axes of a position loop with second-order mechanics, as one state space; command and run-in of ten lags."""
+    kv, wn, zeta = data["kv"], data["omega_n"], data["zeta"]
+    n, radius, feed = data["samples"], data["radius"], data["feed"]
+    a = np.array([[-kv, 0, 0], [0, 0, wn], [wn, -wn, -2 * zeta * wn]])
+    b, c = np.array([kv, 0, 0]), np.array([0, 1.0, 0])
+    turn = 2 * np.pi * radius / feed
+    step = turn / n
+    before = int(np.ceil(10 / kv / step))
+    times = np.arange(-before, n) * step
+    phase = feed / radius * times
+    return a, b, c, times, before, radius, phase
+
+
+def plant_lsim(data):
+    start = time.perf_counter()
+    a, b, c, times, before, radius, phase = plant(data)
+    system = (a, b[:, None], c[None, :], np.zeros((1, 1)))
+    axes = []
+    for command in (radius * np.cos(phase), radius * np.sin(phase)):
+        rest = np.array([command[0], command[0], 0.0])
+        _, y, _ = lsim(system, command, times - times[0], X0=rest)
+        axes.append(y[before:])
+    deviation = np.hypot(*axes) - radius
+    return time.perf_counter() - start, [float(deviation.mean())]
+
+
+def plant_solve_ivp(data):
+    start = time.perf_counter()
+    a, b, c, times, before, radius, phase = plant(data)
+    rate = phase[1] / times[1] if times[1] else phase[0] / times[0]
+    axes = []
+    for wave in (np.cos, np.sin):
+        rest = radius * wave(phase[0])
+        right = lambda t, x: a @ x + b * (radius * wave(rate * t))
+        solved = solve_ivp(
+            right, (times[0], times[-1]), [rest, rest, 0.0], method="DOP853", t_eval=times[before:], rtol=1e-8, atol=1e-9
+        )
+        axes.append(solved.y[1])
+    deviation = np.hypot(*axes) - radius
+    return time.perf_counter() - start, [float(deviation.mean())]
+
+
 PEERS = {
+    "lsim": plant_lsim,
+    "solve_ivp": plant_solve_ivp,
+    "diagnosis": diagnosis.run,
     "scipy": circle_scipy,
     "circle-fit": circle_circle_fit,
     "statsmodels": stepwise_statsmodels,

@@ -67,6 +67,12 @@ impl Table {
         eprintln!("{}: {}", self.title, self.rows[self.rows.len() - 1].join("  "));
     }
 
+    /// Adds a row as it stands.
+    pub(crate) fn words(&mut self, row: &[String]) {
+        self.rows.push(row.to_vec());
+        eprintln!("{}: {}", self.title, row.join("  "));
+    }
+
     /// Adds a sentence under the table.
     pub(crate) fn remark(&mut self, text: String) {
         self.remarks.push(text);

@@ -1,9 +1,9 @@
 //! Whether the numbers of a run can be what the campaign says they are. What cannot is refused by name;
 //! what is odd but possible becomes a note.
 use super::Note;
-use super::error::{CampaignError, Place, Problem};
+use super::clock::Clock;
+use super::error::{CampaignError, Problem};
 use super::manifest::Entry;
-use super::table::place;
 use giotto_shared::Direction;
 use std::f64::consts::TAU;
 
@@ -27,56 +27,15 @@ const LARGEST_GAP_DEG: f64 = 36.0;
 /// Noise below which two equal files may be two runs of a simulation without noise, m.
 const SMALLEST_NOISE_M: f64 = 0.15e-6;
 
-/// What the time stamps of a run say.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Clock {
-    /// Duration of the recorded rows plus one spacing, s.
-    pub(super) turn_s: f64,
-    /// Typical spacing, s.
-    pub(super) spacing_s: f64,
-    /// The largest hole: row after it and its length beyond one spacing, s.
-    pub(super) gap: Option<(usize, f64)>,
-}
-
 fn err(entry: &Entry, row: usize, field: usize, problem: Problem) -> CampaignError {
-    CampaignError::new(place(&entry.path, row, field), problem)
-}
-
-/// Time stamps (from 0) must grow; `first_s` is the one subtracted.
-pub(super) fn clock(entry: &Entry, time: &[f64], field: usize, first_s: f64) -> Result<Clock, CampaignError> {
-    if let Some(k) = time.windows(2).position(|w| w[1] < w[0]) {
-        let problem = Problem::TimeBackwards { from_s: time[k] + first_s, to_s: time[k + 1] + first_s };
-        return Err(err(entry, k + 1, field, problem));
-    }
-    let last = time[time.len() - 1];
-    if last <= 0.0 {
-        return Err(err(entry, time.len() - 1, field, Problem::TimeConstant { at_s: first_s }));
-    }
-    // Stamps are rounded to the ticks of the instrument: spacings scatter by up to a tick, a lost sample adds a spacing.
-    let stride = (time.len() - 1).div_ceil(1 << 16);
-    let mut spacings: Vec<f64> = (1..time.len()).step_by(stride).map(|k| time[k] - time[k - 1]).collect();
-    spacings.sort_unstable_by(f64::total_cmp);
-    let at = |share: f64| spacings[((spacings.len() - 1) as f64 * share).round() as usize];
-    let central = &spacings[spacings.len() / 20..spacings.len() - spacings.len() / 20];
-    let spacing_s = central.iter().sum::<f64>() / central.len() as f64;
-    let limit = spacing_s + f64::max(1.05 * (at(0.95) - at(0.05)), 0.5 * spacing_s);
-    let mut gap: Option<(usize, f64)> = None;
-    for k in 1..time.len() {
-        let hole = time[k] - time[k - 1];
-        if hole > limit && gap.is_none_or(|(_, largest)| hole - spacing_s > largest) {
-            gap = Some((k, hole - spacing_s));
-        }
-    }
-    let n = time.len() as f64;
-    let turn_s = if gap.is_some() { last + spacing_s } else { last * n / (n - 1.0) };
-    Ok(Clock { turn_s, spacing_s, gap })
+    CampaignError::new(entry.place(row, field), problem)
 }
 
 /// Holes in the recording: small ones are noted, large ones refused.
 pub(super) fn gaps(
     entry: &Entry,
     clock: &Clock,
-    time: &[f64],
+    rows: usize,
     field: usize,
     notes: &mut Vec<Note>,
 ) -> Result<(), CampaignError> {
@@ -85,8 +44,8 @@ pub(super) fn gaps(
     if gap_deg > LARGEST_GAP_DEG {
         return Err(err(entry, row, field, Problem::Gap { gap_s, gap_deg, limit_deg: LARGEST_GAP_DEG }));
     }
-    let lost = ((clock.turn_s / clock.spacing_s).round() - time.len() as f64).max(1.0);
-    let at = Place::at(&entry.path, row + 2, 1);
+    let lost = ((clock.turn_s / clock.spacing_s).round() - rows as f64).max(1.0);
+    let at = entry.row(row);
     let text = format!(
         "about {lost} samples are missing (largest hole {gap_deg:.2}°); angles follow the time stamps"
     );
@@ -191,7 +150,7 @@ pub(super) fn slowness(entry: &Entry, turn_s: f64) -> Result<f64, CampaignError>
     let ratio = turn_s / programmed_s;
     if !(1.0 / LONGEST_TURN..=LONGEST_TURN).contains(&ratio) {
         let problem = Problem::TooLong { measured_s: turn_s, programmed_s, hint: duration_hint(ratio) };
-        return Err(CampaignError::new(Place::at(&entry.path, 2, 1), problem));
+        return Err(CampaignError::new(entry.row(0), problem));
     }
     Ok(ratio)
 }
@@ -215,7 +174,7 @@ pub(super) fn duration(
     let ratio = slowness(entry, turn_s)?;
     if ratio < SHORTEST_TURN {
         let problem = Problem::TooShort { measured_s: turn_s, programmed_s: turn_s / ratio, share: ratio };
-        return Err(CampaignError::new(Place::at(&entry.path, deviation.len() + 1, 1), problem));
+        return Err(CampaignError::new(entry.row(deviation.len() - 1), problem));
     }
     if ratio < 0.97 {
         notes.push(fast(entry, ratio));
@@ -231,12 +190,12 @@ pub(super) fn duration(
 pub(super) fn several_laps(entry: &Entry, turn_s: f64, rows: usize, laps: u32) -> CampaignError {
     let programmed_s = TAU * entry.radius_m / entry.feed_m_s;
     let problem = Problem::SeveralLaps { measured_s: turn_s, programmed_s, laps };
-    CampaignError::new(Place::at(&entry.path, rows / laps as usize + 2, 1), problem)
+    CampaignError::new(entry.row(rows / laps as usize), problem)
 }
 
 fn fast(entry: &Entry, ratio: f64) -> Note {
     let text = format!("the turn took {:.0} % of the programmed time: a feed override?", 100.0 * ratio);
-    Note { at: Place::at(&entry.path, 2, 1), text }
+    Note { at: entry.row(0), text }
 }
 
 fn duration_hint(ratio: f64) -> String {
@@ -371,7 +330,7 @@ pub(super) fn angles(
             let text = format!(
                 "start_angle_deg = {said:.1}, the first sample lies at {found:.1}°: the file is believed"
             );
-            notes.push(Note { at: place(&entry.path, 0, field), text });
+            notes.push(Note { at: entry.place(0, field), text });
         }
     }
     Ok(())

@@ -1,5 +1,6 @@
 //! `campaign.toml`, strictly: every value checked, every refusal with its line and column.
 use super::error::{CampaignError, Place, Problem};
+use super::import::Slice;
 use super::{Direction, Note};
 use std::collections::HashMap;
 use std::ops::Range;
@@ -52,6 +53,8 @@ pub struct Entry {
     pub centre_m: Option<[f64; 3]>,
     /// Declared arc, rad, if the run is not a whole turn.
     pub arc_rad: Option<f64>,
+    /// Where the run stands in a foreign file; `None` for a file of the contract.
+    pub slice: Option<Slice>,
 }
 
 impl Manifest {
@@ -216,6 +219,7 @@ impl Source<'_> {
             temperature_c,
             centre_m,
             arc_rad: arc.map(f64::to_radians),
+            slice: None,
         };
         Ok((entry, span))
     }

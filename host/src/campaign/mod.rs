@@ -3,21 +3,28 @@
 //! | file | holds |
 //! |---|---|
 //! | `manifest` | `campaign.toml`, strictly |
-//! | `table` | the numbers of a CSV, fast |
+//! | `blocks` | large files in blocks of whole lines, on all cores |
+//! | `table` | the numbers of a contract's CSV, fast |
+//! | `run_file` | a run's file, own or foreign: its columns in SI |
+//! | `clock`, `thinned` | time stamps and other rows, seen once and forgotten |
 //! | `samples` | columns → one turn of polar samples |
 //! | `check` | whether numbers can be what the campaign says they are |
 //! | `read`, `write` | whole campaigns; run by run where memory counts |
 //! | `import` | foreign files |
 //! | `error` | everything a campaign is refused for, with its place |
+mod blocks;
 mod check;
+mod clock;
 mod error;
 pub mod import;
 mod manifest;
 mod read;
+mod run_file;
 mod samples;
 mod table;
 #[cfg(test)]
 mod tests;
+mod thinned;
 mod write;
 
 pub use check::sample_noise;

@@ -1,6 +1,6 @@
 //! Reading campaigns: all at once, or run by run for those that do not fit in memory.
 use super::check;
-use super::error::{CampaignError, Place, Problem};
+use super::error::{CampaignError, Problem};
 use super::manifest::Manifest;
 use super::samples::{self, Loaded};
 use super::{Campaign, Note};
@@ -22,23 +22,30 @@ pub fn read(path: &Path) -> Result<Campaign, CampaignError> {
 /// # Errors
 /// As [`read`].
 pub fn read_with_notes(path: &Path) -> Result<(Campaign, Vec<Note>), CampaignError> {
-    let manifest = Manifest::open(path)?;
-    let loaded: Vec<Result<Loaded, CampaignError>> =
-        manifest.runs.par_iter().map(|entry| samples::load(entry, true)).collect();
-    let mut together = Together::new(&manifest);
-    let mut runs = Vec::with_capacity(loaded.len());
-    let mut notes = manifest.notes.clone();
-    for (index, loaded) in loaded.into_iter().enumerate() {
-        let loaded = loaded?;
-        together.add(index, &loaded);
-        notes.extend(loaded.notes);
-        runs.push(loaded.run);
-    }
-    together.check()?;
-    Ok((Campaign { name: manifest.name, machine: manifest.machine, runs }, notes))
+    Manifest::open(path)?.read()
 }
 
 impl Manifest {
+    /// Reads and checks all runs, with notes.
+    ///
+    /// # Errors
+    /// As [`read`].
+    pub fn read(&self) -> Result<(Campaign, Vec<Note>), CampaignError> {
+        let loaded: Vec<Result<Loaded, CampaignError>> =
+            self.runs.par_iter().map(|entry| samples::load(entry, true)).collect();
+        let mut together = Together::new(self);
+        let mut runs = Vec::with_capacity(loaded.len());
+        let mut notes = self.notes.clone();
+        for (index, loaded) in loaded.into_iter().enumerate() {
+            let loaded = loaded?;
+            together.add(index, &loaded);
+            notes.extend(loaded.notes);
+            runs.push(loaded.run);
+        }
+        together.check()?;
+        Ok((Campaign { name: self.name.clone(), machine: self.machine.clone(), runs }, notes))
+    }
+
     /// Reads and checks run `index` without keeping its time stamps. What only shows across runs is for
     /// [`Together`] to say.
     ///
@@ -101,10 +108,7 @@ impl<'a> Together<'a> {
             let Some(print) = seen.fingerprint else { continue };
             if let Some(first) = known.insert(print, *index) {
                 let other = self.manifest.runs[first].file.clone();
-                return Err(CampaignError::new(
-                    Place::at(&entry.path, 2, 1),
-                    Problem::DuplicateData { other },
-                ));
+                return Err(CampaignError::new(entry.row(0), Problem::DuplicateData { other }));
             }
         }
         Ok(())

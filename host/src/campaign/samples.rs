@@ -1,10 +1,14 @@
 //! From the columns of a file to one turn of polar samples.
-use super::check;
+use super::clock::{Clock, Stamps};
 use super::error::{CampaignError, Place, Problem};
+use super::import::Quantity;
 use super::manifest::Entry;
-use super::table::{self, Column, Table, Unit};
-use super::{Note, Run, Samples};
-use giotto_shared::circle::{self, Circle, CircleError, Plane, Xy};
+use super::run_file::RunFile;
+use super::table::Batch;
+use super::{Note, Run, Samples, check};
+use crate::fit::fit_circle;
+use giotto_shared::circle::{Circle, CircleError, Merge, Plane, Scatter};
+use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// Fewest samples of a run.
@@ -23,6 +27,8 @@ pub struct Loaded {
     pub notes: Vec<Note>,
     /// Number of samples; stays when the samples themselves are dropped.
     pub rows: usize,
+    /// Whether the time stamps were of use.
+    pub(super) clocked: bool,
     /// Several laps are likely: how many. A slowed-down controller looks the same in one run.
     pub(super) laps: Option<u32>,
     /// Identifies the noise of the measurement; `None` where there is none.
@@ -49,13 +55,108 @@ pub struct Tilt {
     pub flatness_m: f64,
 }
 
-/// Reads and checks one run.
+/// What is kept of the rows while they go by.
+#[derive(Default)]
+struct Rows {
+    stamps: Stamps,
+    time: Vec<f64>,
+    /// x, or the angle.
+    first: Vec<f64>,
+    /// y, or the deviation.
+    second: Vec<f64>,
+    /// Lowest and highest point over the plane.
+    heights: [f64; 2],
+}
+
+/// A block of rows on its way to [`Rows`].
+struct Part {
+    time: Vec<f64>,
+    first: Vec<f64>,
+    second: Vec<f64>,
+    heights: [f64; 2],
+}
+
+impl Rows {
+    fn take(&mut self, part: Part, keep_time: bool) {
+        let mut time = part.time;
+        self.stamps.take(&mut time);
+        if keep_time {
+            self.time.extend_from_slice(&time);
+        }
+        self.first.extend_from_slice(&part.first);
+        self.second.extend_from_slice(&part.second);
+        self.heights = [self.heights[0].min(part.heights[0]), self.heights[1].max(part.heights[1])];
+    }
+}
+
+/// Reads and checks one run. Of its rows the angle and the deviation (or x and y) are kept, and the time only if it is wanted
+/// or stands for the angle; everything else goes by: 16 bytes a row are the memory of a run.
 pub(super) fn load(entry: &Entry, keep_time: bool) -> Result<Loaded, CampaignError> {
-    let mut table = Table::read(&entry.path)?;
-    let rows = table.rows();
-    if rows < FEWEST {
-        let at = Place::at(&entry.path, rows + 1, 1);
-        return Err(CampaignError::new(at, Problem::TooFew { found: rows, expected: FEWEST }));
+    let file = RunFile::open(entry)?;
+    let fields = file.fields();
+    let index = |wanted: &dyn Fn(Quantity) -> bool| fields.iter().position(|f| wanted(f.quantity));
+    let time_field = index(&|q| matches!(q, Quantity::Time | Quantity::Stamp(_)));
+    let angle_field = index(&|q| q == Quantity::Angle);
+    let radial_field = index(&|q| matches!(q, Quantity::Deviation | Quantity::Radius));
+    let position = [0, 1, 2].map(|axis| index(&|q| q == Quantity::Position(axis)));
+    let xy = position[0].zip(position[1]);
+    let no_circle = |e: CircleError, field: usize| {
+        CampaignError::new(entry.place(0, field), Problem::NoCircle { reason: e.to_string() })
+    };
+    let mut plane = None;
+    if let ([Some(x), Some(y), Some(z)], true) = (position, xy.is_some()) {
+        let scatter = scatter(entry, [x, y, z])?;
+        if scatter.count < FEWEST {
+            return Err(too_few(entry, scatter.count));
+        }
+        plane = Some((PlaneView::through(&scatter).map_err(|e| no_circle(e, x))?, z));
+    }
+    // Without angles the time becomes the angle.
+    let polar_by_time = xy.is_none() && angle_field.is_none();
+    let keep = keep_time || polar_by_time;
+    let radius = match radial_field {
+        Some(field) if fields[field].quantity == Quantity::Radius => entry.radius_m,
+        _ => 0.0,
+    };
+    let mut rows = Rows::default();
+    let expected = file.rows();
+    rows.first.reserve_exact(if polar_by_time { 0 } else { expected });
+    rows.second.reserve_exact(expected);
+    rows.time.reserve_exact(if keep && time_field.is_some() { expected } else { 0 });
+    let prepare = |batch: Batch| {
+        let mut columns = batch.columns;
+        let mut column =
+            |field: Option<usize>| field.map_or_else(Vec::new, |f| std::mem::take(&mut columns[f]));
+        let time = column(time_field);
+        let mut heights = [0.0_f64; 2];
+        let (first, second) = match (xy, &plane) {
+            (Some((x, y)), None) => (column(Some(x)), column(Some(y))),
+            (Some((x, y)), Some((view, z))) => {
+                let (mut x, mut y, z) = (column(Some(x)), column(Some(y)), column(Some(*z)));
+                for ((x, y), z) in x.iter_mut().zip(&mut y).zip(&z) {
+                    let height = view.plane.height([*x, *y, *z]);
+                    heights = [heights[0].min(height), heights[1].max(height)];
+                    [*x, *y] = view.project([*x, *y, *z]);
+                }
+                (x, y)
+            }
+            (None, _) => {
+                let mut deviation = column(radial_field);
+                if radius != 0.0 {
+                    deviation.iter_mut().for_each(|v| *v -= radius);
+                }
+                (column(angle_field), deviation)
+            }
+        };
+        Part { time, first, second, heights }
+    };
+    file.walk(prepare, |part| {
+        rows.take(part, keep);
+        Ok(())
+    })?;
+    let count = rows.second.len();
+    if count < FEWEST {
+        return Err(too_few(entry, count));
     }
     let mut run = Run {
         file: entry.file.clone(),
@@ -67,52 +168,40 @@ pub(super) fn load(entry: &Entry, keep_time: bool) -> Result<Loaded, CampaignErr
         temperature_c: entry.temperature_c,
         centre_m: entry.centre_m,
         samples: Samples {
-            angle_rad: Vec::new(),
-            deviation_m: Vec::new(),
+            angle_rad: rows.first,
+            deviation_m: rows.second,
             time_s: None,
             angle_inferred: false,
         },
     };
     let mut notes = Vec::new();
-    let clock = match take(&mut table, |c| c == Column::Time) {
+    // Coarse stamps of a foreign file say nothing that its angles do not say better.
+    let useless = entry.slice.is_some() && !polar_by_time && rows.stamps.coarse();
+    let clock = match time_field.filter(|_| !useless) {
         None => None,
-        Some((field, mut time)) => {
-            let first = time[0];
-            time.iter_mut().for_each(|t| *t -= first);
-            Some((check::clock(entry, &time, field, first)?, time, field))
-        }
+        Some(field) => Some((rows.stamps.clock(entry, field)?, rows.time, field)),
     };
     let mut frame = None;
     let mut covered = TAU;
-    if let Some((x_field, x)) = take(&mut table, |c| c == Column::Position(0)) {
-        let positions = (x, take(&mut table, |c| c == Column::Position(1)).map_or_else(Vec::new, |(_, y)| y));
-        let z = take(&mut table, |c| c == Column::Position(2)).map(|(_, z)| z);
-        let (angle, deviation, found) = polar(entry, x_field, positions, z)?;
-        check::deviation(entry, &deviation, x_field, "the distance from the circle")?;
-        frame = Some(found);
-        run.samples.angle_rad = angle;
-        run.samples.deviation_m = deviation;
-    } else if let Some((field, deviation)) =
-        take(&mut table, |c| matches!(c, Column::Deviation(_) | Column::Radius))
-    {
-        if let (Some((clock, ..)), None) = (&clock, table.index(|c| c == Column::Angle)) {
+    if let Some((x, _)) = xy {
+        let plane = plane.map(|(view, _)| view.with_heights(rows.heights));
+        frame = Some(polar(entry, x, &mut run.samples, plane, &no_circle)?);
+        check::deviation(entry, &run.samples.deviation_m, x, "the distance from the circle")?;
+    } else if let Some(field) = radial_field {
+        if let (Some((clock, ..)), true) = (&clock, polar_by_time) {
             check::slowness(entry, clock.turn_s)?; // a wrong radius explains more than a wrong deviation
         }
-        run.samples.deviation_m = deviations(entry, table.header[field], field, deviation)?;
-        if let Some((_, mut angle)) = take(&mut table, |c| c == Column::Angle) {
-            angle.iter_mut().for_each(|a| *a = a.to_radians());
-            run.samples.angle_rad = angle;
-        }
+        check::deviation(entry, &run.samples.deviation_m, field, fields[field].name)?;
     }
     let mut laps = None;
     let mut kept = None;
-    if run.samples.angle_rad.is_empty() {
+    if polar_by_time {
         // A ballbar knows time only: the recorded lap is one turn.
         let Some((clock, mut time, field)) = clock else {
             unreachable!("the header was checked: time or angle")
         };
         laps = check::duration(entry, clock.turn_s, &run.samples.deviation_m, &mut notes)?;
-        check::gaps(entry, &clock, &time, field, &mut notes)?;
+        check::gaps(entry, &clock, count, field, &mut notes)?;
         if keep_time {
             kept = Some(time.clone());
         }
@@ -122,7 +211,7 @@ pub(super) fn load(entry: &Entry, keep_time: bool) -> Result<Loaded, CampaignErr
         let turn_s = Some(clock.turn_s);
         return finish(run, frame, turn_s, kept, notes, laps);
     }
-    let field = table.index(|c| matches!(c, Column::Angle | Column::Position(0))).unwrap_or(0);
+    let field = index(&|q| matches!(q, Quantity::Angle | Quantity::Position(0))).unwrap_or(0);
     if !unwrapped(&run.samples.angle_rad) {
         unwrap(&mut run.samples.angle_rad);
     }
@@ -138,6 +227,28 @@ pub(super) fn load(entry: &Entry, keep_time: bool) -> Result<Loaded, CampaignErr
     finish(run, frame, turn_s, kept, notes, laps)
 }
 
+fn too_few(entry: &Entry, found: usize) -> CampaignError {
+    let at = if found == 0 { Place::at(&entry.path, 1, 1) } else { entry.row(found - 1) };
+    CampaignError::new(at, Problem::TooFew { found, expected: FEWEST })
+}
+
+/// Moments of the points of a run in space: a walk over the file of its own, unless an import has taken them already.
+fn scatter(entry: &Entry, fields: [usize; 3]) -> Result<Scatter, CampaignError> {
+    if let Some(scatter) = entry.slice.as_ref().and_then(|slice| slice.scatter) {
+        return Ok(scatter);
+    }
+    let mut scatter = Scatter::default();
+    let prepare = |batch: Batch| {
+        let [x, y, z] = fields.map(|f| batch.columns[f].as_slice());
+        Scatter::of_block(x, y, z)
+    };
+    RunFile::open(entry)?.walk(prepare, |part| {
+        scatter.merge(&part);
+        Ok(())
+    })?;
+    Ok(scatter)
+}
+
 fn finish(
     mut run: Run,
     frame: Option<Frame>,
@@ -149,32 +260,12 @@ fn finish(
     let fingerprint = check::fingerprint(&run.samples.deviation_m);
     run.samples.time_s = time;
     let rows = run.samples.deviation_m.len();
-    Ok(Loaded { rows, run, frame, turn_s, notes, laps, fingerprint })
-}
-
-fn take(table: &mut Table, wanted: impl Fn(Column) -> bool) -> Option<(usize, Vec<f64>)> {
-    let field = table.index(wanted)?;
-    Some((field, std::mem::take(&mut table.columns[field])))
-}
-
-fn deviations(
-    entry: &Entry,
-    column: Column,
-    field: usize,
-    mut values: Vec<f64>,
-) -> Result<Vec<f64>, CampaignError> {
-    match column {
-        Column::Deviation(Unit::Um) => values.iter_mut().for_each(|v| *v *= 1e-6),
-        Column::Deviation(Unit::Mm) => values.iter_mut().for_each(|v| *v *= 1e-3),
-        _ => values.iter_mut().for_each(|v| *v = *v * 1e-3 - entry.radius_m),
-    }
-    check::deviation(entry, &values, field, column.name())?;
-    Ok(values)
+    Ok(Loaded { rows, clocked: turn_s.is_some(), run, frame, turn_s, notes, laps, fingerprint })
 }
 
 /// Time stamps into angles, in place: one turn of evenly spaced samples, whatever the rounding of the
 /// stamps; by the stamps themselves where samples were lost.
-fn infer_angles(time: &mut [f64], entry: &Entry, clock: &check::Clock) {
+fn infer_angles(time: &mut [f64], entry: &Entry, clock: &Clock) {
     let (start, d) = (entry.start_angle_rad.unwrap_or(0.0), f64::from(entry.direction.sign()));
     let n = time.len() as f64;
     if clock.gap.is_none() {
@@ -185,29 +276,16 @@ fn infer_angles(time: &mut [f64], entry: &Entry, clock: &check::Clock) {
     }
 }
 
-/// Points into polar samples about their least-squares circle, in place.
+/// Points (x as angle, y as deviation) into polar samples about their least-squares circle, in place.
 fn polar(
     entry: &Entry,
     field: usize,
-    (mut x, mut y): (Vec<f64>, Vec<f64>),
-    z: Option<Vec<f64>>,
-) -> Result<(Vec<f64>, Vec<f64>, Frame), CampaignError> {
-    let no_circle = |e: CircleError| {
-        CampaignError::new(table::place(&entry.path, 0, field), Problem::NoCircle { reason: e.to_string() })
-    };
-    let mut plane = None;
-    let scale = |v: &mut Vec<f64>| v.iter_mut().for_each(|v| *v *= 1e-3);
-    scale(&mut x);
-    scale(&mut y);
-    if let Some(mut z) = z {
-        scale(&mut z);
-        let found = PlaneView::of(&x, &y, &z).map_err(no_circle)?;
-        for ((x, y), z) in x.iter_mut().zip(&mut y).zip(&z) {
-            [*x, *y] = found.project([*x, *y, *z]);
-        }
-        plane = Some(found);
-    }
-    let fit = Xy::new(&x, &y).and_then(|points| circle::fit(&points)).map_err(no_circle)?;
+    samples: &mut Samples,
+    plane: Option<PlaneView>,
+    no_circle: &dyn Fn(CircleError, usize) -> CampaignError,
+) -> Result<Frame, CampaignError> {
+    let (x, y) = (&mut samples.angle_rad, &mut samples.deviation_m);
+    let fit = fit_circle(x, y).map_err(|e| no_circle(e, field))?;
     let Circle { centre, radius } = fit.circle;
     let relative = radius / entry.radius_m;
     if (relative - 1.0).abs() > check::LARGEST_SIZE_ERROR {
@@ -216,18 +294,19 @@ fn polar(
             programmed_mm: entry.radius_m * 1e3,
             hint: check::unit_hint(relative),
         };
-        return Err(CampaignError::new(table::place(&entry.path, 0, field), problem));
+        return Err(CampaignError::new(entry.place(0, field), problem));
     }
-    for (x, y) in x.iter_mut().zip(&mut y) {
-        let (dx, dy) = (*x - centre[0], *y - centre[1]);
-        *x = dy.atan2(dx);
-        *y = dx.hypot(dy) - entry.radius_m;
-    }
-    let frame = match plane {
+    x.par_chunks_mut(1 << 16).zip(y.par_chunks_mut(1 << 16)).for_each(|(x, y)| {
+        for (x, y) in x.iter_mut().zip(y) {
+            let (dx, dy) = (*x - centre[0], *y - centre[1]);
+            *x = dy.atan2(dx);
+            *y = dx.hypot(dy) - entry.radius_m;
+        }
+    });
+    Ok(match plane {
         None => Frame { origin_m: [centre[0], centre[1], 0.0], plane: None },
         Some(view) => Frame { origin_m: view.lift(centre), plane: Some(view.tilt()) },
-    };
-    Ok((x, y, frame))
+    })
 }
 
 /// A plane seen from the positive end of the axis nearest to its normal, so that CCW means what it means
@@ -238,11 +317,16 @@ struct PlaneView {
 }
 
 impl PlaneView {
-    fn of(x: &[f64], y: &[f64], z: &[f64]) -> Result<Self, CircleError> {
-        let plane = Plane::fit(x.iter().zip(y).zip(z).map(|((&x, &y), &z)| [x, y, z]))?;
+    fn through(scatter: &Scatter) -> Result<Self, CircleError> {
+        let plane = Plane::through(scatter)?;
         let largest =
             plane.normal.iter().copied().fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
         Ok(Self { plane, flip: largest.signum() })
+    }
+
+    fn with_heights(mut self, [lowest, highest]: [f64; 2]) -> Self {
+        self.plane.flatness = highest - lowest;
+        self
     }
 
     fn project(&self, point: [f64; 3]) -> [f64; 2] {

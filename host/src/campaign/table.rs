@@ -1,12 +1,9 @@
 //! The numbers of a run's CSV, fast: chunked reads, exact floats, errors by line and column.
+use super::blocks::{BLOCK, Fault, Text};
 use super::error::{CampaignError, Place, Problem};
-use rayon::prelude::*;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
-use std::path::Path;
-
-/// Bytes parsed by one task, and tasks read ahead at a time: together they bound the memory beside the columns.
-const BLOCK: usize = 1 << 20;
-const BLOCKS: usize = 8;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
 
 const EXPECTED_RUN: &str = "a CSV with one run";
 
@@ -62,16 +59,26 @@ impl Column {
     }
 }
 
-/// Columns of one run as written in its file. Row `k` (from 0) stands in line `k + 2`.
+/// Rows as written in the file, column by column.
+#[derive(Debug)]
+pub(crate) struct Batch {
+    /// One vector a field.
+    pub(crate) columns: Vec<Vec<f64>>,
+    /// Rows in each.
+    pub(crate) rows: usize,
+}
+
+/// A file of one of the contract's shapes. Row `k` (from 0) stands in line `k + 2`.
 #[derive(Debug)]
 pub(crate) struct Table {
+    path: PathBuf,
     pub(crate) header: Vec<Column>,
-    pub(crate) columns: Vec<Vec<f64>>,
+    text: Text,
 }
 
 impl Table {
-    /// Reads a file of one of the contract's shapes.
-    pub(crate) fn read(path: &Path) -> Result<Self, CampaignError> {
+    /// Opens a file and reads its header.
+    pub(crate) fn open(path: &Path) -> Result<Self, CampaignError> {
         let io = |e: std::io::Error| CampaignError::io(path, "read", EXPECTED_RUN, &e);
         if path.is_dir() {
             return Err(CampaignError::new(
@@ -79,79 +86,54 @@ impl Table {
                 Problem::IsDirectory { expected: EXPECTED_RUN },
             ));
         }
-        let mut file = std::fs::File::open(path).map_err(io)?;
-        let size = file.metadata().map_err(io)?.len();
-        let mut buffer = Vec::with_capacity(BLOCK.min(usize::try_from(size).unwrap_or(BLOCK)) + 1);
-        file.by_ref().take(BLOCK as u64).read_to_end(&mut buffer).map_err(io)?;
-        if buffer.is_empty() {
+        let mut text = Text::open(std::fs::File::open(path).map_err(io)?, BLOCK).map_err(io)?;
+        let head = text.head();
+        if head.is_empty() {
             return Err(CampaignError::new(Place::file(path), Problem::Empty { expected: EXPECTED_RUN }));
         }
-        let start = if buffer.starts_with(b"\xEF\xBB\xBF") { 3 } else { 0 };
-        let end = buffer[start..].iter().position(|&b| b == b'\n').map_or(buffer.len(), |p| start + p);
-        let header = parse_header(path, &buffer[start..end])?;
-        let mut body = (end + 1).min(buffer.len());
-
-        // Rows are about as long as the first ones: reserve once, so that growing never doubles the memory.
-        let sample = &buffer[body..];
-        let lines = sample.iter().filter(|&&b| b == b'\n').count().max(1) as u64;
-        let rows = size * lines / (sample.len().max(1) as u64) + size / 64 + 16;
-        let rows = usize::try_from(rows.min(size / 2 + 1)).unwrap_or(0);
-        let mut columns: Vec<Vec<f64>> = header.iter().map(|_| Vec::with_capacity(rows)).collect();
-
-        let mut blank_at: Option<u64> = None;
-        let mut consumed = 0u64; // bytes of the file before `buffer`
-        loop {
-            let last = buffer.len() as u64 + consumed >= size && {
-                let before = buffer.len();
-                file.by_ref().take(BLOCK as u64).read_to_end(&mut buffer).map_err(io)?;
-                buffer.len() == before
-            };
-            let whole = if last {
-                buffer.len()
-            } else {
-                buffer.iter().rposition(|&b| b == b'\n').map_or(body, |p| p + 1)
-            };
-            if whole == body && !last && buffer.len() > BLOCKS * BLOCK {
-                return Err(explain(path, &header, consumed + body as u64)); // no line end in sight: not a table
-            }
-            let blocks = split_at_lines(&buffer[body..whole], BLOCK);
-            let width = header.len();
-            let parse = |block: &&[u8]| parse_block(block, width);
-            let parsed: Vec<_> = if blocks.len() > 1 {
-                blocks.par_iter().map(parse).collect()
-            } else {
-                blocks.iter().map(parse).collect()
-            };
-            for (block, result) in blocks.iter().zip(parsed) {
-                let start = consumed + (block.as_ptr() as usize - buffer.as_ptr() as usize) as u64;
-                let parsed = result.map_err(|at| explain(path, &header, start + at as u64))?;
-                if let (Some(at), true) = (blank_at, parsed.rows > 0) {
-                    return Err(explain(path, &header, at));
-                }
-                for (column, part) in columns.iter_mut().zip(&parsed.columns) {
-                    column.extend_from_slice(part);
-                }
-                blank_at = blank_at.or(parsed.blank_at.map(|at| start + at as u64));
-            }
-            if last {
-                break;
-            }
-            consumed += whole as u64;
-            buffer.drain(..whole);
-            body = 0;
-            file.by_ref().take((BLOCK * BLOCKS) as u64).read_to_end(&mut buffer).map_err(io)?;
-        }
-        Ok(Self { header, columns })
+        let start = if head.starts_with(b"\xEF\xBB\xBF") { 3 } else { 0 };
+        let end = head[start..].iter().position(|&b| b == b'\n').map_or(head.len(), |p| start + p);
+        let header = parse_header(path, &head[start..end])?;
+        text.skip(end + 1);
+        Ok(Self { path: path.to_path_buf(), header, text })
     }
 
-    /// Number of rows.
+    /// Rows to expect.
     pub(crate) fn rows(&self) -> usize {
-        self.columns.first().map_or(0, Vec::len)
+        self.text.rows()
     }
 
-    /// Index of a column.
-    pub(crate) fn index(&self, wanted: impl Fn(Column) -> bool) -> Option<usize> {
-        self.header.iter().position(|&c| wanted(c))
+    /// Walks all rows: `prepare` works on batches on all cores, `take` gets what it made in the order of the file.
+    pub(crate) fn walk<T: Send>(
+        self,
+        prepare: impl Fn(Batch) -> T + Sync,
+        mut take: impl FnMut(T) -> Result<(), CampaignError>,
+    ) -> Result<(), CampaignError> {
+        let (path, header, width) = (&self.path, &self.header, self.header.len());
+        let mut blank_at: Option<u64> = None;
+        let parse = |at: u64, block: &[u8]| {
+            let parsed = parse_block(block, width).map_err(|line| at + line as u64)?;
+            let blank = parsed.blank_at.map(|blank| at + blank as u64);
+            let rows = parsed.rows;
+            let prepared = (rows > 0).then(|| prepare(Batch { columns: parsed.columns, rows }));
+            Ok((blank, prepared))
+        };
+        let walked = self.text.walk(parse, |result: Result<_, u64>| {
+            let (blank, prepared) = result.map_err(|at| explain(path, header, at))?;
+            if let Some(prepared) = prepared {
+                if let Some(at) = blank_at {
+                    return Err(explain(path, header, at)); // blank lines may end a file, not divide it
+                }
+                take(prepared)?;
+            }
+            blank_at = blank_at.or(blank);
+            Ok(ControlFlow::Continue(()))
+        });
+        walked.map_err(|fault| match fault {
+            Fault::Io(e) => CampaignError::io(path, "read", EXPECTED_RUN, &e),
+            Fault::Endless(at) => explain(path, header, at),
+            Fault::Taken(error) => error,
+        })
     }
 }
 
@@ -221,21 +203,6 @@ pub(crate) fn shorten(text: &str) -> String {
     } else {
         text.chars().take(57).chain("…".chars()).collect()
     }
-}
-
-/// Cuts at line ends into blocks of at least `size` bytes (the last may be shorter).
-fn split_at_lines(mut bytes: &[u8], size: usize) -> Vec<&[u8]> {
-    let mut blocks = Vec::new();
-    while bytes.len() > size {
-        let cut = bytes[size..].iter().position(|&b| b == b'\n').map_or(bytes.len(), |p| size + p + 1);
-        let (block, rest) = bytes.split_at(cut);
-        blocks.push(block);
-        bytes = rest;
-    }
-    if !bytes.is_empty() {
-        blocks.push(bytes);
-    }
-    blocks
 }
 
 struct Parsed {

@@ -20,8 +20,7 @@ pub struct Args {
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let ballbar = args.ballbar.as_deref().map(ballbar20::read).transpose()?;
-    let opened = args.source.open(out)?;
-    let manifest = &opened.manifest;
+    let manifest = &args.source.open(out)?;
     let bar = if out.draws() {
         indicatif::ProgressBar::new(manifest.runs.len() as u64).with_message("runs")
     } else {

@@ -73,8 +73,7 @@ impl From<FitError> for Failure {
 
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
-    let opened = args.source.open(out)?;
-    let manifest = &opened.manifest;
+    let manifest = &args.source.open(out)?;
     let bar = if out.draws() {
         indicatif::ProgressBar::new(manifest.runs.len() as u64).with_message("runs")
     } else {

@@ -1,7 +1,7 @@
 //! A campaign, or a foreign file where a campaign stands.
 use super::{Failure, Output};
 use crate::campaign::import::{self, Added, Format, Laps, Options};
-use crate::campaign::{Campaign, Direction, Manifest, read_with_notes};
+use crate::campaign::{Campaign, Direction, Manifest};
 use std::path::{Path, PathBuf};
 
 /// Heading of these options; given one by one, since a heading for the struct would go on behind it.
@@ -39,14 +39,6 @@ pub struct Source {
     foreign: Foreign,
 }
 
-/// A campaign that is open; a foreign file lives in a directory that goes when this does.
-#[derive(Debug)]
-pub struct Opened {
-    /// The campaign.
-    pub manifest: Manifest,
-    _folder: Option<tempfile::TempDir>,
-}
-
 pub(super) fn length(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(v) if v > 0.0 && v <= 1e5 => Ok(v),
@@ -82,12 +74,12 @@ impl Foreign {
 }
 
 impl Source {
-    /// Opens the campaign, or imports the foreign file for this command alone.
-    pub fn open(&self, out: Output) -> Result<Opened, Failure> {
+    /// Opens the campaign, or the foreign file as a campaign of one run.
+    pub fn open(&self, out: Output) -> Result<Manifest, Failure> {
         let path = &self.campaign;
         let own = path.is_dir() || !path.exists() || path.extension().is_some_and(|e| e == "toml");
         if own {
-            return Ok(Opened { manifest: Manifest::open(path)?, _folder: None });
+            return Ok(Manifest::open(path)?);
         }
         let Some(options) = self.foreign.options() else {
             // What is no measurement at all is bad input, whatever is missing beside it.
@@ -99,15 +91,11 @@ impl Source {
             );
             return Err(Failure::usage(text).help("add --radius MM --feed MM_S --direction ccw|cw"));
         };
-        let cannot = |e: std::io::Error| super::failure::cannot_write(&std::env::temp_dir(), &e);
-        let folder = tempfile::tempdir().map_err(cannot)?;
         let bar = Progress::new(out, std::slice::from_ref(path));
-        let added = import::add(std::slice::from_ref(path), folder.path(), &options, &|p, b| bar.tell(p, b))?;
+        let (manifest, added) = import::open(path, &options, &|p, b| bar.tell(p, b))?;
         bar.done();
         added.iter().for_each(|a| tell(a, &options, out));
-        let mut manifest = Manifest::open(folder.path())?;
-        manifest.name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-        Ok(Opened { manifest, _folder: Some(folder) })
+        Ok(manifest)
     }
 
     /// The campaign was read, but what was asked cannot be answered from it.
@@ -118,10 +106,8 @@ impl Source {
 
     /// Reads the whole campaign into memory and prints its notes.
     pub fn read(&self, out: Output) -> Result<Campaign, Failure> {
-        let opened = self.open(out)?;
-        let (mut campaign, notes) = read_with_notes(&opened.manifest.path)?;
+        let (campaign, notes) = self.open(out)?.read()?;
         notes.iter().for_each(|note| out.note(note));
-        campaign.name = opened.manifest.name;
         Ok(campaign)
     }
 }

@@ -11,6 +11,7 @@
 //! | `moments` | [`Moments`]: centred, mergeable, one pass |
 //! | `algebraic` | [`kasa`] and [`hyper`]: closed circles from moments |
 //! | `geometric` | [`refine`]: least squares of the distances, with a report |
+//! | `scatter` | [`Scatter`]: moments of points in space, mergeable, one pass |
 //! | `plane` | [`Plane`] of 3-D points, projection, tilt, flatness |
 mod algebraic;
 mod geometric;
@@ -18,6 +19,7 @@ mod lanes;
 mod moments;
 mod plane;
 mod points;
+mod scatter;
 #[cfg(test)]
 mod tests;
 
@@ -26,6 +28,7 @@ pub use geometric::{CircleFit, Stop, refine};
 pub use moments::Moments;
 pub use plane::Plane;
 pub use points::{BLOCK, Merge, Points, Sampled, Xy};
+pub use scatter::Scatter;
 
 use core::fmt;
 

@@ -1,5 +1,5 @@
 //! The plane of a circle measured in space.
-use super::CircleError;
+use super::{BLOCK, CircleError, Merge, Scatter};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use num_traits::Float;
 
@@ -15,7 +15,7 @@ pub struct Plane {
     pub axes: [[f64; 3]; 2],
     /// Angle between normal and z, rad, 0…π/2.
     pub tilt_rad: f64,
-    /// Root mean square distance of the points from the plane, m.
+    /// Root mean square distance of the points from the plane, m; from moments alone to 1e-8 of their spread.
     pub rms: f64,
     /// Flatness: highest minus lowest point over the plane, m.
     pub flatness: f64,
@@ -30,30 +30,53 @@ impl Plane {
     where
         I: Iterator<Item = [f64; 3]> + Clone,
     {
-        let count = points.clone().count();
-        if count < 3 {
-            return Err(CircleError::TooFew { points: count });
-        }
-        let n = count as f64;
-        let Some(first) = points.clone().next() else { return Err(CircleError::TooFew { points: 0 }) };
-        let first = Vector3::from(first);
-        let offset = points.clone().map(|p| Vector3::from(p) - first).sum::<Vector3<f64>>() / n;
-        let centroid = first + offset;
-        let mut scatter = Matrix3::zeros();
+        let mut scatter = Scatter::default();
+        let mut block = [[0.0; BLOCK]; 3];
+        let mut n = 0;
+        let mut flush = |block: &[[f64; BLOCK]; 3], n: usize| {
+            let [x, y, z] = block;
+            scatter.merge(&Scatter::of_block(&x[..n], &y[..n], &z[..n]));
+        };
         for p in points.clone() {
-            let d = (Vector3::from(p) - first) - offset;
-            scatter += d * d.transpose();
+            for (axis, v) in block.iter_mut().zip(p) {
+                axis[n] = v;
+            }
+            n += 1;
+            if n == BLOCK {
+                flush(&block, n);
+                n = 0;
+            }
         }
-        scatter /= n;
-        if !scatter.iter().all(|v| v.is_finite()) {
+        flush(&block, n);
+        let plane = Self::through(&scatter)?;
+        let (mut lowest, mut highest, mut squares) = (0.0_f64, 0.0_f64, 0.0);
+        for height in points.map(|p| plane.height(p)) {
+            (lowest, highest) = (lowest.min(height), highest.max(height));
+            squares += height * height;
+        }
+        let rms = Float::sqrt(squares / scatter.count as f64);
+        Ok(Self { rms, flatness: highest - lowest, ..plane })
+    }
+
+    /// The plane of points by their moments. Its `flatness` is NaN: moments know of no extremes, see [`height`](Self::height).
+    ///
+    /// # Errors
+    /// As [`fit`](Self::fit).
+    pub fn through(scatter: &Scatter) -> Result<Self, CircleError> {
+        if scatter.count < 3 {
+            return Err(CircleError::TooFew { points: scatter.count });
+        }
+        let [xx, xy, xz, yy, yz, zz] = scatter.sums.map(|sum| sum / scatter.count as f64);
+        let moments = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+        if !moments.iter().all(|v| v.is_finite()) {
             return Err(CircleError::NonFinite);
         }
-        let spread = Float::sqrt(scatter.trace());
-        let digits = 4.0 * f64::EPSILON * centroid.amax();
+        let spread = Float::sqrt(moments.trace());
+        let digits = 4.0 * f64::EPSILON * Vector3::from(scatter.mean).amax();
         if spread <= digits.max(f64::MIN_POSITIVE) || !(1.0 / (spread * spread)).is_finite() {
             return Err(CircleError::Coincident);
         }
-        let eigen = SymmetricEigen::new(scatter / (spread * spread));
+        let eigen = SymmetricEigen::new(moments / (spread * spread));
         let mut order = [0, 1, 2];
         order.sort_unstable_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
         // Below 1e-7 of the spread the second direction is lost in the rounding of the scatter.
@@ -67,20 +90,20 @@ impl Plane {
         let reference = if Float::abs(normal.x) < 0.999 { Vector3::x() } else { Vector3::y() };
         let along = (reference - normal * normal.dot(&reference)).normalize();
         let across = normal.cross(&along);
-        let (mut lowest, mut highest, mut squares) = (0.0_f64, 0.0_f64, 0.0);
-        for p in points {
-            let height = ((Vector3::from(p) - first) - offset).dot(&normal);
-            (lowest, highest) = (lowest.min(height), highest.max(height));
-            squares += height * height;
-        }
         Ok(Self {
-            centroid: centroid.into(),
+            centroid: scatter.mean,
             normal: normal.into(),
             axes: [along.into(), across.into()],
             tilt_rad: Float::atan2(Float::hypot(normal.x, normal.y), normal.z),
-            rms: Float::sqrt(squares / n),
-            flatness: highest - lowest,
+            rms: spread * Float::sqrt(eigen.eigenvalues[order[0]].max(0.0)),
+            flatness: f64::NAN,
         })
+    }
+
+    /// Distance of a point from the plane, m, positive on the side of the normal.
+    pub fn height(&self, point: [f64; 3]) -> f64 {
+        let d: [f64; 3] = core::array::from_fn(|i| point[i] - self.centroid[i]);
+        self.normal[0] * d[0] + self.normal[1] * d[1] + self.normal[2] * d[2]
     }
 
     /// Coordinates of a point along [`axes`](Self::axes), from the centroid, m.

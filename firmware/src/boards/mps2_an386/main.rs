@@ -33,11 +33,24 @@ mod watchdog;
 mod image {
     use super::{common, flash, uart, vectors, watchdog};
     use cortex_m_rt::entry;
+    use embedded_io::{Read, Write};
     use giotto_firmware::server::Board;
 
     /// Clock of core and peripherals (DAI0386 2.5).
     const CLOCK_HZ: u32 = 25_000_000;
     const BOARD: Board = Board { name: "mps2-an386", build: env!("GIOTTO_BUILD"), tick_hz: common::TICK_HZ };
+
+    /// Sends back what comes, byte for byte: what the line itself carries (feature `echo`, for `giotto-hil link`).
+    fn echo(mut link: uart::Uart) -> ! {
+        let mut bytes = [0; 64];
+        loop {
+            if let Ok(count) = link.read(&mut bytes)
+                && link.write(&bytes[..count]).is_err()
+            {
+                cortex_m::asm::udf();
+            }
+        }
+    }
 
     #[entry]
     fn main() -> ! {
@@ -48,6 +61,9 @@ mod image {
             Some((link, desk, common::buffers()?))
         });
         let Some((link, desk, buffers)) = started else { cortex_m::asm::udf() };
+        if cfg!(feature = "echo") {
+            echo(link)
+        }
         watchdog::start(CLOCK_HZ);
         let ports = common::Ports {
             link,

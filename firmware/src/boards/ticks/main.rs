@@ -19,7 +19,7 @@ mod image {
     use cortex_m::peripheral::syst::SystClkSource;
     use cortex_m_rt::entry;
     use defmt as _;
-    use giotto_firmware::engine::bench::{Arc, Plain, Streamed};
+    use giotto_firmware::engine::bench::{Arc, Libm, Plain, Streamed, Turning};
     use giotto_firmware::engine::flag;
 
     /// Nothing logs here.
@@ -145,8 +145,44 @@ mod image {
         streamed.sound().then_some(range)
     }
 
-    fn plain(floor: u32) -> Range {
-        let mut plain = Plain::new();
+    /// A phase of 32 bits and `idsp`'s table of sines.
+    #[derive(Default)]
+    struct Idsp {
+        phase: i32,
+    }
+
+    impl Turning for Idsp {
+        fn advance(&mut self, by_rad: f32) {
+            const PER_RAD: f32 = (2_147_483_648.0 / core::f64::consts::PI) as f32;
+            self.phase = self.phase.wrapping_add((by_rad * PER_RAD) as i32);
+        }
+
+        fn turned(&self, re: f32, im: f32) -> [[f32; 2]; 2] {
+            let (cos, sin) = idsp::cossin(self.phase);
+            let [cos, sin] = [cos, sin].map(|v| v as f32 * (1.0 / 2_147_483_648.0));
+            [[cos, sin], [re * cos - im * sin, re * sin + im * cos]]
+        }
+    }
+
+    /// An angle and nalgebra's rotation.
+    #[derive(Default)]
+    struct Nalgebra {
+        theta: f32,
+    }
+
+    impl Turning for Nalgebra {
+        fn advance(&mut self, by_rad: f32) {
+            self.theta += by_rad;
+        }
+
+        fn turned(&self, re: f32, im: f32) -> [[f32; 2]; 2] {
+            let rotation = nalgebra::Rotation2::new(self.theta);
+            [(rotation * nalgebra::Vector2::x()).into(), (rotation * nalgebra::Vector2::new(re, im)).into()]
+        }
+    }
+
+    fn plain<T: Turning>(floor: u32) -> Range {
+        let mut plain = Plain::<T>::default();
         let mut range = Range::NONE;
         // To the end of its ramp.
         for _ in 0..400_u16 {
@@ -166,7 +202,9 @@ mod image {
         let [all, steady] = arc(true, floor)?;
         say("arc_extended", &all);
         say("arc_extended_steady", &steady);
-        say("naive_libm", &plain(floor));
+        say("naive_libm", &plain::<Libm>(floor));
+        say("naive_nalgebra", &plain::<Nalgebra>(floor));
+        say("naive_idsp", &plain::<Idsp>(floor));
         Some(())
     }
 

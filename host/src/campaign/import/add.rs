@@ -1,11 +1,15 @@
 //! Recordings as runs of a campaign: every file is read and checked before anything of the campaign changes.
+use super::Quantity;
 use super::detect::Format;
-use super::recording::Recording;
-use super::trim::{self, Turns};
+use super::rows::Slice;
+use super::scan::scan;
+use super::trim::Turns;
 use crate::campaign::manifest::{Entry, Manifest};
-use crate::campaign::{CampaignError, Direction, Frame, Note, Place, Problem, check, samples, write};
-use std::io::{BufWriter, Write};
-use std::ops::Range;
+use crate::campaign::run_file::RunFile;
+use crate::campaign::table::Batch;
+use crate::campaign::{CampaignError, Direction, Frame, Note, Place, Problem, samples, write};
+use std::io::Write;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, value};
@@ -35,6 +39,26 @@ pub struct Options {
     pub machine: Option<String>,
     /// Which laps become runs.
     pub laps: Laps,
+}
+
+impl Options {
+    /// A run of which the file is `path` and the rows are those of `slice`.
+    pub(super) fn entry(&self, path: &Path, slice: Slice) -> Entry {
+        Entry {
+            file: path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
+            path: path.to_path_buf(),
+            line: 0,
+            radius_m: self.radius_m,
+            feed_m_s: self.feed_m_s,
+            direction: self.direction.unwrap_or(Direction::Ccw),
+            start_angle_rad: self.start_angle_rad,
+            started_s: self.started_s,
+            temperature_c: self.temperature_c,
+            centre_m: self.centre_m,
+            arc_rad: None,
+            slice: Some(slice),
+        }
+    }
 }
 
 /// Which laps of a recording become runs.
@@ -100,10 +124,68 @@ pub fn add(
     staged
 }
 
+/// A lap of a foreign file, found and not yet read.
+struct Lap {
+    entry: Entry,
+    added: Added,
+}
+
 /// A run on disk under a temporary name.
 struct Staged {
     file: NamedTempFile,
     added: Added,
+}
+
+/// The laps of a file that become runs.
+fn laps(path: &Path, options: &Options, progress: &dyn Fn(u64)) -> Result<Vec<Lap>, CampaignError> {
+    let scan = scan(path, options, progress)?;
+    let Turns { sign, arc_rad, feed_in, feed_out, .. } = scan.turns;
+    let direction = match (options.direction, sign) {
+        (Some(direction), _) => direction,
+        (None, sign) if sign > 0.0 => Direction::Ccw,
+        (None, sign) if sign < 0.0 => Direction::Cw,
+        _ => {
+            let line = scan.slices.first().map_or(1, |slice| slice.first_line - scan.laps[0].start);
+            return Err(CampaignError::new(Place::at(path, line, 1), Problem::DirectionUnknown));
+        }
+    };
+    let wanted = if options.laps == Laps::First { 1 } else { scan.laps.len() };
+    let each = scan.slices.into_iter().zip(scan.target_radius_m).enumerate().take(wanted);
+    let lap = |(index, (slice, target_radius_m)): (usize, (Slice, Option<f64>))| Lap {
+        added: Added {
+            file: String::new(),
+            source: path.to_path_buf(),
+            format: scan.format,
+            rows: scan.rows,
+            lines: (slice.line(0), slice.line(slice.rows - 1)),
+            lap: (index + 1, scan.laps.len()),
+            left_out: (feed_in, feed_out),
+            direction,
+            arc_rad,
+            frame: None,
+            turn_s: None,
+            target_radius_m,
+            notes: Vec::new(),
+        },
+        entry: Entry { direction, arc_rad, ..options.entry(path, slice) },
+    };
+    Ok(each.map(lap).collect())
+}
+
+/// A foreign file as a campaign of its first lap (or of each), which stays where it is: commands read it from there.
+///
+/// # Errors
+/// As [`add`]; what only shows in the samples themselves shows when they are read.
+pub fn open(
+    path: &Path,
+    options: &Options,
+    progress: &dyn Fn(&Path, u64),
+) -> Result<(Manifest, Vec<Added>), CampaignError> {
+    let laps = laps(path, options, &|bytes| progress(path, bytes))?;
+    let (runs, added) = laps.into_iter().map(|lap| (lap.entry, lap.added)).unzip();
+    let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    let machine = options.machine.clone().unwrap_or_else(|| "unknown".to_owned());
+    Ok((Manifest { path: path.to_path_buf(), name, machine, runs, notes: Vec::new() }, added))
 }
 
 fn stage(
@@ -114,172 +196,85 @@ fn stage(
 ) -> Result<Vec<Staged>, CampaignError> {
     let mut staged = Vec::new();
     for path in files {
-        let tell = |bytes| progress(path, bytes);
-        let recording = Recording::read(path, options.format, options.columns.as_deref(), &tell)?;
-        let refuse = |problem| CampaignError::new(Place::at(path, recording.first_line, 1), problem);
-        if recording.rows < samples::FEWEST {
-            return Err(refuse(Problem::TooFew { found: recording.rows, expected: samples::FEWEST }));
-        }
-        let turns = turns(&recording, path, options).map_err(refuse)?;
-        let direction = match (options.direction, turns.sign) {
-            (Some(direction), _) => direction,
-            (None, sign) if sign > 0.0 => Direction::Ccw,
-            (None, sign) if sign < 0.0 => Direction::Cw,
-            _ => return Err(refuse(Problem::DirectionUnknown)),
-        };
-        let laps = if options.laps == Laps::First { 1 } else { turns.laps.len() };
-        for (index, rows) in turns.laps.iter().take(laps).enumerate() {
-            let file = write_rows(&recording, rows.clone(), dir)?;
-            let entry = Entry {
-                file: file.path().display().to_string(),
-                path: file.path().to_path_buf(),
-                line: 0,
-                radius_m: options.radius_m,
-                feed_m_s: options.feed_m_s,
-                direction,
-                start_angle_rad: options.start_angle_rad,
-                started_s: options.started_s,
-                temperature_c: options.temperature_c,
-                centre_m: options.centre_m,
-                arc_rad: turns.arc_rad,
-            };
-            let first = recording.first_line + rows.start;
-            let loaded = samples::load(&entry, false).map_err(|e| at_source(e, path, first))?;
-            staged.push(Staged {
-                file,
-                added: Added {
-                    file: String::new(),
-                    source: path.clone(),
-                    format: recording.format,
-                    rows: recording.rows,
-                    lines: (first, recording.first_line + rows.end - 1),
-                    lap: (index + 1, turns.laps.len()),
-                    left_out: (turns.feed_in, turns.feed_out),
-                    direction,
-                    arc_rad: turns.arc_rad,
-                    frame: loaded.frame,
-                    turn_s: loaded.turn_s,
-                    target_radius_m: target_radius(&recording, rows),
-                    notes: loaded
-                        .notes
-                        .into_iter()
-                        .map(|n| Note { at: moved(&n.at, path, first), ..n })
-                        .collect(),
-                },
-            });
+        for Lap { entry, mut added } in laps(path, options, &|bytes| progress(path, bytes))? {
+            // Read as any command would read it; what it is refused for it is refused for here.
+            let loaded = samples::load(&entry, false)?;
+            (added.frame, added.turn_s, added.notes) = (loaded.frame, loaded.turn_s, loaded.notes);
+            drop(loaded.run);
+            let file = write_rows(&entry, loaded.clocked, dir)?;
+            staged.push(Staged { file, added });
         }
     }
     Ok(staged)
 }
 
-/// A place in a staged file, said of the line that it came from.
-fn moved(at: &Place, source: &Path, first: usize) -> Place {
-    let line = at.line.map(|l| l.saturating_sub(2) + first);
-    Place { file: source.to_path_buf(), line, column: line.map(|_| 1) }
-}
-
-fn at_source(error: CampaignError, source: &Path, first: usize) -> CampaignError {
-    CampaignError::new(moved(&error.at, source, first), *error.problem)
-}
-
-fn turns(recording: &Recording, path: &Path, options: &Options) -> Result<Turns, Problem> {
-    if !recording.position_m[0].is_empty() {
-        return trim::of_points(&recording.position_m, &recording.time_s, options.radius_m);
-    }
-    if !recording.angle_rad.is_empty() {
-        let mut angle = recording.angle_rad.clone();
-        trim::unwrap(&mut angle);
-        return trim::of_angles(&angle, &recording.time_s);
-    }
-    // Deviations over time: readings beyond the range at either end are feed-in and feed-out.
-    let deviation = |k: usize| match recording.deviation_m.get(k) {
-        Some(v) => *v,
-        None => recording.radius_m[k] - options.radius_m,
-    };
-    let inside = |k: usize| deviation(k).abs() < check::INSTRUMENT_LIMIT_M;
-    let rows = recording.rows;
-    let (mut from, mut to) = (0, rows);
-    if (0..rows).filter(|&k| inside(k)).count() * 2 > rows {
-        from = (0..rows).find(|&k| inside(k)).unwrap_or(0);
-        to = (0..rows).rfind(|&k| inside(k)).map_or(rows, |k| k + 1);
-    }
-    let time = &recording.time_s[from..to];
-    let n = time.len();
-    let last = time[n - 1] - time[0];
-    let turn_s = last * n as f64 / (n as f64 - 1.0);
-    let values: Vec<f64> = (from..to).map(deviation).collect();
-    let entry = Entry {
-        file: String::new(),
-        path: path.to_path_buf(),
-        line: 0,
-        radius_m: options.radius_m,
-        feed_m_s: options.feed_m_s,
-        direction: Direction::Ccw,
-        start_angle_rad: None,
-        started_s: None,
-        temperature_c: None,
-        centre_m: None,
-        arc_rad: None,
-    };
-    let found = check::duration(&entry, turn_s, &values, &mut Vec::new()).map_err(|e| *e.problem)?;
-    let count = found.unwrap_or(1) as usize;
-    let edge = |k: usize| from + n * k / count;
-    let laps: Vec<Range<usize>> = (0..count).map(|k| edge(k)..edge(k + 1)).collect();
-    Ok(Turns { laps, arc_rad: None, feed_in: from, feed_out: rows - to, sign: 0.0 })
-}
-
-/// Radius of the circle through the controller's own positions.
-fn target_radius(recording: &Recording, rows: &Range<usize>) -> Option<f64> {
-    if recording.target_m[0].is_empty() || recording.target_m[1].is_empty() {
-        return None;
-    }
-    let all: Vec<usize> = rows.clone().collect();
-    let (x, y) = trim::flatten(&recording.target_m, &all)?;
-    let points = giotto_shared::circle::Xy::new(&x[rows.clone()], &y[rows.clone()]).ok()?;
-    giotto_shared::circle::fit(&points).ok().map(|fit| fit.circle.radius)
-}
-
-/// Rows as a CSV of the contract under a temporary name in the campaign.
-fn write_rows(recording: &Recording, rows: Range<usize>, dir: &Path) -> Result<NamedTempFile, CampaignError> {
+/// A run as a CSV of the contract under a temporary name in the campaign; `clocked` with its time stamps.
+fn write_rows(entry: &Entry, clocked: bool, dir: &Path) -> Result<NamedTempFile, CampaignError> {
     let io = |e: std::io::Error| CampaignError::io(dir, "written", "a place for a file", &e);
-    let mut columns: Vec<(&str, &[f64], f64, usize)> = Vec::new();
+    let fields = RunFile::open(entry)?.fields();
     let degrees = 180.0 / std::f64::consts::PI;
-    let positions = ["x_mm", "y_mm", "z_mm"].into_iter().zip(&recording.position_m);
-    let time = &recording.time_s;
-    let distinct = 1 + rows.clone().skip(1).filter(|&k| !time.is_empty() && time[k] != time[k - 1]).count();
-    // Stamps in whole seconds under many samples tell neither order nor feed.
-    if !time.is_empty() && distinct * 4 >= rows.len() {
-        columns.push(("time_s", time, 1.0, 9));
-    }
-    columns.extend(positions.filter(|(_, v)| !v.is_empty()).map(|(name, v)| (name, v.as_slice(), 1e3, 9)));
-    if !recording.angle_rad.is_empty() {
-        columns.push(("angle_deg", &recording.angle_rad, degrees, 9));
-    }
-    if recording.position_m[0].is_empty() {
-        if recording.deviation_m.is_empty() {
-            columns.push(("radius_mm", &recording.radius_m, 1e3, 9));
-        } else {
-            columns.push(("deviation_um", &recording.deviation_m, 1e6, 6));
+    let mut columns: Vec<(usize, &str, f64, usize)> = Vec::new();
+    for (field, quantity) in fields.iter().map(|f| f.quantity).enumerate() {
+        let (name, factor, places) = match quantity {
+            Quantity::Time | Quantity::Stamp(_) if clocked => ("time_s", 1.0, 9),
+            Quantity::Position(axis) => (["x_mm", "y_mm", "z_mm"][axis], 1e3, 9),
+            Quantity::Angle => ("angle_deg", degrees, 9),
+            Quantity::Deviation => ("deviation_um", 1e6, 6),
+            Quantity::Radius => ("radius_mm", 1e3, 9),
+            _ => continue,
+        };
+        if !columns.iter().any(|c| c.1 == name) {
+            columns.push((field, name, factor, places));
         }
     }
-    let origin = if time.is_empty() { 0.0 } else { time[rows.start] };
+    // The contract takes one shape: positions before angles before deviations over time.
+    let has = |name: &str| columns.iter().any(|c| c.1 == name);
+    let (planar, deviation) = (has("x_mm") && has("y_mm"), has("deviation_um"));
+    columns.retain(|c| match c.1 {
+        "x_mm" | "y_mm" | "z_mm" => planar,
+        "angle_deg" => !planar,
+        "deviation_um" => !planar,
+        "radius_mm" => !planar && !deviation,
+        _ => true,
+    });
+    columns.sort_by_key(|c| {
+        ["time_s", "x_mm", "y_mm", "z_mm", "angle_deg"].iter().position(|n| *n == c.1).unwrap_or(9)
+    });
+    let mut origin = 0.0;
+    if let Some(&(field, ..)) = columns.iter().find(|c| c.1 == "time_s") {
+        origin = first_of(entry, field)?;
+    }
     let mut file = tempfile::Builder::new().prefix(".import-").suffix(".csv").tempfile_in(dir).map_err(io)?;
-    let mut out = BufWriter::with_capacity(1 << 18, file.as_file_mut());
-    let names: Vec<&str> = columns.iter().map(|c| c.0).collect();
-    writeln!(out, "{}", names.join(",")).map_err(io)?;
-    let mut line = String::new();
-    for k in rows {
-        line.clear();
-        for (index, (name, values, factor, places)) in columns.iter().enumerate() {
-            let shift = if *name == "time_s" { origin } else { 0.0 };
-            let end = if index + 1 == columns.len() { b'\n' } else { b',' };
-            write::number(&mut line, (values[k] - shift) * factor, *places, end);
+    let names: Vec<&str> = columns.iter().map(|c| c.1).collect();
+    writeln!(file, "{}", names.join(",")).map_err(io)?;
+    let text = |batch: Batch| {
+        let mut text = String::with_capacity(batch.rows * 16 * columns.len());
+        for k in 0..batch.rows {
+            for (index, (field, name, factor, places)) in columns.iter().enumerate() {
+                let shift = if *name == "time_s" { origin } else { 0.0 };
+                let end = if index + 1 == columns.len() { b'\n' } else { b',' };
+                write::number(&mut text, (batch.columns[*field][k] - shift) * factor, *places, end);
+            }
         }
-        out.write_all(line.as_bytes()).map_err(io)?;
-    }
-    out.flush().map_err(io)?;
-    drop(out);
+        text
+    };
+    RunFile::open(entry)?.walk(text, |text| file.write_all(text.as_bytes()).map_err(io))?;
     Ok(file)
+}
+
+/// The first value of a column.
+fn first_of(entry: &Entry, field: usize) -> Result<f64, CampaignError> {
+    let mut first = 0.0;
+    let Some(slice) = &entry.slice else { return Ok(first) };
+    slice.walk(
+        &entry.path,
+        |batch| batch.columns[field].first().copied(),
+        |_, value| {
+            first = value.unwrap_or(0.0);
+            Ok(ControlFlow::Break(()))
+        },
+    )?;
+    Ok(first)
 }
 
 /// Gives the staged files their names and writes `campaign.toml`, its old text kept to the letter.

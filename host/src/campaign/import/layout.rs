@@ -3,7 +3,7 @@ use super::Format;
 
 /// What a field holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Quantity {
+pub(in crate::campaign) enum Quantity {
     /// Seconds, from any origin.
     Time,
     /// Date and time of day.
@@ -22,7 +22,7 @@ pub(super) enum Quantity {
 
 /// Order of the parts of a date.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum DateOrder {
+pub(in crate::campaign) enum DateOrder {
     /// 08.11.2022 16:17:28.353
     DayMonthYear,
     /// 11/08/22 16:17:28

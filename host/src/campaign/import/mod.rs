@@ -7,8 +7,11 @@
 //! | `leica`, `spatial_analyzer`, `rtde`, `kflop` | one file a format with a layout of its own |
 //! | `named` | columns known by the words and units of a header (German locale, plain exports, the contract's own) |
 //! | `columns` | columns named on the command line |
-//! | `recording` | the numbers of a file, SI |
+//! | `recognise` | a file by its first lines |
+//! | `rows` | the rows of a file, SI, block by block |
+//! | `sample` | a fair sample of its points |
 //! | `trim` | feed-in, feed-out, laps, arcs |
+//! | `scan` | one look at all rows: which are the circle, and where they stand |
 //! | `add` | recordings as runs of a campaign, all or none |
 //! | `ballbar20` | the results in `.b5r` files |
 //!
@@ -21,13 +24,18 @@ mod kflop;
 mod layout;
 mod leica;
 mod named;
-mod recording;
+mod recognise;
+mod rows;
 mod rtde;
+mod sample;
+mod scan;
 mod spatial_analyzer;
 mod trim;
 
-pub use add::{Added, Laps, Options, add};
+pub use add::{Added, Laps, Options, add, open};
 pub use detect::Format;
+pub(in crate::campaign) use layout::Quantity;
+pub use rows::Slice;
 
 use crate::campaign::CampaignError;
 use std::path::Path;
@@ -37,5 +45,5 @@ use std::path::Path;
 /// # Errors
 /// A file that cannot be read, or whose layout is not known.
 pub fn recognise(file: &Path, format: Format, columns: Option<&str>) -> Result<Format, CampaignError> {
-    recording::recognise(file, format, columns).map(|layout| layout.format)
+    recognise::rows_of(file, format, columns).map(|slice| slice.format())
 }

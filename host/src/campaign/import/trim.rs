@@ -1,5 +1,7 @@
 //! Which rows of a recording are the circle: feed-in and feed-out left out, laps told apart, arcs measured.
-use crate::campaign::{Problem, SHORTEST_ARC_DEG};
+use crate::campaign::manifest::Entry;
+use crate::campaign::thinned::Thinned;
+use crate::campaign::{Problem, SHORTEST_ARC_DEG, check};
 use giotto_shared::circle::{self, Circle, Plane, Xy};
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -24,16 +26,55 @@ pub(super) struct Turns {
     pub(super) sign: f64,
 }
 
-/// Points seen in their plane from its positive side, as the reader of campaigns sees them.
-pub(super) fn flatten(position: &[Vec<f64>; 3], rows: &[usize]) -> Option<(Vec<f64>, Vec<f64>)> {
-    let [x, y, z] = position;
-    if z.is_empty() {
-        return Some((x.clone(), y.clone()));
+/// A circle in its plane and how far from it a point of it may lie.
+#[derive(Clone, Debug)]
+pub(super) struct Ring {
+    /// The plane seen from its positive side, as the reader of campaigns sees it.
+    plane: Option<(Plane, f64)>,
+    circle: Circle,
+    limit: f64,
+}
+
+impl Ring {
+    /// Angle of a point about the centre, rad, and whether it lies on the circle.
+    pub(super) fn at(&self, point: [f64; 3]) -> (f64, bool) {
+        let [x, y] = flat(self.plane.as_ref(), point);
+        let (dx, dy) = (x - self.circle.centre[0], y - self.circle.centre[1]);
+        (dy.atan2(dx), (dx.hypot(dy) - self.circle.radius).abs() <= self.limit)
     }
-    let plane = Plane::fit(rows.iter().map(|&k| [x[k], y[k], z[k]])).ok()?;
-    let largest = plane.normal.iter().copied().fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
-    let flip = largest.signum();
-    Some((0..x.len()).map(|k| plane.project([x[k], y[k], z[k]])).map(|[u, v]| (u, flip * v)).unzip())
+}
+
+fn flat(plane: Option<&(Plane, f64)>, point: [f64; 3]) -> [f64; 2] {
+    plane.map_or([point[0], point[1]], |(plane, flip)| {
+        let [u, v] = plane.project(point);
+        [u, flip * v]
+    })
+}
+
+/// The circle of `radius_m` that most of the points are on; z may be empty.
+pub(super) fn ring(points: &[Vec<f64>; 3], radius_m: f64) -> Option<Ring> {
+    let [x, y, z] = points;
+    let rows = x.len();
+    let point = |k: usize| [x[k], y[k], z.get(k).copied().unwrap_or(0.0)];
+    let mut used: Vec<usize> = (0..rows).collect();
+    if z.is_empty() {
+        let (circle, limit) = robust_circle(x, y, &used, radius_m)?;
+        return Some(Ring { plane: None, circle, limit });
+    }
+    let fit = |used: &[usize]| {
+        let plane = Plane::fit(used.iter().map(|&k| point(k))).ok()?;
+        let largest =
+            plane.normal.iter().copied().fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
+        let plane = Some((plane, largest.signum()));
+        let (u, v): (Vec<f64>, Vec<f64>) =
+            (0..rows).map(|k| flat(plane.as_ref(), point(k))).map(|[u, v]| (u, v)).unzip();
+        let (circle, limit) = robust_circle(&u, &v, used, radius_m)?;
+        Some(Ring { plane, circle, limit })
+    };
+    let ring = fit(&used)?;
+    // The plane of the circle alone: a lift before it has tilted the first one.
+    used.retain(|&k| ring.at(point(k)).1);
+    fit(&used)
 }
 
 /// Circle of most points: feed-in, feed-out and dwell do not bend it.
@@ -72,49 +113,19 @@ fn robust_circle(x: &[f64], y: &[f64], rows: &[usize], radius_m: f64) -> Option<
     Some((best, limit))
 }
 
-/// Rows of points that make the circle of `radius_m`, and their unwrapped angles.
-pub(super) fn of_points(position: &[Vec<f64>; 3], time_s: &[f64], radius_m: f64) -> Result<Turns, Problem> {
-    let rows = position[0].len();
-    let off = |found| Problem::OffCircle { found, rows, radius_mm: (radius_m * 1e9).round() / 1e6 };
-    // A stride bounds the work of the robust start; the limits are then applied to every row.
-    let stride = rows.div_ceil(20_000);
-    let mut used: Vec<usize> = (0..rows).step_by(stride).collect();
-    let (mut x, mut y) = flatten(position, &used).ok_or_else(|| off(0))?;
-    let (mut circle, mut limit) = robust_circle(&x, &y, &used, radius_m).ok_or_else(|| off(0))?;
-    if !position[2].is_empty() {
-        // The plane of the circle alone: a lift before it has tilted the first one.
-        used.retain(|&k| {
-            ((x[k] - circle.centre[0]).hypot(y[k] - circle.centre[1]) - circle.radius).abs() <= limit
-        });
-        (x, y) = flatten(position, &used).ok_or_else(|| off(used.len()))?;
-        (circle, limit) = robust_circle(&x, &y, &used, radius_m).ok_or_else(|| off(used.len()))?;
-    }
-    let on =
-        |k: usize| ((x[k] - circle.centre[0]).hypot(y[k] - circle.centre[1]) - circle.radius).abs() <= limit;
-    let stretch = longest(rows, on);
-    if stretch.len() * 4 < rows || stretch.len() < 8 {
-        return Err(off(stretch.len()));
-    }
-    let mut angle: Vec<f64> =
-        stretch.clone().map(|k| (y[k] - circle.centre[1]).atan2(x[k] - circle.centre[0])).collect();
-    unwrap(&mut angle);
-    let time = if time_s.is_empty() { &[] } else { &time_s[stretch.clone()] };
-    let mut turns = of_angles(&angle, time)?;
-    turns.laps.iter_mut().for_each(|l| *l = l.start + stretch.start..l.end + stretch.start);
-    turns.feed_in += stretch.start;
-    turns.feed_out += rows - stretch.end;
-    Ok(turns)
-}
-
-/// Turns of unwrapped angles. `time` may be empty.
-pub(super) fn of_angles(angle: &[f64], time: &[f64]) -> Result<Turns, Problem> {
+/// Turns of unwrapped angles. `time` may be empty; its row `offset` is the first of `angle`.
+pub(super) fn of_angles(angle: &[f64], offset: usize, time: &Thinned<f64>) -> Result<Turns, Problem> {
     let n = angle.len();
     let sign = (angle[n - 1] - angle[0]).signum();
     let block = (n / 200).max(1);
+    // Of long recordings every n-th time was kept: the rate is that between the rows of these.
+    let timed = |k: usize| {
+        let kept = time.at(offset + k);
+        kept.filter(|(row, _)| *row >= offset).map_or((k, k as f64), |(row, t)| (row - offset, t))
+    };
     let rate = |k: usize| {
-        let to = (k + block).min(n - 1);
-        let span = if time.is_empty() { (to - k) as f64 } else { time[to] - time[k] };
-        if span > 0.0 { sign * (angle[to] - angle[k]) / span } else { 0.0 }
+        let ((from, a), (to, b)) = (timed(k), timed((k + block).min(n - 1)));
+        if b > a { sign * (angle[to] - angle[from]) / (b - a) } else { 0.0 }
     };
     let mut rates: Vec<f64> = (0..n - 1).step_by(block).map(rate).collect();
     rates.sort_unstable_by(f64::total_cmp);
@@ -171,22 +182,58 @@ fn covered(angle: &[f64], range: Range<usize>) -> f64 {
     (angle[range.end - 1] - angle[range.start]).abs() * n / (n - 1.0)
 }
 
-/// The longest stretch of rows that are `on`, up to three strays in a row forgiven.
-fn longest(rows: usize, on: impl Fn(usize) -> bool) -> Range<usize> {
-    let (mut best, mut start, mut last) = (0..0, None, 0);
-    for k in 0..rows {
-        if on(k) {
-            if start.is_none() || k - last > 4 {
-                start = Some(k);
-            }
-            last = k;
-            let from = start.unwrap_or(k);
-            if k + 1 - from > best.len() {
-                best = from..k + 1;
-            }
+/// Finds the longest stretch of rows that are on the circle, up to three strays in a row forgiven.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Longest {
+    row: usize,
+    start: Option<usize>,
+    last: usize,
+    best: Range<usize>,
+}
+
+impl Longest {
+    /// The next row.
+    pub(super) fn push(&mut self, on: bool) {
+        let k = self.row;
+        self.row += 1;
+        if !on {
+            return;
+        }
+        let from = match self.start {
+            Some(start) if k - self.last <= 4 => start,
+            _ => k,
+        };
+        (self.start, self.last) = (Some(from), k);
+        if k + 1 - from > self.best.len() {
+            self.best = from..k + 1;
         }
     }
-    best
+
+    /// The longest so far.
+    pub(super) fn best(&self) -> Range<usize> {
+        self.best.clone()
+    }
+}
+
+/// Turns of deviations over time: readings beyond the range at either end are feed-in and feed-out.
+pub(super) fn of_times(time: &[f64], deviation: &[f64], entry: &Entry) -> Result<Turns, Problem> {
+    let rows = deviation.len();
+    let inside = |k: usize| deviation[k].abs() < check::INSTRUMENT_LIMIT_M;
+    let (mut from, mut to) = (0, rows);
+    if (0..rows).filter(|&k| inside(k)).count() * 2 > rows {
+        from = (0..rows).find(|&k| inside(k)).unwrap_or(0);
+        to = (0..rows).rfind(|&k| inside(k)).map_or(rows, |k| k + 1);
+    }
+    let time = &time[from..to];
+    let n = time.len();
+    let last = time[n - 1] - time[0];
+    let turn_s = last * n as f64 / (n as f64 - 1.0);
+    let found =
+        check::duration(entry, turn_s, &deviation[from..to], &mut Vec::new()).map_err(|e| *e.problem)?;
+    let count = found.unwrap_or(1) as usize;
+    let edge = |k: usize| from + n * k / count;
+    let laps: Vec<Range<usize>> = (0..count).map(|k| edge(k)..edge(k + 1)).collect();
+    Ok(Turns { laps, arc_rad: None, feed_in: from, feed_out: rows - to, sign: 0.0 })
 }
 
 /// Adds whole turns so that no step is half a turn or more.

@@ -1,0 +1,161 @@
+//! Large text files in blocks of whole lines: the next window is read while this one is parsed on all cores, and results
+//! come in the order of the file. Memory is a window and its results, whatever the size of the file.
+use super::CampaignError;
+use rayon::prelude::*;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::ops::ControlFlow;
+
+/// Bytes parsed by one task. Blocks begin at the same bytes whatever the number of threads, and so do sums over them.
+pub(super) const BLOCK: usize = 1 << 19;
+/// Blocks of a window.
+const BLOCKS: usize = 8;
+/// A line longer than this is no row of numbers.
+const LONGEST_LINE: usize = BLOCK * BLOCKS;
+
+/// A file from some byte on.
+#[derive(Debug)]
+pub(super) struct Text {
+    file: std::io::Take<File>,
+    /// Bytes already read, of which the first `skip` were used.
+    buffer: Vec<u8>,
+    skip: usize,
+    /// Byte of the file at which `buffer` begins.
+    at: u64,
+    /// Bytes of the file.
+    size: u64,
+}
+
+/// Why a walk ended early.
+pub(super) enum Fault {
+    /// The operating system says so.
+    Io(std::io::Error),
+    /// No line end for a long way behind this byte.
+    Endless(u64),
+    /// Whoever took the results.
+    Taken(CampaignError),
+}
+
+impl Text {
+    /// A file with its first bytes, at most `head` of them, read.
+    pub(super) fn open(file: File, head: usize) -> std::io::Result<Self> {
+        let size = file.metadata()?.len();
+        let head = head.min(usize::try_from(size).unwrap_or(head).saturating_add(1));
+        let mut buffer = Vec::with_capacity(head);
+        let mut file = file.take(u64::MAX);
+        file.by_ref().take(head as u64).read_to_end(&mut buffer)?;
+        Ok(Self { file, buffer, skip: 0, at: 0, size })
+    }
+
+    /// The bytes `from` to `to` of a file, nothing read yet.
+    pub(super) fn between(mut file: File, from: u64, to: u64) -> std::io::Result<Self> {
+        let size = file.metadata()?.len().min(to);
+        file.seek(SeekFrom::Start(from))?;
+        Ok(Self { file: file.take(to.saturating_sub(from)), buffer: Vec::new(), skip: 0, at: from, size })
+    }
+
+    /// What was read and not skipped.
+    pub(super) fn head(&self) -> &[u8] {
+        &self.buffer[self.skip..]
+    }
+
+    /// Leaves out the next `bytes` of what was read.
+    pub(super) fn skip(&mut self, bytes: usize) {
+        self.skip = (self.skip + bytes).min(self.buffer.len());
+    }
+
+    /// Rows to expect by the length of the lines read so far, with some to spare.
+    pub(super) fn rows(&self) -> usize {
+        let sample = self.head();
+        let lines = sample.iter().filter(|&&b| b == b'\n').count().max(1) as u64;
+        let rows = self.size * lines / (sample.len().max(1) as u64) + self.size / 64 + 16;
+        usize::try_from(rows.min(self.size / 2 + 1)).unwrap_or(0)
+    }
+
+    /// Parses the rest block by block. `parse` is given the byte at which a block begins; `take` gets the results in order
+    /// and may end the walk.
+    pub(super) fn walk<T: Send>(
+        mut self,
+        parse: impl Fn(u64, &[u8]) -> T + Sync,
+        mut take: impl FnMut(T) -> Result<ControlFlow<()>, CampaignError>,
+    ) -> Result<(), Fault> {
+        let mut body = self.skip;
+        let mut next = Vec::new();
+        let mut last = self.fill()?;
+        loop {
+            let buffer = &self.buffer;
+            let whole = if last {
+                buffer.len()
+            } else {
+                buffer.iter().rposition(|&b| b == b'\n').map_or(body, |p| p + 1)
+            };
+            if whole == body && !last && buffer.len() - body > LONGEST_LINE {
+                return Err(Fault::Endless(self.at + body as u64));
+            }
+            let mut from = self.at + body as u64;
+            let blocks: Vec<(u64, &[u8])> = split_at_lines(&buffer[body..whole])
+                .into_iter()
+                .map(|block| {
+                    let at = from;
+                    from += block.len() as u64;
+                    (at, block)
+                })
+                .collect();
+            let work = || -> Vec<T> {
+                if blocks.len() > 1 {
+                    blocks.par_iter().map(|(at, block)| parse(*at, block)).collect()
+                } else {
+                    blocks.iter().map(|(at, block)| parse(*at, block)).collect()
+                }
+            };
+            let (results, more) = if last {
+                (work(), Ok(0))
+            } else {
+                next.clear();
+                next.extend_from_slice(&buffer[whole..]);
+                let file = &mut self.file;
+                let (results, more) =
+                    rayon::join(work, || file.take((BLOCK * BLOCKS) as u64).read_to_end(&mut next));
+                (results, more)
+            };
+            for result in results {
+                if take(result).map_err(Fault::Taken)?.is_break() {
+                    return Ok(());
+                }
+            }
+            if last {
+                return Ok(());
+            }
+            last = more.map_err(Fault::Io)? == 0;
+            self.at += whole as u64;
+            std::mem::swap(&mut self.buffer, &mut next);
+            body = 0;
+        }
+    }
+
+    /// Reads the first window where the head was not the whole file; whether that was all.
+    fn fill(&mut self) -> Result<bool, Fault> {
+        if self.at + self.buffer.len() as u64 >= self.size {
+            // Longer than it was when opened, or of a size that is not known: one more look tells.
+            let before = self.buffer.len();
+            self.file.by_ref().take(BLOCK as u64).read_to_end(&mut self.buffer).map_err(Fault::Io)?;
+            return Ok(self.buffer.len() == before);
+        }
+        Ok(false)
+    }
+}
+
+/// Cuts at line ends into blocks of at least [`BLOCK`] bytes (the last may be shorter).
+fn split_at_lines(mut bytes: &[u8]) -> Vec<&[u8]> {
+    let mut blocks = Vec::new();
+    while bytes.len() > BLOCK {
+        let cut = memchr::memchr(b'\n', &bytes[BLOCK..]).map_or(bytes.len(), |p| BLOCK + p + 1);
+        let (block, rest) = bytes.split_at(cut);
+        blocks.push(block);
+        bytes = rest;
+    }
+    if !bytes.is_empty() {
+        blocks.push(bytes);
+    }
+    blocks
+}

@@ -1,0 +1,73 @@
+//! Every n-th of a sequence whose length is not known before its end.
+
+/// Most values kept.
+const MOST: usize = 1 << 16;
+
+/// Keeps value 0, s, 2s, … of what is pushed, s the smallest power of two for which they are no more than 65 536.
+#[derive(Clone, Debug)]
+pub(super) struct Thinned<T> {
+    values: Vec<T>,
+    stride: usize,
+    pushed: usize,
+}
+
+impl<T> Default for Thinned<T> {
+    fn default() -> Self {
+        Self { values: Vec::new(), stride: 1, pushed: 0 }
+    }
+}
+
+impl<T: Copy> Thinned<T> {
+    /// The next value.
+    pub(super) fn push(&mut self, value: T) {
+        if self.pushed.is_multiple_of(self.stride) {
+            if self.values.len() == MOST {
+                let mut k = 0;
+                self.values.retain(|_| {
+                    k += 1;
+                    k % 2 == 1
+                });
+                self.stride *= 2;
+            }
+            // The stride may just have grown past this one.
+            if self.pushed.is_multiple_of(self.stride) {
+                self.values.push(value);
+            }
+        }
+        self.pushed += 1;
+    }
+
+    /// The last value kept at or before `index`, with its place.
+    pub(super) fn at(&self, index: usize) -> Option<(usize, T)> {
+        let k = (index / self.stride).min(self.values.len().checked_sub(1)?);
+        Some((k * self.stride, self.values[k]))
+    }
+
+    /// The values kept with their places.
+    pub(super) fn iter(&self) -> impl Iterator<Item = (usize, T)> + '_ {
+        self.values.iter().enumerate().map(|(k, v)| (k * self.stride, *v))
+    }
+
+    /// The values kept.
+    pub(super) fn into_values(self) -> Vec<T> {
+        self.values
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keeps_every_nth_and_knows_which() {
+        for n in [1, 5, MOST, MOST + 1, 3 * MOST + 7, 40 * MOST] {
+            let mut thinned = Thinned::default();
+            (0..n).for_each(|k| thinned.push(k));
+            assert!(thinned.iter().all(|(place, value)| place == value));
+            let kept = thinned.iter().count();
+            assert!(kept <= MOST && (n < MOST || kept > MOST / 2), "{kept} of {n}");
+            let (place, value) = thinned.at(n - 1).unwrap();
+            assert!(place == value && value < n && value + 2 * n / MOST + 1 >= n - 1);
+        }
+    }
+}
