@@ -77,7 +77,7 @@ pub(crate) fn run(peers: &mut Peers) -> Result<Table, Error> {
                 let same = size.is_some_and(|size| (value[k] / size - 1.0).abs() < SAME);
                 if !same {
                     return Err(format!(
-                        "{cause}: the script finds {} where giotto finds {size:?}",
+                        "{cause:?}: the script finds {} where giotto finds {size:?}",
                         value[k]
                     )
                     .into());

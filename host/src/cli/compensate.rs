@@ -6,6 +6,9 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+/// What remains at a joint is said from this share of the correction on.
+const JOINT_BAR: f64 = 0.05;
+
 /// Arguments of `giotto compensate`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
@@ -58,6 +61,8 @@ struct Arc {
     change_um: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     blocks: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    joint_remaining_um: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     left: Option<String>,
 }
@@ -118,15 +123,17 @@ fn document(result: &Compensated, model: &ModelFile) -> Document {
                 feed_mm_s: None,
                 change_um: None,
                 blocks: None,
+                joint_remaining_um: None,
                 left: None,
             };
             match report.fate {
                 Fate::Left(left) => Arc { left: Some(left.to_string()), ..none },
-                Fate::Corrected { radius_mm, feed_mm_s, delta_mm, blocks } => Arc {
+                Fate::Corrected { radius_mm, feed_mm_s, delta_mm, blocks, joint_share } => Arc {
                     radius_mm: Some(radius_mm),
                     feed_mm_s: Some(feed_mm_s),
                     change_um: Some(delta_mm * 1e3),
                     blocks: Some(blocks),
+                    joint_remaining_um: Some(joint_share * delta_mm.abs() * 1e3),
                     ..none
                 },
             }
@@ -156,12 +163,23 @@ fn say(args: &Args, result: &Compensated, document: &Document, out: Output) -> R
         match report.fate {
             Fate::Left(Left::Negligible) => negligible += 1,
             Fate::Left(left) => _ = reasons.insert(report.line, left),
-            Fate::Corrected { radius_mm, feed_mm_s, delta_mm, blocks } => out.say(format_args!(
-                "  {name}:{}: R {radius_mm:.3} mm at {feed_mm_s:.1} mm/s: {:+.1} µm, {blocks} block{}",
-                report.line,
-                delta_mm * 1e3,
-                if blocks == 1 { "" } else { "s" }
-            )),
+            Fate::Corrected { radius_mm, feed_mm_s, delta_mm, blocks, joint_share } => {
+                let joints = if joint_share > JOINT_BAR {
+                    let left_um = joint_share * delta_mm.abs() * 1e3;
+                    format!(
+                        "; up to {:.0} % of that ({left_um:.1} µm) remains at a joint",
+                        100.0 * joint_share
+                    )
+                } else {
+                    String::new()
+                };
+                out.say(format_args!(
+                    "  {name}:{}: R {radius_mm:.3} mm at {feed_mm_s:.1} mm/s: {:+.1} µm, {blocks} block{}{joints}",
+                    report.line,
+                    delta_mm * 1e3,
+                    if blocks == 1 { "" } else { "s" }
+                ));
+            }
         }
     }
     for (line, left) in reasons {

@@ -3,13 +3,11 @@
 //! All candidate columns and the observations are reduced once to a triangle; any subset of the columns is then a
 //! small problem on that triangle, with the same residuals. No normal equations anywhere.
 use super::FitError;
+use super::reduced::{BLOCK_ROWS, Reduced};
 use nalgebra::{DMatrix, DVector};
 
 /// Column norms are 1: a diagonal of R below this is rounding, not information.
 const RANK_TOLERANCE: f64 = 1e-11;
-
-/// Rows that are brought to a triangle at a time: they stay in cache.
-const BLOCK_ROWS: usize = 256;
 
 /// Observations and all candidate columns, reduced to a triangle.
 #[derive(Clone, Debug)]
@@ -95,19 +93,18 @@ impl Triangle {
             .map(|(values, mean)| values.iter().fold(0.0, |top: f64, v| top.max((v - mean).abs())))
             .map(|top| if top > 0.0 { top } else { 1.0 })
             .collect();
-        let mut r = DMatrix::zeros(0, width);
+        let mut reduced = Reduced::new(width);
         for start in (0..n).step_by(BLOCK_ROWS) {
-            // The triangle so far, over the next rows: its triangle is that of all rows up to here.
-            let (above, rows) = (r.nrows(), BLOCK_ROWS.min(n - start));
-            let mut block = r.resize_vertically(above + rows, 0.0);
+            let rows = BLOCK_ROWS.min(n - start);
             for (j, values) in all.iter().enumerate() {
-                let to = block.column_mut(j);
-                for (to, value) in to.into_iter().skip(above).zip(&values[start..]) {
-                    *to = (value - means[j]) / largest[j];
+                let (mean, by) = (means[j], 1.0 / largest[j]);
+                for (to, value) in reduced.block(j).iter_mut().zip(&values[start..start + rows]) {
+                    *to = (value - mean) * by;
                 }
             }
-            r = block.qr().unpack_r();
+            reduced.take(rows);
         }
+        let mut r = reduced.triangle(n.min(width));
         let mut scales = largest;
         for (mut column, scale) in r.column_iter_mut().zip(&mut scales) {
             let norm = column.norm();

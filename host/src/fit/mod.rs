@@ -3,6 +3,7 @@
 //! | file | holds |
 //! |---|---|
 //! | `least_squares` | [`Triangle`], [`LeastSquares`]: Householder QR on centred, scaled columns (Eq. 2–3) |
+//! | `reduced` | tall matrices to a triangle, block by block, without allocation |
 //! | `stepwise` | [`stepwise`](stepwise()): enter and remove by partial F (Eq. 4–11, 17–19) |
 //! | `quantile` | critical values of F and t |
 //! | `circle` | the geometric circle fit on all cores |
@@ -18,6 +19,7 @@ mod heldout;
 mod least_squares;
 mod quantile;
 mod radius;
+mod reduced;
 mod stepwise;
 #[cfg(test)]
 #[allow(clippy::excessive_precision, reason = "reference numbers are quoted as published")]

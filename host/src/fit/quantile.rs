@@ -1,6 +1,6 @@
 //! Critical values of the F and t distributions.
 use super::FitError;
-use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
+use statrs::distribution::{Continuous, ContinuousCDF, FisherSnedecor, Normal, StudentsT};
 
 /// F_{α; numerator, denominator}: exceeded by chance with probability `alpha`.
 ///
@@ -30,7 +30,26 @@ pub fn critical_t(alpha: f64, dof: usize) -> Result<f64, FitError> {
         return Err(error);
     }
     let t = StudentsT::new(0.0, 1.0, dof as f64).map_err(|_| error)?;
-    Ok(t.inverse_cdf(1.0 - 0.5 * alpha))
+    Ok(refined(&t, 0.5 * alpha, dof as f64).unwrap_or_else(|| t.inverse_cdf(1.0 - 0.5 * alpha)))
+}
+
+/// t with a tail of `tail` above it: the normal quantile stretched by the expansion in 1/dof (Abramowitz and Stegun 26.7.5), then
+/// Newton on the tail; nothing where that does not settle (few degrees of freedom, extreme tails). A tenth of the time that
+/// the inverse of the beta function takes.
+fn refined(t: &StudentsT, tail: f64, dof: f64) -> Option<f64> {
+    let z = Normal::standard().inverse_cdf(1.0 - tail);
+    let square = z * z;
+    let mut x = z
+        + z * (square + 1.0) / (4.0 * dof)
+        + z * ((5.0 * square + 16.0) * square + 3.0) / (96.0 * dof * dof);
+    for _ in 0..6 {
+        let step = (t.sf(x) - tail) / t.pdf(x);
+        x += step;
+        if step.abs() <= 1e-9 * x.abs() {
+            return x.is_finite().then_some(x);
+        }
+    }
+    None
 }
 
 #[cfg(test)]
@@ -55,6 +74,17 @@ mod tests {
         {
             let got = critical_t(alpha, d).unwrap();
             assert!((got / want - 1.0).abs() < 1e-8, "t({alpha}; {d}) = {got}");
+        }
+    }
+
+    #[test]
+    fn the_short_way_and_the_long_way_agree() {
+        for dof in [1, 2, 3, 5, 10, 27, 300, 9_997] {
+            for alpha in [0.5, 0.1, 0.05, 0.01, 1e-4] {
+                let long = StudentsT::new(0.0, 1.0, f64::from(dof)).unwrap().inverse_cdf(1.0 - 0.5 * alpha);
+                let short = critical_t(alpha, dof as usize).unwrap();
+                assert!((short / long - 1.0).abs() < 1e-9, "t({alpha}; {dof}) = {short}, not {long}");
+            }
         }
     }
 

@@ -21,6 +21,25 @@ pub(super) struct Plan {
     pub(super) exit: Exit,
 }
 
+/// What an offset that ends inside its arc leaves of itself at the end (`blend`).
+const INSIDE_SHARE: f64 = 0.4;
+
+impl Plan {
+    /// Largest share of the correction that remains as an error at a joint of the arc; what is not known counts as nothing.
+    pub(super) fn joint_share(&self) -> f64 {
+        let known =
+            |shape: Transition| Some(shape.remaining()).filter(|share| share.is_finite()).unwrap_or(0.0);
+        let delta = self.twin.delta_mm;
+        let entry = known(self.entry.shape) * ((delta - self.entry.from_mm) / delta).abs();
+        let exit = match self.exit {
+            Exit::Held => 0.0,
+            Exit::RunOut { shape, .. } => known(shape),
+            Exit::Inside { .. } => INSIDE_SHARE,
+        };
+        entry.max(exit)
+    }
+}
+
 /// Length of the step from standstill in units of σ·f: a lag has (1 − exp(−t/σ))².
 const START_RESPONSES: f64 = 3.0;
 /// A step longer than this many σ·f answers slowly enough to be taken as smooth.

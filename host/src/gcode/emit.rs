@@ -20,7 +20,13 @@ pub(super) fn emit(
                 let pieces = blend::pieces(arc, plan.twin.delta_mm, plan.entry, plan.exit);
                 out.arc(line, arc, &plan, &pieces);
                 let (radius_mm, feed_mm_s, delta_mm) = (arc.radius_mm, arc.feed_mm_s, plan.twin.delta_mm);
-                Some(Fate::Corrected { radius_mm, feed_mm_s, delta_mm, blocks: pieces.len() })
+                Some(Fate::Corrected {
+                    radius_mm,
+                    feed_mm_s,
+                    delta_mm,
+                    blocks: pieces.len(),
+                    joint_share: plan.joint_share(),
+                })
             }
             (action, plan) => {
                 out.copy(line, action);

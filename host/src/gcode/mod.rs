@@ -112,6 +112,8 @@ pub enum Fate {
         delta_mm: f64,
         /// Blocks that replace the arc.
         blocks: usize,
+        /// Largest share of `delta_mm` that is expected to remain as an error where the arc meets its neighbours.
+        joint_share: f64,
     },
     /// As it was.
     Left(Left),

@@ -67,7 +67,13 @@ pub fn compensate(program: &[u8], model: &ModelFile, options: &Options) -> Compe
                 from = pieces.last().map(|p| p.end);
                 let (radius_mm, feed_mm_s) = (arc.radius_mm, arc.feed_mm_s);
                 let delta_mm = plan.twin.delta_mm;
-                Some(Fate::Corrected { radius_mm, feed_mm_s, delta_mm, blocks: pieces.len() })
+                Some(Fate::Corrected {
+                    radius_mm,
+                    feed_mm_s,
+                    delta_mm,
+                    blocks: pieces.len(),
+                    joint_share: plan.joint_share(),
+                })
             }
             (action, plan, _) => {
                 out.program.extend_from_slice(line);
