@@ -5,6 +5,7 @@
 //! | `manifest` | `campaign.toml`, strictly |
 //! | `blocks` | large files in blocks of whole lines, on all cores |
 //! | `table` | the numbers of a contract's CSV, fast |
+//! | `decimal` | plain decimals, fast |
 //! | `run_file` | a run's file, own or foreign: its columns in SI |
 //! | `clock`, `thinned` | time stamps and other rows, seen once and forgotten |
 //! | `samples` | columns → one turn of polar samples |
@@ -15,6 +16,7 @@
 mod blocks;
 mod check;
 mod clock;
+mod decimal;
 mod error;
 pub mod import;
 mod manifest;

@@ -1,5 +1,6 @@
 //! The numbers of a run's CSV, fast: chunked reads, exact floats, errors by line and column.
 use super::blocks::{BLOCK, Fault, Text};
+use super::decimal;
 use super::error::{CampaignError, Place, Problem};
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::ops::ControlFlow;
@@ -231,8 +232,8 @@ fn parse_block(bytes: &[u8], width: usize) -> Result<Parsed, usize> {
         }
         for (field, column) in columns.iter_mut().enumerate() {
             at = skip_blanks(bytes, at);
-            let (value, used) = fast_float2::parse_partial::<f64, _>(&bytes[at..]).map_err(|_| line)?;
-            if used == 0 || !value.is_finite() {
+            let (value, used) = decimal::parse(&bytes[at..], b'.').ok_or(line)?;
+            if !value.is_finite() {
                 return Err(line);
             }
             column.push(value);

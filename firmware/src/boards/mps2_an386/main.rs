@@ -41,7 +41,7 @@ mod image {
     const BOARD: Board = Board { name: "mps2-an386", build: env!("GIOTTO_BUILD"), tick_hz: common::TICK_HZ };
 
     /// Sends back what comes, byte for byte: what the line itself carries (feature `echo`, for `giotto-hil link`).
-    fn echo(mut link: uart::Uart) -> ! {
+    fn echo(mut link: impl Read + Write) -> ! {
         let mut bytes = [0; 64];
         loop {
             if let Ok(count) = link.read(&mut bytes)

@@ -4,6 +4,7 @@
 //! [`Layout`] (blanks of other alphabets, odd stamps), and what that does not understand either is refused.
 use super::layout::{DateOrder, Layout, Quantity, latin1, split};
 use crate::campaign::blocks::{Fault, Text};
+use crate::campaign::decimal;
 use crate::campaign::table::{Batch, shorten};
 use crate::campaign::{CampaignError, Place, Problem};
 use giotto_shared::circle::Scatter;
@@ -181,6 +182,7 @@ impl<'a> Plan<'a> {
     fn fast(&self, bytes: &[u8], mut at: usize, dates: &mut Dates, values: &mut [f64]) -> Option<usize> {
         let separator = self.layout.separator;
         let runs = separator == b' ';
+        let mark = if self.layout.decimal_comma { b',' } else { b'.' };
         let mut field = 0;
         if runs {
             at = skip(bytes, at, b" \t\"");
@@ -206,10 +208,9 @@ impl<'a> Plan<'a> {
             let rest = bytes.get(at..)?;
             let (value, used) = match quantity {
                 Quantity::Stamp(order) => dates.stamp(rest, order)?,
-                _ if self.layout.decimal_comma => comma(rest, separator)?,
-                _ => fast_float2::parse_partial::<f64, _>(rest).ok()?,
+                _ => decimal::parse(rest, mark)?,
             };
-            if used == 0 || !value.is_finite() {
+            if !value.is_finite() {
                 return None;
             }
             values[column] = value * factor;
@@ -241,20 +242,6 @@ fn skip(bytes: &[u8], mut at: usize, blanks: &[u8]) -> usize {
     at
 }
 
-/// A number with a decimal comma.
-fn comma(bytes: &[u8], separator: u8) -> Option<(f64, usize)> {
-    let mut digits = [0u8; 48];
-    let mut n = 0;
-    while let Some(&b) = bytes.get(n)
-        && b != separator
-        && !matches!(b, b'\n' | b'\r' | b' ' | b'\t' | b'"')
-    {
-        *digits.get_mut(n)? = if b == b',' { b'.' } else { b };
-        n += 1;
-    }
-    Some((fast_float2::parse::<f64, _>(&digits[..n]).ok()?, n))
-}
-
 /// Stamps of one day after the other: the day is worked out once.
 #[derive(Default)]
 struct Dates {
@@ -283,8 +270,8 @@ impl Dates {
         if clock.get(2) != Some(&b':') || clock.get(5) != Some(&b':') {
             return None;
         }
-        let (seconds, used) = fast_float2::parse_partial::<f64, _>(&clock[6..]).ok()?;
-        let seconds = (used > 0 && seconds >= 0.0).then_some(seconds)?;
+        let (seconds, used) = decimal::parse(&clock[6..], b'.')?;
+        let seconds = (seconds >= 0.0).then_some(seconds)?;
         let value = self.days as f64 * 86_400.0 + two(0)? * 3600.0 + two(3)? * 60.0 + seconds;
         Some((value, quote + length + 1 + 6 + used))
     }

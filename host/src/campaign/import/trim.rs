@@ -241,7 +241,9 @@ pub(super) fn unwrap(angle: &mut [f64]) {
     let mut turns = 0.0;
     for k in 1..angle.len() {
         let step = angle[k] + turns - angle[k - 1];
-        turns -= TAU * (step / TAU).round();
+        if step.abs() >= TAU / 2.0 {
+            turns -= TAU * (step / TAU).round();
+        }
         angle[k] += turns;
     }
 }
