@@ -52,7 +52,7 @@ impl Report {
 
     /// Whether every bar is met.
     pub fn meets_bars(&self) -> bool {
-        self.text <= TEXT_BAR && self.ram() <= RAM_BAR && self.panics_in_tick().is_empty()
+        self.text <= TEXT_BAR && self.ram() <= RAM_BAR && self.panics.is_empty()
     }
 
     /// As one JSON document.

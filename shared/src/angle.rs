@@ -1,5 +1,5 @@
 //! Angles as integers: a turn is 2³² (or 2⁶⁴), so that a phase wraps by itself and never drifts.
-use crate::fixed::{mulh, mulh_add, mulh_sub, to_fixed};
+use crate::fixed::{mulh, mulh_add, mulh_sub, rounded, to_fixed};
 use core::f64::consts::{PI, TAU};
 
 /// Radians per unit of a 32-bit phase.
@@ -72,11 +72,10 @@ const fn series(x: f64, first: f64, n: usize) -> f64 {
     sum
 }
 
-/// Phase nearest to an angle in radians.
+/// Phase nearest to an angle in radians, of size below 5e7.
 pub fn phase_from_rad(angle_rad: f64) -> u32 {
-    let turns = angle_rad / TAU;
-    let fraction = turns - libm::floor(turns);
-    (fraction * 4_294_967_296.0 + 0.5) as u64 as u32
+    // Whole turns fall out of the 32 bits.
+    rounded(angle_rad, 1.0 / RAD_PER_UNIT) as u32
 }
 
 #[cfg(test)]

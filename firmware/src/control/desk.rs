@@ -100,12 +100,14 @@ where
         }
         self.shared.hold.store(false, Relaxed);
         self.planner.resync(now.raw_nm, self.shared.epoch());
-        let (approach, circle) = self.planner.circle(run).map_err(in_words)?;
+        let (mut approach, mut circle) = (None, Planned::default());
+        self.planner.circle(run, &mut approach, &mut circle).map_err(in_words)?;
         // At rest the queue is empty, and it has room for both.
-        if let Some(approach) = approach {
-            self.segments.send(approach).map_err(|_| MotionRefusal::QueueFull)?;
+        if !(approach.as_ref().is_none_or(|approach| self.segments.send(approach))
+            && self.segments.send(&circle))
+        {
+            return Err(MotionRefusal::QueueFull);
         }
-        self.segments.send(circle).map_err(|_| MotionRefusal::QueueFull)?;
         self.accepted_at = Some(now.tick);
         Ok(())
     }

@@ -2,11 +2,8 @@
 
 /// The end things go into.
 pub trait Sender<T> {
-    /// Puts one in; gives it back if there is no room.
-    ///
-    /// # Errors
-    /// The thing itself.
-    fn send(&mut self, thing: T) -> Result<(), T>;
+    /// Puts a copy of one in; `false`: there is no room.
+    fn send(&mut self, thing: &T) -> bool;
 
     /// Things that wait.
     fn waiting(&self) -> usize;
@@ -17,14 +14,19 @@ pub trait Receiver<T> {
     /// The oldest one.
     fn receive(&mut self) -> Option<T>;
 
+    /// Moves the oldest one, if there is one, to a place.
+    fn receive_into(&mut self, place: &mut T) -> bool {
+        self.receive().map(|thing| *place = thing).is_some()
+    }
+
     /// Things that wait.
     fn waiting(&self) -> usize;
 }
 
-impl<T, const N: usize> Sender<T> for heapless_spsc::spsc::Producer<'_, T, N> {
-    #[inline]
-    fn send(&mut self, thing: T) -> Result<(), T> {
-        self.enqueue(thing)
+impl<T: Copy, const N: usize> Sender<T> for heapless_spsc::spsc::Producer<'_, T, N> {
+    #[inline(never)]
+    fn send(&mut self, thing: &T) -> bool {
+        self.enqueue(*thing).is_ok()
     }
 
     fn waiting(&self) -> usize {
@@ -32,10 +34,16 @@ impl<T, const N: usize> Sender<T> for heapless_spsc::spsc::Producer<'_, T, N> {
     }
 }
 
-impl<T, const N: usize> Receiver<T> for heapless_spsc::spsc::Consumer<'_, T, N> {
+impl<T: Copy, const N: usize> Receiver<T> for heapless_spsc::spsc::Consumer<'_, T, N> {
     #[inline]
     fn receive(&mut self) -> Option<T> {
         self.dequeue()
+    }
+
+    #[inline]
+    fn receive_into(&mut self, place: &mut T) -> bool {
+        // Copied where it is: a value taken out would pass over the stack.
+        self.peek().map(|thing| *place = *thing).is_some_and(|()| self.dequeue().is_some())
     }
 
     #[inline]

@@ -31,13 +31,11 @@ struct Segments<I> {
 
 impl<I: Receiver<Planned>> Inbox for Segments<I> {
     #[inline]
-    fn take(&mut self) -> Option<Planned> {
-        let next = self.queue.receive();
-        if !self.closed {
-            return next;
-        }
-        self.dropped = self.dropped.wrapping_add(u32::from(next.is_some()));
-        None
+    fn take(&mut self, place: &mut Planned) -> bool {
+        let taken = self.queue.receive_into(place);
+        let thrown_away = taken && self.closed;
+        self.dropped = self.dropped.wrapping_add(u32::from(thrown_away));
+        taken && !thrown_away
     }
 }
 
@@ -134,10 +132,11 @@ where
         let (raw_nm, corrected_nm) = (output.nominal_nm, output.corrected_nm);
         let point = SetPoint { raw_nm, corrected_nm };
         let timed = TimedSetPoint { tick: self.now, point, last: !moving };
-        match self.set_points.send(timed) {
+        if self.set_points.send(&timed) {
             // The last one is tried again: without it the reader would wait for ever.
-            Ok(()) => self.recording = moving,
-            Err(_) => self.shared.drop_one(),
+            self.recording = moving;
+        } else {
+            self.shared.drop_one();
         }
     }
 }

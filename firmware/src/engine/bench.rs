@@ -52,8 +52,8 @@ pub struct Arc {
 
 impl Arc {
     /// One and a half turns with the β model alone, or with [`TERMS`] as well. Each axis reverses at constant feed, and X
-    /// in the rising ramp too.
-    pub fn new(extended: bool) -> Self {
+    /// in the rising ramp too. With a rise (m) it is a helix.
+    pub fn new(extended: bool, rise_m: f64) -> Self {
         let config = Config::robot(1000);
         let normal = [0.0, 0.5, 1.0];
         // cos and sin of −0.3 rad along two vectors of the plane: X, and the normal crossed with it.
@@ -66,7 +66,7 @@ impl Arc {
         let mut planner = Planner::new(&config, start);
         let mut queue = heapless::spsc::Queue::new();
         let sweep_rad = 3.0 * core::f64::consts::PI;
-        let arc = Segment::Arc { centre_m: CENTRE_M, normal, sweep_rad, rise_m: 0.0, feed_m_s: FEED_M_S };
+        let arc = Segment::Arc { centre_m: CENTRE_M, normal, sweep_rad, rise_m, feed_m_s: FEED_M_S };
         if planner.set_table(Some(&table(extended))).is_ok()
             && let Ok(planned) = planner.segment(&arc)
         {

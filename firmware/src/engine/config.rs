@@ -83,13 +83,19 @@ impl Config {
 
     /// Ticks of an engage or disengage blend.
     pub fn engage_ticks(&self) -> u32 {
-        ticks(self.engage_s * f64::from(self.rate_hz))
+        ticks(self.engage_s as f32 * self.rate_hz as f32)
     }
 }
 
+/// The next whole number; one met to seven digits is met, since times and rates are decimal. Saturates; 0 for NaN.
+pub(crate) fn whole_above(exact: f32) -> u32 {
+    let below = exact as u32;
+    below.saturating_add(u32::from(exact - below as f32 > 1e-6 * exact))
+}
+
 /// A whole number of ticks, at least the shortest ramp.
-pub(crate) fn ticks(exact: f64) -> u32 {
-    (libm::ceil(exact) as u32).clamp(MIN_RAMP_TICKS, MAX_RAMP_TICKS)
+pub(crate) fn ticks(exact: f32) -> u32 {
+    whole_above(exact).clamp(MIN_RAMP_TICKS, MAX_RAMP_TICKS)
 }
 
 /// A value of [`Config`] that is not finite, not positive or beyond what the engine is built for.

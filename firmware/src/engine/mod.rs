@@ -2,7 +2,7 @@
 //!
 //! | part | runs | does |
 //! |---|---|---|
-//! | [`Planner`] | background | turns a program and the table into integers, in `f64` |
+//! | [`Planner`] | background | turns a program and the table into integers: places exactly, the correction in single precision |
 //! | [`Executor`] | timer interrupt | one set-point a tick from those integers |
 //! | [`Engine`] | both in one thread | the two with a queue between, for the host and for simple boards |
 //!
@@ -12,7 +12,8 @@
 //! What a program may ask for, and what it gets: the feed along the path is the one asked for, or less where the length
 //! or, on arcs of a program, the centripetal acceleration does not allow it (a [`CircleRun`] keeps its feed: it is there
 //! to be measured). Segments join at an exact stop. Ramps are long enough that the *commanded* path, with what the operator
-//! adds, keeps the configured acceleration; play taken up and friction pulses come on top of it.
+//! adds, keeps the configured acceleration (play taken up and friction pulses come on top of it), and that offset and slew
+//! keep the bounds of the table: only where constant feed alone is beyond them is the offset cut, and counted.
 //!
 //! Measured, in simulation:
 //!
@@ -161,7 +162,9 @@ impl Engine {
     pub fn run_circle(&mut self, run: &CircleRun) -> Result<(), Refused> {
         self.ready(2)?;
         let before = self.planner.position_nm();
-        let (approach, circle) = self.planner.circle(run).inspect_err(|_| self.planner.rewind(before))?;
+        let (mut approach, mut circle) = (None, Planned::default());
+        let planned = self.planner.circle(run, &mut approach, &mut circle);
+        planned.inspect_err(|_| self.planner.rewind(before))?;
         // Room for both was checked.
         if let Some(approach) = approach {
             let _ = self.queue.enqueue(approach);

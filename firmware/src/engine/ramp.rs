@@ -6,12 +6,12 @@
 //! change it.
 use giotto_shared::fixed::{mulh, mulh_add, to_fixed};
 
-/// S′ = `FIRST`·w⁴.
-pub(crate) const FIRST: f64 = 315.0 / 128.0;
+/// S′ = `FIRST`·w⁴. This and the next two are exact in single precision.
+pub(crate) const FIRST: f32 = 315.0 / 128.0;
 /// S″ = −`SECOND`·x·w³.
-pub(crate) const SECOND: f64 = 315.0 / 8.0;
+pub(crate) const SECOND: f32 = 315.0 / 8.0;
 /// S‴ = `THIRD`·w²(1 − 7w/6).
-pub(crate) const THIRD: f64 = 945.0 / 2.0;
+pub(crate) const THIRD: f32 = 945.0 / 2.0;
 
 /// Coefficients of (S − ½)/x: 1/2 (Q30), w² 3/16 (Q31), w³ 5/32 (Q32), w⁴ 35/256 (Q31). The tick keeps a copy in its own
 /// state: one multiple load brings them all, where immediate operands would cost two instructions each. The half is
@@ -144,10 +144,10 @@ mod tests {
             let s = smoothstep((f64::from(x) / 2f64.powi(31) + 1.0) / 2.0);
             let got = [
                 f64::from(f.s_q31) / 2f64.powi(31),
-                f64::from(f.w4_q31) / 2f64.powi(31) * FIRST,
-                -f64::from(f.xw3_q29) / 2f64.powi(29) * SECOND,
+                f64::from(f.w4_q31) / 2f64.powi(31) * f64::from(FIRST),
+                -f64::from(f.xw3_q29) / 2f64.powi(29) * f64::from(SECOND),
                 (f64::from(f.w2_q31) / 2f64.powi(31) - 7.0 / 6.0 * f64::from(f.w3_q30) / 2f64.powi(30))
-                    * THIRD,
+                    * f64::from(THIRD),
             ];
             for (w, (g, e)) in worst.iter_mut().zip(got.iter().zip([s.value, s.first, s.second, s.third])) {
                 *w = w.max((g - e).abs());

@@ -53,7 +53,7 @@ impl Sides {
             if !side.known && moves {
                 (side.known, side.mask) = (true, if ahead[axis] >= 0 { 0 } else { -1 });
             }
-            side.limit = if extra.sided() && moves { DEAD_NM.wrapping_neg() } else { i32::MIN };
+            side.limit = if extra.sided && moves { DEAD_NM.wrapping_neg() } else { i32::MIN };
             side.fade = t.fade[axis];
             side.jump = t.jump[axis].map(|jump| jump ^ side.mask);
         }

@@ -10,12 +10,13 @@
 //! at the last velocity and acceleration, for [`StreamPlan::hold_ticks`] at most ("hold"); a set-point that comes in that time is
 //! joined without a step. After that the path comes to rest along its tangent within the acceleration limit while
 //! the correction is ramped out, and [`StreamState::Fault`] is latched. Nothing jumps at any time.
+use super::config::whole_above;
 use super::engage::Engage;
 use super::guard::Guard;
 use super::ramp::{Clock, POLYNOMIAL, clock_step, shapes};
 use super::{Counters, Output, flag};
 use core::sync::atomic::{Ordering, compiler_fence};
-use giotto_shared::fixed::{mulh, mulh_add, to_fixed};
+use giotto_shared::fixed::{mulh, mulh_add, single_to_fixed};
 use giotto_shared::law::Operator;
 
 /// Longest distance of the places, samples; a power of two.
@@ -75,46 +76,47 @@ const CARE: u32 = u32::MAX;
 
 /// What a plan is made from.
 pub(crate) struct StreamNeeds {
-    pub(crate) operator: Option<Operator<f64>>,
-    pub(crate) tick_s: f64,
+    pub(crate) operator: Option<Operator<f32>>,
+    pub(crate) rate_hz: f32,
     /// Distance of the places wanted, s.
-    pub(crate) window_s: f64,
-    pub(crate) feed_m_s: f64,
-    pub(crate) acceleration_m_s2: f64,
+    pub(crate) window_s: f32,
+    pub(crate) feed_m_s: f32,
+    pub(crate) acceleration_m_s2: f32,
     pub(crate) hold_ticks: u32,
     pub(crate) engage_ticks: u32,
-    pub(crate) offset_nm: i32,
-    pub(crate) slew_nm: i32,
+    /// Of the offset, and of its change per tick.
+    pub(crate) bounds_nm: [i32; 2],
 }
 
 impl StreamPlan {
     /// `None` if the operator is too strong for so short a window.
     pub(crate) fn build(n: &StreamNeeds) -> Option<Self> {
-        let stride = (libm::round(n.window_s / n.tick_s) as u32).clamp(1, MAX_STRIDE);
-        let h = f64::from(stride) * n.tick_s;
+        let stride = ((n.window_s * n.rate_hz + 0.5) as u32).clamp(1, MAX_STRIDE);
+        let h = stride as f32 / n.rate_hz;
         let operator = n.operator.unwrap_or_default();
         // p(−h) − 2p + p(h) is s²h² + s⁴h⁴/12 + …, with 2h it is 4 s²h² + 16 s⁴h⁴/12 + …
         let second = operator.second_s2 / (h * h);
         let fourth = 12.0 * operator.fourth_s4 / (h * h * h * h);
         let outer = (fourth - second) / 12.0;
         let inner = second - 4.0 * outer;
-        let most = 0.99 * f64::from(1u32 << (31 - WEIGHT_BITS));
-        if !(libm::fabs(inner) < most && libm::fabs(outer) < most) {
+        let most = 0.99 * (1u32 << (31 - WEIGHT_BITS)) as f32;
+        if !(inner.abs() < most && outer.abs() < most) {
             return None;
         }
         // v/2ᵏ per tick must be within the acceleration: 2ᵏ ≥ v/(a·T).
-        let ratio = n.feed_m_s / (n.acceleration_m_s2 * n.tick_s);
-        let brake_shift = libm::ceil(libm::log2(ratio.max(1.0))) as u32;
+        let ratio = n.feed_m_s / n.acceleration_m_s2 * n.rate_hz;
+        let brake_shift = u32::BITS - whole_above(ratio).saturating_sub(1).leading_zeros();
+        let [offset_nm, slew_nm] = n.bounds_nm;
         Some(Self {
             stride,
-            inner: to_fixed(inner, WEIGHT_BITS),
-            outer: to_fixed(outer, WEIGHT_BITS),
-            step_nm: to_fixed(n.feed_m_s * n.tick_s * 1.05e9, 0) as u32,
+            inner: single_to_fixed(inner, WEIGHT_BITS),
+            outer: single_to_fixed(outer, WEIGHT_BITS),
+            step_nm: single_to_fixed(n.feed_m_s / n.rate_hz * 1.05e9, 0) as u32,
             hold_ticks: n.hold_ticks,
             brake_shift: brake_shift.min(20),
             engage_ticks: n.engage_ticks,
-            offset_nm: n.offset_nm,
-            slew_nm: n.slew_nm,
+            offset_nm,
+            slew_nm,
             corrected: n.operator.is_some(),
         })
     }
@@ -155,17 +157,29 @@ impl StreamPlan {
     }
 }
 
-/// The stream's tick.
+/// What is kept of a tick and of those that were whole strides before it, nm.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+struct Kept {
+    /// The offset of the tick, behind a word that makes the size a power of two: to the very first word the compiler finds a
+    /// second way, which costs the tick a register.
+    offset: [i32; 4],
+    /// By axis: the set-point of the tick, and those 1, 2 and 3 strides before it.
+    axes: [[i32; 4]; 3],
+}
+
+/// The stream's tick. What each tick needs comes first: there one load reaches two words.
+#[repr(C)]
 #[derive(Clone, Debug)]
 pub struct Stream {
     plan: StreamPlan,
-    /// By the tick's place in a stride and by axis: the newest set-point of this place, and those 1, 2 and 3 strides
-    /// before it; the first row is the offset of that tick.
-    kept: [[[i32; 4]; 4]; MAX_STRIDE as usize],
-    /// Place of the newest.
+    guard: Guard,
+    /// Place of the newest set-point in `kept`.
     place: u32,
     /// Number of the set-point that may be taken as it is, or [`CARE`].
     regular: u32,
+    /// By the tick's place in a stride.
+    kept: [Kept; MAX_STRIDE as usize],
     /// Velocity per tick and its change per tick where regular set-points ended; meant only while care is needed.
     velocity: [i32; 3],
     change: [i32; 3],
@@ -178,7 +192,6 @@ pub struct Stream {
     bias_nm: [i32; 3],
     joining: bool,
     join: Clock,
-    guard: Guard,
     engage: Engage,
     counters: StreamCounters,
 }
@@ -205,7 +218,7 @@ impl Stream {
         guard.watch(bypass);
         Self {
             plan: *plan,
-            kept: [[[0; 4], [x; 4], [y; 4], [z; 4]]; MAX_STRIDE as usize],
+            kept: [Kept { axes: [[x; 4], [y; 4], [z; 4]], offset: [0; 4] }; MAX_STRIDE as usize],
             place: 0,
             regular: u32::from(sequence),
             velocity: [0; 3],
@@ -257,11 +270,12 @@ impl Stream {
         if let Some(StreamSample { sequence, position_nm: [x, y, z] }) = sample
             && u32::from(sequence) == self.regular
         {
-            let (last, most) = (&self.kept[(self.place % MAX_STRIDE) as usize], self.plan.step_nm);
+            let last = &self.kept[(self.place % MAX_STRIDE) as usize].axes;
+            let most = self.plan.step_nm;
             let near = |now: i32, last: i32| {
                 (now.wrapping_sub(last) as u32).wrapping_add(most) <= most.wrapping_mul(2)
             };
-            if near(x, last[1][0]) && near(y, last[2][0]) && near(z, last[3][0]) {
+            if near(x, last[0][0]) && near(y, last[1][0]) && near(z, last[2][0]) {
                 self.regular = u32::from(sequence.wrapping_add(1));
                 return self.filter(x, y, z);
             }
@@ -289,20 +303,20 @@ impl Stream {
         let place = if next == self.plan.stride { 0 } else { next };
         self.place = place;
         compiler_fence(Ordering::AcqRel);
-        let [offset, kx, ky, kz] = &mut self.kept[(place % MAX_STRIDE) as usize];
+        let Kept { axes: [kx, ky, kz], offset } = &mut self.kept[(place % MAX_STRIDE) as usize];
         // One axis after the other and its result put away: all at once they do not fit into the registers.
         let wx = self.plan.axis(kx, x);
-        offset[0] = wx;
+        offset[1] = wx;
         compiler_fence(Ordering::AcqRel);
         let wy = self.plan.axis(ky, y);
-        offset[1] = wy;
+        offset[2] = wy;
         compiler_fence(Ordering::AcqRel);
         let wz = self.plan.axis(kz, z);
-        offset[2] = wz;
+        offset[3] = wz;
         compiler_fence(Ordering::AcqRel);
         // The set-points of two strides ago have moved up one place.
         let nominal = [kx[2], ky[2], kz[2]];
-        let [lx, ly, lz, _] = self.kept[(before % MAX_STRIDE) as usize][0];
+        let [_, lx, ly, lz] = self.kept[(before % MAX_STRIDE) as usize].offset;
         let weights = Guard::weigh(wz, lz, Guard::weigh(wy, ly, Guard::weigh(wx, lx, (0, 0))));
         if self.guard.easy(weights) {
             return Output::new(nominal, [wx, wy, wz], flag::MOVING);
@@ -322,7 +336,7 @@ impl Stream {
             place = place.checked_sub(1).unwrap_or(self.plan.stride.wrapping_sub(1));
             strides += usize::from(place == self.place);
         }
-        let [_, x, y, z] = &self.kept[(place % MAX_STRIDE) as usize];
+        let [x, y, z] = &self.kept[(place % MAX_STRIDE) as usize].axes;
         [x[strides & 3], y[strides & 3], z[strides & 3]]
     }
 
@@ -338,13 +352,13 @@ impl Stream {
     /// As [`Self::filter`] when bounds or engagement may change what goes out.
     #[inline(never)]
     fn with_care(&mut self, last: [i32; 3]) -> Output {
-        let [[wx, wy, wz, _], x, y, z] = self.kept[(self.place % MAX_STRIDE) as usize];
+        let Kept { axes: [x, y, z], offset: [_, wx, wy, wz] } = self.kept[(self.place % MAX_STRIDE) as usize];
         let (nominal, wanted) = ([x[2], y[2], z[2]], [wx, wy, wz]);
         let wanted = self.engage.apply(wanted);
         self.guard.watch(!self.engage.full());
         let (offset, verdict) = self.guard.pass_after(last, wanted);
         let [ox, oy, oz] = offset;
-        self.kept[(self.place % MAX_STRIDE) as usize][0] = [ox, oy, oz, 0];
+        self.kept[(self.place % MAX_STRIDE) as usize].offset = [0, ox, oy, oz];
         let bounds = &mut self.counters.bounds;
         bounds.offset_cuts = bounds.offset_cuts.wrapping_add(u32::from(verdict.offset_cut));
         bounds.slew_cuts = bounds.slew_cuts.wrapping_add(u32::from(verdict.slew_cut));

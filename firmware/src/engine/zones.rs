@@ -1,8 +1,6 @@
 //! The table as the planner uses it: each zone's operator and merged terms, checked once.
 use giotto_shared::law::{Operator, Profile, ProfileError};
-use giotto_shared::model::Cumulants;
-use giotto_shared::table::{Limits, MAX_TERMS, Table, Travel, Zone};
-use giotto_shared::term::Term;
+use giotto_shared::table::{Limits, Table, Travel, Zone};
 
 /// Why a table cannot be used. Zones count from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,31 +14,28 @@ pub enum ZoneError {
 /// What a segment asks the table.
 pub(crate) struct Asked {
     /// Centre of an arc, middle of a line.
-    pub(crate) place_m: [f64; 3],
-    pub(crate) radius_m: Option<f64>,
-    pub(crate) feed_m_s: f64,
+    pub(crate) place_m: [f32; 3],
+    pub(crate) radius_m: Option<f32>,
+    pub(crate) feed_m_s: f32,
     pub(crate) ccw: Option<bool>,
 }
 
 /// A zone ready for use.
 #[derive(Clone, Debug)]
 pub(crate) struct Built {
-    pub(crate) operator: Operator<f64>,
-    /// κ3/6, s³, assumed (see [`Cumulants::third_of_lag_and_average`]): used where the feed changes on an arc.
-    pub(crate) third_s3: f64,
+    pub(crate) operator: Operator<f32>,
+    /// κ3/6, s³, assumed (see [`third_of_lag_and_average`](giotto_shared::model::Cumulants::third_of_lag_and_average)): used where the feed changes on an arc.
+    pub(crate) third_s3: f32,
     /// `None`: no profile terms.
-    pub(crate) profile: Option<Profile<f64>>,
+    pub(crate) profile: Option<Profile<f32>>,
     /// Where position errors are counted from: the middle of the zone's place.
-    pub(crate) reference_m: Option<[f64; 3]>,
+    pub(crate) reference_m: Option<[f32; 3]>,
 }
 
 impl Built {
     /// Merges the terms of zone `index`.
     fn new(zone: &Zone, index: usize) -> Result<Self, ZoneError> {
-        let cumulants = Cumulants {
-            kappa2_s2: f64::from(zone.cumulants.kappa2_s2),
-            kappa4_s4: f64::from(zone.cumulants.kappa4_s4),
-        };
+        let cumulants = zone.cumulants;
         let bounds = [zone.radius_m, zone.feed_m_s];
         let numbers = bounds.iter().flatten();
         if !(numbers.copied().all(f32::is_finite)
@@ -50,14 +45,11 @@ impl Built {
         {
             return Err(ZoneError::Value(Some(index)));
         }
-        let terms: heapless::Vec<Term<f64>, MAX_TERMS> =
-            zone.terms.iter().map(|term| term.map(f64::from)).collect();
-        let profile = Profile::new(&terms).map_err(|e| ZoneError::Term(index, e))?;
-        let reference_m = zone.place_m.map(|[low, high]| {
-            let middle = |i: usize| 0.5 * (f64::from(low[i]) + f64::from(high[i]));
-            [middle(0), middle(1), middle(2)]
-        });
-        let profile = (!terms.is_empty()).then_some(profile);
+        let profile = Profile::new(&zone.terms).map_err(|e| ZoneError::Term(index, e))?;
+        let reference_m = zone
+            .place_m
+            .map(|[[x0, y0, z0], [x1, y1, z1]]| [0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (z0 + z1)]);
+        let profile = (!zone.terms.is_empty()).then_some(profile);
         let third_s3 = cumulants.third_of_lag_and_average() / 6.0;
         Ok(Self { operator: Operator::new(&cumulants), third_s3, profile, reference_m })
     }
@@ -118,10 +110,10 @@ pub(crate) fn check(table: &Table) -> Result<(), ZoneError> {
 }
 
 fn fits(zone: &Zone, asked: &Asked) -> bool {
-    // Programmed values are decimal, bounds are f32: a bound that was meant to be met is met.
-    let inside = |value: f64, [low, high]: [f32; 2]| {
-        let slack = 1e-6 * libm::fabs(value);
-        value >= f64::from(low) - slack && value <= f64::from(high) + slack
+    // Programmed values and bounds are rounded to single precision: a bound that was meant to be met is met.
+    let inside = |value: f32, [low, high]: [f32; 2]| {
+        let slack = 1e-6 * value.abs();
+        value >= low - slack && value <= high + slack
     };
     let travel = match (zone.travel, asked.ccw) {
         (Travel::Both, _) | (_, None) => true,

@@ -44,15 +44,15 @@ impl<T> Queue<T> {
     }
 }
 
-impl<T> Sender<T> for Queue<T> {
-    fn send(&mut self, thing: T) -> Result<(), T> {
+impl<T: Copy> Sender<T> for Queue<T> {
+    fn send(&mut self, thing: &T) -> bool {
         let capacity = self.capacity;
         self.with(|things| {
-            if things.len() == capacity {
-                return Err(thing);
+            let room = things.len() < capacity;
+            if room {
+                things.push_back(*thing);
             }
-            things.push_back(thing);
-            Ok(())
+            room
         })
     }
 

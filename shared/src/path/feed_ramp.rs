@@ -61,12 +61,14 @@ pub struct FeedRamp<T> {
     pub duration_s: T,
 }
 
+/// Largest S′ and S″: 630/4⁴, and 2520 q³r at r² = 1/7.
+pub const STEEPEST: [f64; 2] = [315.0 / 128.0, 2520.0 * 27.0 / 2744.0 / 2.645_751_311_064_590_6];
+
 impl FeedRamp<f64> {
     /// The quickest ramp within the limits.
     pub fn within(from_m_s: f64, to_m_s: f64, limits: &MotionLimits) -> Self {
-        // Largest S′ and S″ over the ramp: 630/4⁴ and 2520 q³r at r² = 1/7.
-        let by_acceleration = (315.0 / 128.0) / limits.acceleration_m_s2;
-        let by_jerk = 2520.0 * (3.0f64 / 14.0).powi(3) / libm::sqrt(7.0) / limits.jerk_m_s3;
+        let by_acceleration = STEEPEST[0] / limits.acceleration_m_s2;
+        let by_jerk = STEEPEST[1] / limits.jerk_m_s3;
         let change = libm::fabs(to_m_s - from_m_s);
         let duration_s = (change * by_acceleration).max(libm::sqrt(change * by_jerk));
         Self { from_m_s, to_m_s, duration_s }

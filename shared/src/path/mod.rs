@@ -2,5 +2,5 @@
 mod feed_ramp;
 mod segment;
 
-pub use feed_ramp::{FeedRamp, MotionLimits, Smoothstep, smoothstep};
+pub use feed_ramp::{FeedRamp, MotionLimits, STEEPEST, Smoothstep, smoothstep};
 pub use segment::{CircleRun, Segment};

@@ -29,14 +29,14 @@ impl<T> Queue<T> {
     }
 }
 
-impl<T> Sender<T> for Queue<T> {
-    fn send(&mut self, thing: T) -> Result<(), T> {
+impl<T: Copy> Sender<T> for Queue<T> {
+    fn send(&mut self, thing: &T) -> bool {
         let mut things = self.0.borrow_mut();
-        if things.len() == self.1 {
-            return Err(thing);
+        let room = things.len() < self.1;
+        if room {
+            things.push_back(*thing);
         }
-        things.push_back(thing);
-        Ok(())
+        room
     }
 
     fn waiting(&self) -> usize {

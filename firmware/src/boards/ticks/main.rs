@@ -22,6 +22,9 @@ mod image {
     use giotto_firmware::engine::bench::{Arc, Libm, Plain, Streamed, Turning};
     use giotto_firmware::engine::flag;
 
+    /// How far a helix rises, m.
+    const HELIX_M: f64 = 0.02;
+
     /// Nothing logs here.
     #[defmt::global_logger]
     struct Silence;
@@ -116,8 +119,8 @@ mod image {
     }
 
     /// From rest to rest. All ticks under way, and those at constant feed.
-    fn arc(extended: bool, floor: u32) -> Option<[Range; 2]> {
-        let mut arc = Arc::new(extended);
+    fn arc(extended: bool, rise_m: f64, floor: u32) -> Option<[Range; 2]> {
+        let mut arc = Arc::new(extended, rise_m);
         let mut ranges = [Range::NONE, Range::NONE];
         while !arc.done() {
             let before = SYST::get_current();
@@ -195,13 +198,17 @@ mod image {
 
     fn measure() -> Option<()> {
         let floor = overhead();
-        let [all, steady] = arc(false, floor)?;
+        let [all, steady] = arc(false, 0.0, floor)?;
         say("arc_beta", &all);
         say("arc_beta_steady", &steady);
         say("stream", &stream(floor)?);
-        let [all, steady] = arc(true, floor)?;
+        let [all, steady] = arc(true, 0.0, floor)?;
         say("arc_extended", &all);
         say("arc_extended_steady", &steady);
+        let [all, _] = arc(false, HELIX_M, floor)?;
+        say("helix_beta", &all);
+        let [all, _] = arc(true, HELIX_M, floor)?;
+        say("helix_extended", &all);
         say("naive_libm", &plain::<Libm>(floor));
         say("naive_nalgebra", &plain::<Nalgebra>(floor));
         say("naive_idsp", &plain::<Idsp>(floor));

@@ -61,14 +61,14 @@ impl Executor {
     #[inline(never)]
     pub(super) fn rest(&mut self, inbox: &mut impl Inbox) -> Output {
         self.halting = false;
-        if let Some(next) = inbox.take() {
-            if next.epoch != self.epoch || self.fault.is_some() {
+        // At rest nothing else needs the segment in hand.
+        if inbox.take(&mut self.segment) {
+            if self.segment.epoch != self.epoch || self.fault.is_some() {
                 self.counters.dropped = self.counters.dropped.wrapping_add(1);
-            } else if next.start_nm != self.rest_nm {
+            } else if self.segment.start_nm != self.rest_nm {
                 self.counters.dropped = self.counters.dropped.wrapping_add(1);
                 self.fault = Some(Fault::Discontinuity);
             } else {
-                self.segment = next;
                 self.begin_settle();
                 return self.finish(self.rest_nm, self.rest_offset_nm, flag::SETTLING);
             }

@@ -61,7 +61,7 @@ impl Executor {
         if end {
             return if falling { self.standstill() } else { self.top() };
         }
-        self.ramp_at(shapes(&self.ramp, x), falling)
+        self.ramp_at(&shapes(&self.ramp, x), falling)
     }
 
     #[inline(never)]
@@ -73,26 +73,26 @@ impl Executor {
             self.clock = self.second.mirrored();
             self.mode = Mode::Fall;
             let shape = shapes(&self.ramp, self.clock.here());
-            return self.ramp_at(shape, true);
+            return self.ramp_at(&shape, true);
         }
-        self.ramp_at(shapes(&self.ramp, x).minus(shapes(&self.ramp, later)), false)
+        self.ramp_at(&shapes(&self.ramp, x).minus(shapes(&self.ramp, later)), false)
     }
 
     /// One tick of a ramp on any curve.
-    #[inline(always)]
-    fn ramp_at(&mut self, shape: Shapes, falling: bool) -> Output {
+    #[inline(never)]
+    fn ramp_at(&mut self, shape: &Shapes, falling: bool) -> Output {
         let step = scaled(self.segment.timing.step_q1, shape.s_q31);
         self.advance(step);
         let law = if falling { &self.segment.fall } else { &self.segment.rise };
-        let phase_q32 = ramp_phase(self.phase, step, law.end_term(&shape));
+        let phase_q32 = ramp_phase(self.phase, step, law.end_term(shape));
         let (c, s) = self.weights(phase_q32);
         let nominal = self.place(c, s, phase_q32);
         let [x, y, z] = &self.segment.axes;
         let mut wanted = if self.segment.kind == Kind::Line {
-            let along = law.along(&shape);
+            let along = law.along(shape);
             [mulh(x.v, along), mulh(y.v, along), mulh(z.v, along)]
         } else {
-            let (radial, tangential) = law.gain(&shape);
+            let (radial, tangential) = law.gain(shape);
             let (re, im) = turn(radial, tangential, c, s);
             [x.turned(re, im), y.turned(re, im), z.turned(re, im)]
         };

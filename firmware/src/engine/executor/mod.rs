@@ -3,7 +3,7 @@
 //! Timing contract: [`Executor::tick`] is called once per period from the highest-priority interrupt. It has no loop
 //! whose length depends on data, no division, no `f64`, no allocation, and cannot panic. Phases are integers; one sine and
 //! cosine serve position, correction and all linear terms, and each periodic error takes one more. What it runs was
-//! prepared by the planner in the background and comes through an [`Inbox`] by value, so that a new table never
+//! prepared by the planner in the background and comes through an [`Inbox`] as a whole, so that a new table never
 //! acts inside a segment.
 //!
 //! Longest ticks on a Cortex-M4F, in instructions (`giotto-hil ticks` counts them; the wider bars are those of its issue):
@@ -32,19 +32,19 @@ use giotto_shared::angle::SINCOS;
 
 /// Where the next segment comes from: the receiving end of a lock-free queue.
 pub trait Inbox {
-    /// The next segment, if there is one.
-    fn take(&mut self) -> Option<Planned>;
+    /// Moves the next segment, if there is one, to a place: it is large, and the interrupt's stack is not.
+    fn take(&mut self, place: &mut Planned) -> bool;
 }
 
 impl<const N: usize> Inbox for heapless::spsc::Queue<Planned, N> {
-    fn take(&mut self) -> Option<Planned> {
-        self.dequeue()
+    fn take(&mut self, place: &mut Planned) -> bool {
+        self.dequeue().map(|next| *place = next).is_some()
     }
 }
 
 impl Inbox for heapless::spsc::Consumer<'_, Planned> {
-    fn take(&mut self) -> Option<Planned> {
-        self.dequeue()
+    fn take(&mut self, place: &mut Planned) -> bool {
+        self.dequeue().map(|next| *place = next).is_some()
     }
 }
 

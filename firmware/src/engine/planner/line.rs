@@ -1,74 +1,79 @@
 //! Lines.
-use super::numbers::{dot, positive, seen_from, sub, unit};
-use super::timing::{LINE, TURN, end_term, share_out};
-use super::{Planner, Refused, worst};
-use crate::engine::extra::Extra;
+use super::demand::{Demand, longer};
+use super::law::LineLaw;
+use super::numbers::{length, seen_from, to_m};
+use super::timing::{Way, end_term, turns_per_tick};
+use super::{Planner, Refused, terms, worst};
 use crate::engine::planned::{Axis, Kind, Planned};
-use crate::engine::ramp::{FIRST, THIRD, clock_step};
 use crate::engine::zones::Asked;
-use giotto_shared::fixed::to_fixed;
+use giotto_shared::fixed::single_to_fixed;
 
 impl Planner {
-    pub(super) fn line_to(&mut self, to: [i32; 3], feed: f64) -> Result<Planned, Refused> {
-        positive(feed, "feed")?;
+    /// To a place, at no more than a feed.
+    pub(super) fn line_to(&mut self, to: [i32; 3], feed: f32, segment: &mut Planned) -> Result<(), Refused> {
         self.check_feed(feed)?;
         let from = self.position_nm;
-        let metres = |nm: [i32; 3]| nm.map(|p| f64::from(p) * 1e-9);
-        let span = sub(metres(to), metres(from));
-        let length = libm::sqrt(dot(span, span));
-        let Some(direction) = unit(span) else { return self.dwell(self.config.tick_s()) };
-        let mut u_nm = [0; 3];
-        for ((u, t), f) in u_nm.iter_mut().zip(to).zip(from) {
-            *u = t.checked_sub(f).ok_or(Refused::OutOfBounds("length"))?;
+        let mut span_nm = [0; 3];
+        for ((span, to), from) in span_nm.iter_mut().zip(to).zip(from) {
+            *span = to.checked_sub(from).ok_or(Refused::OutOfBounds("length"))?;
         }
-        let middle = [0, 1, 2].map(|i| f64::from(from[i]) * 1e-9 + 0.5 * span[i]);
-        let zone = self.zones.choose(&Asked { place_m: middle, radius_m: None, feed_m_s: feed, ccw: None });
-        let limit = self.config.motion.acceleration_m_s2;
+        if span_nm == [0; 3] {
+            self.dwell(1, segment);
+            return Ok(());
+        }
+        let (start, span) = (to_m(from), to_m(span_nm));
+        let whole = length(span);
+        let [x, y, z] = start;
+        let place_m = [x + 0.5 * span[0], y + 0.5 * span[1], z + 0.5 * span[2]];
+        let zone = self.zones.choose(&Asked { place_m, radius_m: None, feed_m_s: feed, ccw: None });
+        let bounds = self.bounds(zone.is_some());
         let mut stretch = 1.0;
-        let (ramp_ticks, cruise_ticks) = loop {
-            let (ramp_ticks, cruise_ticks) = self.profile(length, feed, stretch)?;
-            let steps = f64::from(ramp_ticks) + f64::from(cruise_ticks);
-            let speed = length / (steps * self.config.tick_s());
-            let ramp_s = f64::from(ramp_ticks) * self.config.tick_s();
-            match self.stretch(stretch, worst::on_line(zone.as_ref(), speed, ramp_s), limit) {
+        let (timing, law) = loop {
+            let (ramp_ticks, cruise_ticks) = self.profile(whole, feed, stretch)?;
+            let timing = Way::LINE.share_out(ramp_ticks, cruise_ticks).ok_or(Refused::OutOfBounds("feed"))?;
+            let speed = turns_per_tick(&timing) / Way::LINE_TURNS * whole * self.machine.rate_hz;
+            let ramp_s = ramp_ticks as f32 * self.machine.tick_s;
+            let law = zone.as_ref().map(|zone| LineLaw::new(zone, speed, ramp_s));
+            let worst = worst::on_line(law.as_ref(), speed, ramp_s);
+            let demand = Demand {
+                offset_m: worst.gain,
+                slew_m_s: worst.slew_per_s,
+                acceleration_m_s2: worst.acceleration_per_s2,
+            };
+            let over = demand.correction(&bounds).max(demand.acceleration(self.machine.acceleration_m_s2));
+            match longer(stretch, over) {
                 Some(longer) => stretch = longer,
-                None => break (ramp_ticks, cruise_ticks),
+                None => break (timing, law),
             }
         };
-        let mut timing = share_out(LINE as u128, ramp_ticks, cruise_ticks);
-        timing.clock_step = clock_step(ramp_ticks);
-        let mut segment = self.blank();
+        self.blank(segment);
         segment.kind = Kind::Line;
-        for (i, axis) in segment.axes.iter_mut().enumerate() {
-            *axis = Axis { base: from[i], u: u_nm[i], v: to_fixed(direction[i], 31), a: 0, b: 0 };
+        for (((axis, from), span_nm), span) in segment.axes.iter_mut().zip(from).zip(span_nm).zip(span) {
+            *axis = Axis { base: from, u: span_nm, v: single_to_fixed(span / whole, 31), a: 0, b: 0 };
         }
-        segment.timing = timing;
-        segment.rise.end_term_q1 = end_term(&timing);
-        if let Some(zone) = zone {
-            let t = f64::from(ramp_ticks) * self.config.tick_s();
-            let speed = timing.step as f64 / LINE * length / self.config.tick_s();
-            let snap = zone.operator.fourth_s4 * speed * THIRD / (t * t * t) * 1e9;
-            segment.rise.k5 = to_fixed(zone.operator.second_s2 * speed * FIRST / t * 1e9, 2);
-            segment.rise.k7 = to_fixed(snap, 2);
-            segment.rise.k8 = to_fixed(-7.0 / 6.0 * snap, 3);
-            self.bound(&mut segment);
+        if let (Some(zone), Some(law)) = (&zone, law) {
+            self.bound(segment, &bounds);
+            segment.rise = law.rounded();
             if let Some(profile) = &zone.profile {
                 // Without a place there is no point that position errors could be counted from.
                 let mut profile = *profile;
                 if zone.reference_m.is_none() {
                     profile.position = [[0.0; 2]; 2];
                 }
-                let start = seen_from(metres(from), zone.reference_m.unwrap_or_default());
-                segment.extra = Extra::on_line(&profile, &self.motion(&timing, TURN / LINE), span, start);
+                let seen = seen_from(start, zone.reference_m.unwrap_or_default());
+                let motion = self.motion(&timing, 1.0 / Way::LINE_TURNS);
+                segment.extra = terms::on_line(&profile, &motion, span, seen);
+                segment.extended = true;
                 if !segment.extra.within_numbers() {
                     return Err(Refused::OutOfBounds("profile term"));
                 }
-                segment.extended = true;
             }
         }
+        segment.timing = timing;
+        segment.rise.end_term_q1 = end_term(&timing);
         segment.fall = segment.rise.turned_round();
         segment.end_nm = to;
         self.position_nm = to;
-        Ok(segment)
+        Ok(())
     }
 }

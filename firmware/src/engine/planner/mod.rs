@@ -1,28 +1,41 @@
-//! From what a program asks for to integers that the tick runs. Runs in the background, in `f64`.
+//! From what a program asks for to integers that the tick runs. Runs in the background.
+//!
+//! Places and angles are exact: double precision at the border, then whole nanometres and phases. The correction is
+//! millimetres at most and computed in single precision, which a Cortex-M4F has; 24 bits of them are below a nanometre.
 //!
 //! | file | plans |
 //! |---|---|
-//! | here | what is asked for, dwells, streams, the choice of ramp and feed |
-//! | `round` | circles, arcs and helices |
-//! | `line` | lines |
-//! | `worst` | bounds: the largest offset, slew and acceleration of what is planned |
+//! | here | what is asked for, dwells, streams, the choice of feed |
+//! | `circle`, `arc`, `line` | each its geometry and timing |
+//! | `round` | what circles and arcs have in common |
+//! | `law`, `terms` | the correction, from the numbers of a zone to those of the tick |
+//! | `worst`, `demand` | what a path asks for at most, and the ramp that keeps it within the bounds |
+//! | `machine` | the configuration, in the form that planning needs |
+//! | `timing`, `numbers` | phases, ticks, numbers at the border |
+mod arc;
+mod circle;
+mod demand;
+mod law;
 mod line;
+mod machine;
 mod numbers;
 mod round;
+mod terms;
 mod timing;
 mod worst;
 
-use super::config::{Config, ticks};
-use super::extra::Motion;
+use super::config::{Config, whole_above};
 use super::planned::{Planned, Timing};
 use super::ramp::clock_step;
 use super::stream::{StreamNeeds, StreamPlan};
 use super::zones::{Asked, ZoneError, Zones};
-use giotto_shared::fixed::to_fixed;
-use giotto_shared::path::{FeedRamp, Segment};
+use arc::Arc;
+use demand::Bounds;
+use giotto_shared::path::Segment;
 use giotto_shared::table::Table;
-use numbers::{in_u32, positive, to_nm};
-use timing::TURN;
+use machine::Machine;
+use numbers::{positive, to_m, to_nm};
+use timing::{Motion, turns_per_tick};
 
 /// Why a segment was not accepted. Nothing has moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +53,7 @@ pub enum Refused {
 /// The engine's slow half: plans segments one after the other.
 #[derive(Clone, Debug)]
 pub struct Planner {
-    config: Config,
+    machine: Machine,
     zones: Zones,
     position_nm: [i32; 3],
     epoch: u8,
@@ -49,7 +62,7 @@ pub struct Planner {
 impl Planner {
     /// Plans from a position on.
     pub fn new(config: &Config, position_nm: [i32; 3]) -> Self {
-        Self { config: *config, zones: Zones::default(), position_nm, epoch: 0 }
+        Self { machine: Machine::new(config), zones: Zones::default(), position_nm, epoch: 0 }
     }
 
     /// The table used for segments planned from now on; `None`: no correction. On an error the old one stays.
@@ -95,115 +108,113 @@ impl Planner {
 
     /// One segment from where the last one ends.
     pub fn segment(&mut self, segment: &Segment) -> Result<Planned, Refused> {
+        let mut planned = Planned::default();
         match *segment {
             Segment::Line { to_m, feed_m_s } => {
                 let to = to_nm(&to_m, "end")?;
-                self.line_to(to, feed_m_s)
+                self.line_to(to, positive(feed_m_s, "feed")?, &mut planned)?;
             }
             Segment::Arc { centre_m, normal, sweep_rad, rise_m, feed_m_s } => {
-                self.arc(centre_m, normal, sweep_rad, rise_m, feed_m_s)
+                let arc = Arc { centre: centre_m, normal, sweep: sweep_rad, rise: rise_m, feed: feed_m_s };
+                self.arc(&arc, &mut planned)?;
             }
-            Segment::Dwell { time_s } => self.dwell(time_s),
+            Segment::Dwell { time_s } => {
+                let ticks = whole_above(positive(time_s, "time")? * self.machine.rate_hz);
+                if ticks == u32::MAX {
+                    return Err(Refused::OutOfBounds("time"));
+                }
+                self.dwell(ticks, &mut planned);
+            }
         }
+        Ok(planned)
     }
 
     /// A stream of set-points from where the last segment ends, at no more than a feed; its zone is chosen there.
     pub fn stream(&self, feed_m_s: f64) -> Result<StreamPlan, Refused> {
-        positive(feed_m_s, "feed")?;
+        let feed_m_s = positive(feed_m_s, "feed")?;
         self.check_feed(feed_m_s)?;
-        let place_m = self.position_nm.map(|p| f64::from(p) * 1e-9);
+        let place_m = to_m(self.position_nm);
         let zone = self.zones.choose(&Asked { place_m, radius_m: None, feed_m_s, ccw: None });
-        let mut bounds = self.blank();
-        if zone.is_some() {
-            self.bound(&mut bounds);
-        }
+        let bounds = self.bounds(zone.is_some());
         let needs = StreamNeeds {
             operator: zone.map(|z| z.operator),
-            tick_s: self.config.tick_s(),
-            window_s: self.config.stream_window_s,
+            rate_hz: self.machine.rate_hz,
+            window_s: self.machine.stream_window_s,
             feed_m_s,
-            acceleration_m_s2: self.config.motion.acceleration_m_s2,
-            hold_ticks: self.config.stream_hold_ticks,
-            engage_ticks: self.config.engage_ticks(),
-            offset_nm: bounds.offset_nm,
-            slew_nm: bounds.slew_nm,
+            acceleration_m_s2: self.machine.acceleration_m_s2,
+            hold_ticks: self.machine.stream_hold_ticks,
+            engage_ticks: self.machine.engage_ticks,
+            bounds_nm: self.machine.bounds_nm(bounds.offset_m, bounds.slew_m_s),
         };
         StreamPlan::build(&needs).ok_or(Refused::OutOfBounds("stream window"))
     }
 
-    fn dwell(&mut self, time_s: f64) -> Result<Planned, Refused> {
-        positive(time_s, "time")?;
-        let Some(cruise_ticks) = in_u32(libm::ceil(time_s * f64::from(self.config.rate_hz))) else {
-            return Err(Refused::OutOfBounds("time"));
-        };
-        let timing = Timing { cruise_ticks: cruise_ticks.max(1), ..Timing::default() };
-        let mut segment = self.blank();
-        (segment.timing, segment.corrected) = (timing, true);
-        Ok(segment)
+    fn dwell(&self, ticks: u32, segment: &mut Planned) {
+        self.blank(segment);
+        segment.timing.cruise_ticks = ticks.max(1);
+        segment.corrected = true;
     }
 
     /// Ramp and constant-rate ticks for a length at no more than a feed.
-    fn profile(&self, length: f64, feed: f64, stretch: f64) -> Result<(u32, u32), Refused> {
+    fn profile(&self, length: f32, feed: f32, stretch: f32) -> Result<(u32, u32), Refused> {
         // Two ramps alone cover feed·(ramp time): a short length takes a lower feed.
         let mut feed = feed;
         for _ in 0..60 {
-            let t = f64::from(self.ramp_ticks(feed, stretch)) * self.config.tick_s();
+            let t = self.machine.ramp_ticks(feed, stretch) as f32 * self.machine.tick_s;
             if feed * t <= length {
                 break;
             }
             feed *= (length / (feed * t)).clamp(0.5, 0.98);
         }
-        let ramp_ticks = self.ramp_ticks(feed, stretch);
-        let cruise = libm::ceil(length / feed / self.config.tick_s()) - f64::from(ramp_ticks);
-        let cruise = in_u32(cruise.max(0.0)).ok_or(Refused::OutOfBounds("duration"))?;
-        Ok((ramp_ticks, cruise))
+        let ramp_ticks = self.machine.ramp_ticks(feed, stretch);
+        let ticks = whole_above(length / feed * self.machine.rate_hz);
+        if ticks == u32::MAX {
+            return Err(Refused::OutOfBounds("duration"));
+        }
+        Ok((ramp_ticks, ticks.saturating_sub(ramp_ticks)))
     }
 
-    /// The quickest ramp within the limits along the path, made longer by a factor.
-    fn ramp_ticks(&self, feed: f64, stretch: f64) -> u32 {
-        let duration_s = FeedRamp::within(0.0, feed, &self.config.motion).duration_s * stretch;
-        ticks(duration_s * f64::from(self.config.rate_hz))
-    }
-
-    /// The factor for a next try at a ramp in which an acceleration was found; `None`: it is within the limit, with
-    /// what a sweep over a ramp may miss to spare.
-    fn stretch(&self, stretch: f64, acceleration_m_s2: f64, limit_m_s2: f64) -> Option<f64> {
-        let over = acceleration_m_s2 / (0.985 * limit_m_s2);
-        (over > 1.0 && stretch < 16.0).then(|| stretch * (1.01 * libm::sqrt(over)).clamp(1.01, 2.0))
-    }
-
-    fn blank(&self) -> Planned {
-        Planned {
-            settle_step: clock_step(self.config.engage_ticks()),
-            offset_nm: to_fixed(self.config.offset_m * 1e9, 0),
-            slew_nm: to_fixed(self.config.slew_m_s * self.config.tick_s() * 1e9, 0),
+    /// Nothing yet: stands where the last segment ends, within the bounds of the image.
+    fn blank(&self, segment: &mut Planned) {
+        *segment = Planned {
+            settle_step: clock_step(self.machine.engage_ticks),
             start_nm: self.position_nm,
             end_nm: self.position_nm,
             epoch: self.epoch,
             ..Planned::default()
-        }
+        };
+        self.bound(segment, &self.bounds(false));
+        segment.corrected = false;
     }
 
-    /// A zone applies: its bounds, or the image's if they are tighter.
-    fn bound(&self, segment: &mut Planned) {
+    /// The bounds of the image; where a zone applies those of the table, if they are tighter.
+    fn bounds(&self, zone: bool) -> Bounds {
+        let Machine { offset_m, slew_m_s, .. } = self.machine;
+        if !zone {
+            return Bounds { offset_m, slew_m_s };
+        }
         let limits = self.zones.limits();
-        let offset = f64::from(limits.offset_m).min(self.config.offset_m);
-        let slew = f64::from(limits.slew_m_s).min(self.config.slew_m_s) * self.config.tick_s();
-        (segment.offset_nm, segment.slew_nm) = (to_fixed(offset * 1e9, 0), to_fixed(slew * 1e9, 0));
+        Bounds { offset_m: offset_m.min(limits.offset_m), slew_m_s: slew_m_s.min(limits.slew_m_s) }
+    }
+
+    /// A zone applies, with its bounds.
+    fn bound(&self, segment: &mut Planned, bounds: &Bounds) {
+        let [offset_nm, slew_nm] = self.machine.bounds_nm(bounds.offset_m, bounds.slew_m_s);
+        (segment.offset_nm, segment.slew_nm) = (offset_nm, slew_nm);
         segment.corrected = true;
     }
 
-    fn motion(&self, timing: &Timing, whole: f64) -> Motion {
-        let tick_s = self.config.tick_s();
+    /// `per_turn`: what a turn of phase counts.
+    fn motion(&self, timing: &Timing, per_turn: f32) -> Motion {
         Motion {
-            rate: timing.step as f64 / TURN * whole / tick_s,
-            ramp_s: f64::from(timing.ramp_ticks) * tick_s,
-            tick_s,
-            take_up_s: self.config.take_up_s,
+            rate: turns_per_tick(timing) * per_turn * self.machine.rate_hz,
+            ramp_s: timing.ramp_ticks as f32 * self.machine.tick_s,
+            tick_s: self.machine.tick_s,
+            take_up_ticks: self.machine.take_up_ticks,
         }
     }
 
-    fn check_feed(&self, feed: f64) -> Result<(), Refused> {
-        if feed > self.config.motion.feed_m_s { Err(Refused::OutOfBounds("feed")) } else { Ok(()) }
+    fn check_feed(&self, feed: f32) -> Result<(), Refused> {
+        if feed > self.machine.feed_m_s { Err(Refused::OutOfBounds("feed")) } else { Ok(()) }
     }
 }

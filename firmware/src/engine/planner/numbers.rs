@@ -1,46 +1,50 @@
-//! Numbers at the border, and vectors.
+//! Numbers at the border: what a program gives in double precision becomes whole nanometres and single precision here.
 use super::Refused;
 use crate::engine::config::MAX_POSITION_M;
-use giotto_shared::fixed::to_fixed;
+use giotto_shared::fixed::rounded;
 
+/// Nanometres in a metre.
+const NM: f64 = 1e9;
+/// Largest coordinate, nm.
+const MAX_POSITION_NM: u64 = (MAX_POSITION_M * NM) as u64;
+
+/// Every number is finite, and of a size that single precision has.
 pub(super) fn finite(values: &[f64], name: &'static str) -> Result<(), Refused> {
-    if values.iter().all(|v| v.is_finite()) { Ok(()) } else { Err(Refused::NotANumber(name)) }
+    if values.iter().all(|v| (*v as f32).is_finite()) { Ok(()) } else { Err(Refused::NotANumber(name)) }
 }
 
-pub(super) fn positive(value: f64, name: &'static str) -> Result<(), Refused> {
-    if value.is_finite() && value > 0.0 { Ok(()) } else { Err(Refused::NotANumber(name)) }
+/// In single precision, finite and above 0.
+pub(super) fn positive(value: f64, name: &'static str) -> Result<f32, Refused> {
+    let single = value as f32;
+    if single.is_finite() && single > 0.0 { Ok(single) } else { Err(Refused::NotANumber(name)) }
 }
 
+/// A place, nm.
 pub(super) fn to_nm(metres: &[f64; 3], name: &'static str) -> Result<[i32; 3], Refused> {
     finite(metres, name)?;
-    if metres.iter().any(|m| libm::fabs(*m) > MAX_POSITION_M) {
+    let nm = metres.map(|m| rounded(m, NM));
+    if nm.iter().any(|nm| nm.unsigned_abs() > MAX_POSITION_NM) {
         return Err(Refused::OutOfBounds("position"));
     }
-    Ok(metres.map(|m| to_fixed(m * 1e9, 0)))
+    Ok(nm.map(|nm| nm as i32))
 }
 
-pub(super) fn in_u32(value: f64) -> Option<u32> {
-    (0.0..4e9).contains(&value).then_some(value as u32)
+/// A length in half nanometres, one on an arm of a circle; for lengths up to [`MAX_RADIUS_M`](crate::engine::MAX_RADIUS_M).
+pub(super) fn to_half_nm(metres: f64) -> i32 {
+    rounded(metres, 2.0 * NM) as i32
 }
 
-pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+/// Metres from nanometres, to 24 bits.
+pub(super) fn to_m(nm: [i32; 3]) -> [f32; 3] {
+    nm.map(|nm| nm as f32 * 1e-9)
 }
 
-pub(super) fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+/// Length of a vector.
+pub(super) fn length([x, y, z]: [f32; 3]) -> f32 {
+    libm::sqrtf(x * x + y * y + z * z)
 }
 
 /// X and Y of a point seen from another.
-pub(super) fn seen_from(point: [f64; 3], reference: [f64; 3]) -> [f64; 2] {
-    [point[0] - reference[0], point[1] - reference[1]]
-}
-
-pub(super) fn unit(a: [f64; 3]) -> Option<[f64; 3]> {
-    let length = libm::sqrt(dot(a, a));
-    (length > 1e-12).then(|| a.map(|x| x / length))
+pub(super) fn seen_from([x, y, _]: [f32; 3], [rx, ry, _]: [f32; 3]) -> [f32; 2] {
+    [x - rx, y - ry]
 }

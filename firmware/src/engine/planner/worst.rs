@@ -1,38 +1,40 @@
 //! The largest that a corrected path asks for, from rest to constant rate, by a sweep over its ramp.
-use crate::engine::zones::Built;
-use giotto_shared::law::AngularMotion;
-use giotto_shared::path::FeedRamp;
+use super::law::{ArcLaw, LineLaw, Shape};
+use super::timing::Motion;
+use crate::engine::ramp::FIRST;
 
 /// Places of a ramp that are looked at.
-const STEPS: u32 = 48;
+const STEPS: u16 = 48;
 
-/// Of an arc with a radius of 1.
+/// The shapes at the places of a ramp, in order.
+fn sweep() -> impl Iterator<Item = Shape> {
+    (0..=STEPS).map(|i| Shape::at(f32::from(i) * (2.0 / STEPS as f32) - 1.0))
+}
+
+/// Of a path that is scaled to an arc with a radius of 1; of a line, as it is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Worst {
     /// Offset.
-    pub(super) gain: f64,
+    pub(super) gain: f32,
     /// Rate of change of the offset, 1/s.
-    pub(super) slew_per_s: f64,
+    pub(super) slew_per_s: f32,
     /// Acceleration of the commanded path, centripetal and along it together, 1/s².
-    pub(super) acceleration_per_s2: f64,
+    pub(super) acceleration_per_s2: f32,
 }
 
-/// On an arc whose constant rate is `rate` rad/s.
-pub(super) fn on_arc(zone: Option<&Built>, rate: f64, ramp_s: f64) -> Worst {
+/// On an arc, in its rising and in its falling ramp.
+pub(super) fn on_arc(law: Option<&ArcLaw>, motion: &Motion) -> Worst {
     let mut worst = Worst::default();
-    // A falling ramp is a rising one run backwards; there κ3 has the other sign.
+    let h = motion.ramp_s / f32::from(STEPS);
     for sense in [1.0, -1.0] {
-        let h = ramp_s / f64::from(STEPS);
-        let mut sweep = (0..=STEPS).map(|i| Place::at(zone, rate, ramp_s, sense, h * f64::from(i)));
-        let mut before = sweep.next().unwrap_or_default();
-        let mut here = before;
-        for after in sweep {
-            worst.add(&before, &here, &after, h);
+        let (mut before, mut here) = (Place::default(), Place::default());
+        // The last place twice: at constant rate nothing changes any more.
+        for (i, after) in sweep().chain([Shape::at(1.0)]).enumerate() {
+            let after = Place::at(law, motion, &after, sense);
+            if i > 0 {
+                worst.add(&before, &here, &after, h);
+            }
             (before, here) = (here, after);
-        }
-        worst.add(&before, &here, &here, h);
-        if zone.is_none_or(|zone| zone.third_s3 == 0.0) {
-            break;
         }
     }
     worst
@@ -41,56 +43,52 @@ pub(super) fn on_arc(zone: Option<&Built>, rate: f64, ramp_s: f64) -> Worst {
 /// Gain less one, and how the angle moves.
 #[derive(Clone, Copy, Default)]
 struct Place {
-    radial: f64,
-    tangential: f64,
-    rate: f64,
-    acceleration: f64,
+    radial: f32,
+    tangential: f32,
+    rate: f32,
+    acceleration: f32,
 }
 
 impl Place {
-    fn at(zone: Option<&Built>, rate: f64, ramp_s: f64, sense: f64, time_s: f64) -> Self {
-        let ramp = FeedRamp { from_m_s: 0.0, to_m_s: rate, duration_s: ramp_s };
-        let [_, rate, acceleration, jerk, snap] = ramp.at(time_s);
-        let Some(zone) = zone else { return Self { rate, acceleration, ..Self::default() } };
-        let gain = zone.operator.gain(&AngularMotion { rate, acceleration, jerk, snap });
-        let radial = gain.radial - 3.0 * sense * zone.third_s3 * rate * acceleration;
-        Self { radial, tangential: gain.tangential, rate, acceleration }
+    fn at(law: Option<&ArcLaw>, motion: &Motion, f: &Shape, sense: f32) -> Self {
+        let [radial, tangential] = law.map_or([0.0; 2], |law| law.gain(f, sense));
+        let (rate, acceleration) = (motion.rate * f.s, motion.rate * FIRST / motion.ramp_s * f.w4);
+        Self { radial, tangential, rate, acceleration }
     }
 }
 
 impl Worst {
-    fn add(&mut self, before: &Place, here: &Place, after: &Place, h: f64) {
+    fn add(&mut self, before: &Place, here: &Place, after: &Place, h: f32) {
         let (w, a) = (here.rate, here.acceleration);
         let (re, im) = (here.radial, here.tangential);
-        let first = |b: f64, a: f64| (a - b) / (2.0 * h);
+        let first = |b: f32, a: f32| (a - b) / (2.0 * h);
         let (re1, im1) = (first(before.radial, after.radial), first(before.tangential, after.tangential));
-        let second = |b: f64, c: f64, a: f64| (b - 2.0 * c + a) / (h * h);
+        let second = |b: f32, c: f32, a: f32| ((b - c) + (a - c)) / (h * h);
         let re2 = second(before.radial, re, after.radial);
         let im2 = second(before.tangential, im, after.tangential);
-        self.gain = self.gain.max(libm::hypot(re, im));
+        let size = |x: f32, y: f32| libm::sqrtf(x * x + y * y);
+        self.gain = self.gain.max(size(re, im));
         // |d/dt (G − 1)e^{iθ}| = |G′ + iω(G − 1)|.
-        self.slew_per_s = self.slew_per_s.max(libm::hypot(re1 - w * im, im1 + w * re));
+        self.slew_per_s = self.slew_per_s.max(size(re1 - w * im, im1 + w * re));
         // d²/dt² G e^{iθ} = (G″ + 2iωG′ + (iα − ω²)G) e^{iθ}.
         let along = re2 - 2.0 * w * im1 - w * w * (1.0 + re) - a * im;
         let across = im2 + 2.0 * w * re1 - w * w * im + a * (1.0 + re);
-        self.acceleration_per_s2 = self.acceleration_per_s2.max(libm::hypot(along, across));
+        self.acceleration_per_s2 = self.acceleration_per_s2.max(size(along, across));
     }
 }
 
-/// Largest acceleration on a line up to a speed, m/s².
-pub(super) fn on_line(zone: Option<&Built>, speed: f64, ramp_s: f64) -> f64 {
-    let ramp = FeedRamp { from_m_s: 0.0, to_m_s: speed, duration_s: ramp_s };
-    let h = ramp_s / f64::from(STEPS);
-    let place = |i: u32| {
-        let [_, _, acceleration, _, snap] = ramp.at(h * f64::from(i));
-        let offset = zone.map_or(0.0, |zone| zone.operator.offset(acceleration, snap));
-        [acceleration, offset]
-    };
-    let (mut before, mut here, mut worst) = (place(0), place(0), 0.0f64);
-    for i in 1..=STEPS {
-        let after = place(i);
-        worst = worst.max(libm::fabs(here[0] + (before[1] - 2.0 * here[1] + after[1]) / (h * h)));
-        (before, here) = (here, after);
+/// On a line up to a speed, m/s: SI.
+pub(super) fn on_line(law: Option<&LineLaw>, speed: f32, ramp_s: f32) -> Worst {
+    let mut worst = Worst::default();
+    let h = ramp_s / f32::from(STEPS);
+    let (mut before, mut here) = (0.0f32, [0.0; 2]);
+    for f in sweep() {
+        let after = [speed * FIRST / ramp_s * f.w4, law.map_or(0.0, |law| law.along(&f))];
+        let second = ((before - here[1]) + (after[1] - here[1])) / (h * h);
+        worst.gain = worst.gain.max(after[1].abs());
+        worst.slew_per_s = worst.slew_per_s.max((after[1] - here[1]).abs() / h);
+        worst.acceleration_per_s2 = worst.acceleration_per_s2.max((here[0] + second).abs());
+        (before, here) = (here[1], after);
     }
     worst
 }

@@ -9,18 +9,17 @@ const DT: f64 = 1e-3;
 const KAPPA: [f64; 2] = [4e-4 + 1.6e-3 / 12.0, 6.0 * 1.6e-7 - 2.56e-6 / 120.0];
 
 fn plan() -> StreamPlan {
-    let operator =
-        Operator { second_s2: -KAPPA[0] / 2.0, fourth_s4: KAPPA[0] * KAPPA[0] / 8.0 - KAPPA[1] / 24.0 };
+    let fourth_s4 = KAPPA[0] * KAPPA[0] / 8.0 - KAPPA[1] / 24.0;
+    let operator = Operator { second_s2: (-KAPPA[0] / 2.0) as f32, fourth_s4: fourth_s4 as f32 };
     StreamPlan::build(&StreamNeeds {
         operator: Some(operator),
-        tick_s: DT,
+        rate_hz: 1000.0,
         window_s: 0.015,
         feed_m_s: 1.0,
         acceleration_m_s2: 5.0,
         hold_ticks: 5,
         engage_ticks: 100,
-        offset_nm: 20_000_000,
-        slew_nm: 200_000,
+        bounds_nm: [20_000_000, 200_000],
     })
     .unwrap()
 }

@@ -39,6 +39,36 @@ fn accelerations(out: &[Output]) -> (f64, f64) {
     (worst(&|o| o.nominal_nm), worst(&|o| o.corrected_nm))
 }
 
+/// The table allows more than the law asks for at constant rate (0.48 mm, 2.9 mm/s), and less than it asks for in the quickest ramp.
+#[test]
+fn ramps_are_long_enough_for_the_bounds_of_the_table() {
+    let run = |offset_m: f32, slew_m_s: f32| {
+        let mut table = table(KAPPA[0], KAPPA[1]);
+        (table.limits.offset_m, table.limits.slew_m_s) = (offset_m, slew_m_s);
+        let mut engine = Engine::new(Config::robot(1000)).unwrap();
+        engine.load(Some(&table)).unwrap();
+        engine.run_circle(&circle(0.3)).unwrap();
+        let out = run_out(&mut engine);
+        let size = |o: &Output| (0..3).map(|i| (o.corrected_nm[i] - o.nominal_nm[i]).abs()).max().unwrap();
+        let cuts = engine.counters().offset_cuts + engine.counters().slew_cuts;
+        // The circle is what follows the last settling.
+        let circle = out.iter().rev().position(|o| o.flags & flag::SETTLING != 0).unwrap();
+        (circle, cuts, f64::from(out.iter().map(size).max().unwrap()) * 1e-9)
+    };
+    let (quick, cuts, asked_m) = run(0.05, 1.0);
+    std::println!("without bounds: {quick} ticks, {asked_m} m at most");
+    assert_eq!(cuts, 0);
+    for (offset_m, slew_m_s) in [(0.6e-3, 1.0), (0.05, 4.5e-3), (0.6e-3, 4.5e-3)] {
+        let (ticks, cuts, largest_m) = run(offset_m, slew_m_s);
+        std::println!("{offset_m} m, {slew_m_s} m/s: {ticks} ticks, {largest_m} m at most");
+        assert_eq!(cuts, 0, "{offset_m} {slew_m_s}");
+        assert!(ticks > quick && largest_m <= f64::from(offset_m), "{ticks} {largest_m}");
+    }
+    // Beyond the bounds at constant rate: no ramp can help, and none is made longer than it has to be.
+    let (ticks, cuts, largest_m) = run(0.3e-3, 1.0);
+    assert!(ticks == quick && cuts > 0 && largest_m <= 0.3e-3 + 1e-9, "{ticks} {cuts} {largest_m}");
+}
+
 /// A rounded rectangle in the plane, 100 × 60 mm with corners of 10 mm, exact stops between its pieces.
 fn rounded_rectangle(engine: &mut Engine, feed_m_s: f64) -> Vec<Output> {
     let (w, h, r) = (0.1, 0.06, 0.01);

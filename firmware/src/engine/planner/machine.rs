@@ -1,0 +1,56 @@
+//! The configuration in the form that planning needs: single precision, worked out once.
+use crate::engine::config::{Config, ticks, whole_above};
+use giotto_shared::fixed::single_to_fixed;
+use giotto_shared::path::STEEPEST;
+
+/// Limits of the machine and of the image. SI.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Machine {
+    pub(super) rate_hz: f32,
+    pub(super) tick_s: f32,
+    pub(super) feed_m_s: f32,
+    pub(super) acceleration_m_s2: f32,
+    pub(super) positioning_m_s: f32,
+    pub(super) offset_m: f32,
+    pub(super) slew_m_s: f32,
+    pub(super) take_up_ticks: u32,
+    pub(super) engage_ticks: u32,
+    pub(super) stream_window_s: f32,
+    pub(super) stream_hold_ticks: u32,
+    /// Shortest ramp up to a feed f: the longer of f·[0] and √(f·[1]) seconds, by acceleration and by jerk.
+    ramp: [f32; 2],
+}
+
+impl Machine {
+    pub(super) fn new(config: &Config) -> Self {
+        let rate_hz = config.rate_hz as f32;
+        let (acceleration_m_s2, jerk_m_s3) =
+            (config.motion.acceleration_m_s2 as f32, config.motion.jerk_m_s3 as f32);
+        Self {
+            rate_hz,
+            tick_s: 1.0 / rate_hz,
+            feed_m_s: config.motion.feed_m_s as f32,
+            acceleration_m_s2,
+            positioning_m_s: config.positioning_m_s as f32,
+            offset_m: config.offset_m as f32,
+            slew_m_s: config.slew_m_s as f32,
+            take_up_ticks: whole_above(config.take_up_s as f32 * rate_hz).clamp(3, 1 << 20),
+            engage_ticks: config.engage_ticks(),
+            stream_window_s: config.stream_window_s as f32,
+            stream_hold_ticks: config.stream_hold_ticks,
+            ramp: [STEEPEST[0] as f32 / acceleration_m_s2, STEEPEST[1] as f32 / jerk_m_s3],
+        }
+    }
+
+    /// The quickest ramp within the limits along the path, made longer by a factor.
+    pub(super) fn ramp_ticks(&self, feed_m_s: f32, stretch: f32) -> u32 {
+        let [by_acceleration, by_jerk] = self.ramp;
+        let duration_s = (feed_m_s * by_acceleration).max(libm::sqrtf(feed_m_s * by_jerk));
+        ticks(duration_s * stretch * self.rate_hz)
+    }
+
+    /// Bounds on an offset (nm) and on its change (nm per tick).
+    pub(super) fn bounds_nm(&self, offset_m: f32, slew_m_s: f32) -> [i32; 2] {
+        [single_to_fixed(offset_m * 1e9, 0), single_to_fixed(slew_m_s * self.tick_s * 1e9, 0)]
+    }
+}
