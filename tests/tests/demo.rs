@@ -85,6 +85,7 @@ fn wrong_corrections_miss_the_bar() {
     let Learned { table, .. } = learn(&plan, seed).expect("the campaign teaches");
     let right = proven(&table.table, seed);
     assert!(right.holds(), "{:?} {:?}", right.before(), right.after());
+    assert_eq!(right.clamped, 0, "set-points cut to the bounds of the table");
 
     let mut turned = table.table.clone();
     for zone in &mut turned.zones {

@@ -12,11 +12,11 @@
 //! |---|---|---|
 //! | arc, β model (`arc`) | 96 | 149, in a ramp |
 //! | arc with eight profile terms, both axes with play and friction pulses (`arc`) | 191 | 281, in a ramp in which an axis reverses |
-//! | set-point of a stream ([`super::Stream`]) | 144 | 150 |
+//! | set-point of a stream ([`super::Stream`]) | 144 | 144 |
 //!
 //! These are arcs whose bounds the planner proved; all else (lines, helices, arcs at their bounds, stops in a ramp,
-//! engagement) runs in `curve` and `between` and takes longer, a helix with the same eight terms 556 at most; between two
-//! ticks of 8 kHz at 25 MHz are 3125.
+//! engagement) runs in `curve` and `between` and takes longer: a helix 496 at most, 563 with the same eight terms; between
+//! two ticks of 8 kHz at 25 MHz are 3125.
 mod arc;
 mod between;
 mod curve;

@@ -46,7 +46,8 @@ pub(super) fn on_arc(p: &Profile<f32>, m: &Motion, u: [f32; 3], v: [f32; 3], cen
     let (cos, sin) = lead(m);
     extra.ahead = [(ux, vx), (uy, vy)].map(|(u, v)| [nm2(v * cos - u * sin), nm2(-u * cos - v * sin)]);
     // u²/2³¹ in nm² times this over 2³² is c·u² in nm.
-    extra.bow = p.bow_per_m.map(|c| single_to_fixed(-c * 4.294_967_3, 31));
+    const PER_NM: f32 = 4_294_967_296.0 * 1e-9;
+    extra.bow = p.bow_per_m.map(|c| single_to_fixed(-c * PER_NM, 31));
     extra.bowed = extra.bow != [0; 2];
     let ([[slow, _], _], [[second, _], _]) = (p.velocity_s, p.acceleration_s2);
     let shares = [-slow * m.rate, -second * change, second * m.rate * m.rate, 0.5 * outward];
@@ -89,8 +90,7 @@ fn unsteady(p: &Profile<f32>, m: &Motion) -> Extra {
     // By the sense of X, then of Y.
     let ([bx, by], [lx, ly]) = (p.backlash_m, p.lateral_m);
     let sides = [[bx, -lx], [ly, by]];
-    let mut extra = Extra::default();
-    extra.turning = Turning {
+    let turning = Turning {
         ticks: m.take_up_ticks,
         dx: single_to_fixed(2.0 / ticks, 31),
         first_x: single_to_fixed(1.0 / ticks - 1.0, 31),
@@ -102,6 +102,7 @@ fn unsteady(p: &Profile<f32>, m: &Motion) -> Extra {
             if spike.peak_m == 0.0 { 0 } else { single_to_fixed(decay(m.tick_s / spike.decay_s), 32) }
         }),
     };
+    let mut extra = Extra { turning, ..Extra::default() };
     let cyclic = p.cyclic.iter().filter(|c| c.amplitude_m != 0.0);
     for (built, c) in extra.cyclic.iter_mut().zip(cyclic) {
         *built = periodic(c);

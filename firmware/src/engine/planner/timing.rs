@@ -43,7 +43,7 @@ impl Way {
         // Long division, 32 bits at a time.
         let high = u64::from(self.turns) << 32 | self.fraction >> 32;
         let low = (high % ticks) << 32 | self.fraction & 0xffff_ffff;
-        Some(((high / ticks) << 32 | low / ticks) & !1)
+        Some((((high / ticks) << 32) | (low / ticks)) & !1)
     }
 
     /// Shared out over two ramps and a constant rate; `None` as in [`Self::per_tick`].
