@@ -13,6 +13,9 @@ pub const TEXT_BAR: u32 = 64 * 1024;
 /// Most RAM of an image, variables and the deepest stack, bytes.
 pub const RAM_BAR: u32 = 16 * 1024;
 
+/// Every so many set-points are asked for: at each of them a host that is busy elsewhere may fall behind.
+const EVERY: u16 = 8;
+
 /// The interrupt that makes the set-points.
 const TICK: &str = "SysTick";
 
@@ -104,12 +107,12 @@ fn deepest_stack(board: Board, image: &Path, note: &mut dyn FnMut(&str)) -> Resu
         controller.flash(&largest_table(), &mut |_| {})?;
     }
     for direction in [Direction::Ccw, Direction::Cw] {
-        controller.run_circle(&circle(0.1, 0.5, direction, 1), 1)?;
+        controller.run_circle(&circle(0.1, 0.5, direction, 1), EVERY)?;
     }
     if flashed {
         controller.command(Command::Rollback)?;
     }
-    controller.run_circle(&circle(0.07, 0.3, Direction::Cw, 1), 1)?;
+    controller.run_circle(&circle(0.07, 0.3, Direction::Cw, 1), EVERY)?;
     // The board looks at its stack a few times a second.
     for _ in 0..600 {
         controller.status()?;

@@ -44,9 +44,8 @@ mod image {
     fn echo(mut link: impl Read + Write) -> ! {
         let mut bytes = [0; 64];
         loop {
-            if let Ok(count) = link.read(&mut bytes)
-                && link.write(&bytes[..count]).is_err()
-            {
+            let sent = link.read(&mut bytes).map(|count| link.write_all(bytes.get(..count).unwrap_or(&[])));
+            if !matches!(sent, Ok(Ok(()))) {
                 cortex_m::asm::udf();
             }
         }

@@ -12,7 +12,7 @@
 //! |---|---|---|
 //! | arc, β model (`arc`) | 96 | 149, in a ramp |
 //! | arc with eight profile terms, both axes with play and friction pulses (`arc`) | 191 | 281, in a ramp in which an axis reverses |
-//! | set-point of a stream ([`super::Stream`]) | 144 | 144 |
+//! | set-point of a stream ([`super::Stream`]) | 143 | 143 |
 //!
 //! These are arcs whose bounds the planner proved; all else (lines, helices, arcs at their bounds, stops in a ramp,
 //! engagement) runs in `curve` and `between` and takes longer: a helix 496 at most, 563 with the same eight terms; between
