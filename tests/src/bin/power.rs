@@ -9,8 +9,10 @@ use giotto_tests::machine::base::Variety;
 use giotto_tests::study::sheet::{Row, page};
 use giotto_tests::study::{Job, Outcome, judge, schedule};
 use rayon::prelude::*;
+use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
@@ -38,6 +40,29 @@ struct Args {
     /// Where the page goes.
     #[arg(short, long, default_value = "tests/POWER.md")]
     output: PathBuf,
+    /// Also writes a line a campaign, as each is answered, to this file (tab-separated).
+    #[arg(long)]
+    rows: Option<PathBuf>,
+}
+
+/// The heading of `--rows`.
+const HEADING: &str = "hidden\tstrength\tseed\tseconds\texact\tgain_share\tcovered\tsaid";
+
+/// One line of `--rows`.
+fn line(row: &Row) -> String {
+    let Row { job, verdict, seconds } = row;
+    let covered: Vec<String> =
+        verdict.covered.iter().map(|(name, inside)| format!("{name}={}", u8::from(*inside))).collect();
+    format!(
+        "{}\t{}\t{}\t{seconds:.2}\t{}\t{:.3}\t{}\t{}",
+        job.kind,
+        job.strength,
+        job.seed,
+        u8::from(verdict.exact),
+        verdict.gain_share.unwrap_or(f64::NAN),
+        covered.join(" "),
+        verdict.said
+    )
 }
 
 /// Draws the campaign of `job`, has it diagnosed as a user would from its files, judges the answer.
@@ -57,11 +82,30 @@ fn main() -> ExitCode {
     let mut jobs = schedule(args.seed, each, args.only.as_deref());
     jobs.retain(|j| args.strength.is_none_or(|s| s == j.strength));
     let done = AtomicUsize::new(0);
+    let rows_file = match args.rows.as_ref().map(std::fs::File::create).transpose() {
+        Ok(file) => Mutex::new(file),
+        Err(e) => {
+            eprintln!("--rows: {e}");
+            return ExitCode::from(2);
+        }
+    };
+    let keep = |line: &str| {
+        if let Ok(mut file) = rows_file.lock()
+            && let Some(file) = file.as_mut()
+            && let Err(e) = writeln!(file, "{line}")
+        {
+            eprintln!("--rows: {e}");
+        }
+    };
+    keep(HEADING);
     let answers: Vec<Result<Row, String>> = jobs
         .par_iter()
         .map(|job| {
             let row = ask(job, variety)
                 .map_err(|e| format!("{} at {}×, seed {}: {e}", job.kind, job.strength, job.seed));
+            if let Ok(row) = &row {
+                keep(&line(row));
+            }
             let n = done.fetch_add(1, Ordering::Relaxed) + 1;
             if n.is_multiple_of(50) {
                 eprintln!("{n} of {}", jobs.len());

@@ -122,8 +122,9 @@ pub fn simulate(machine: &Machine, test: &Test, campaign_s: f64, vibration_rad: 
         // On the grid of steps, so that the lap begins on a step.
         (settle_s / step_s).ceil() * step_s,
     );
-    let mut interpolator =
-        (machine.interpolation_s > 0.0).then(|| Interpolator::new(command, machine.interpolation_s));
+    // One an axis: each follows the chords by a delay of its own.
+    let mut interpolators = (machine.interpolation_s > 0.0)
+        .then(|| [0, 1].map(|_| Interpolator::new(command, machine.interpolation_s)));
     let rest = command.position_m(command.begin_s());
     let loss = line_loss(rate, step_s);
     let gain = [0, 1].map(|i| {
@@ -139,9 +140,8 @@ pub fn simulate(machine: &Machine, test: &Test, campaign_s: f64, vibration_rad: 
     let end = ((n - 1) * per_sample) as i64;
     for k in first..=end {
         let t = k as f64 * step_s;
-        let wanted = match &mut interpolator {
-            // A shared delay only turns the circle, so chords take the mean of both.
-            Some(i) => i.position_m(t - 0.5 * (dead[0] + dead[1])),
+        let wanted = match &mut interpolators {
+            Some([x, y]) => [x.position_m(t - dead[0])[0], y.position_m(t - dead[1])[1]],
             None if dead[0] == dead[1] => command.position_m(t - dead[0]),
             None => [command.position_m(t - dead[0])[0], command.position_m(t - dead[1])[1]],
         };

@@ -2,6 +2,7 @@
 use super::Outcome;
 use crate::effects::{Case, Truth};
 use crate::machine::Instrument;
+use giotto::campaign::Run;
 
 /// How one answer compares with the truth.
 #[derive(Clone, Debug, Default)]
@@ -82,15 +83,27 @@ pub fn judge(case: &Case, outcome: &Outcome) -> Verdict {
     verdict
 }
 
-/// What the true machine leaves of the measurement, rms over all samples, each run's centre removed, µm.
+/// What the true machine leaves of the measurement, rms over all samples, each run's centre removed, µm. The phase of
+/// a vibration, the places of teeth and where on the circle a polygon has its corners are new in each run: no model
+/// could foretell them, so they count as left (of a polygon all but its mean).
 pub fn perfect_rms_um(case: &Case) -> f64 {
     let perfect = Instrument { noise_m: 0.0, resolution_m: 0.0, drift_m: 0.0, ..case.instrument };
     let perfect = Instrument {
         spread: crate::machine::Spread { radius_m: 0.0, oval_m: 0.0, lobes_m: 0.0, ..perfect.spread },
         ..perfect
     };
-    // The same streams of random numbers: the vibration has the same phases.
-    let clean = perfect.measure(&case.machine, &case.plan, case.measured_with);
+    let mut machine = case.machine.clone();
+    machine.vibration = None;
+    machine.axes.iter_mut().for_each(|axis| axis.stick_slip = None);
+    let polygon = perfect.measure(&machine, &case.plan, case.measured_with);
+    machine.interpolation_s = 0.0;
+    let mut clean = perfect.measure(&machine, &case.plan, case.measured_with);
+    for (run, polygon) in clean.runs.iter_mut().zip(&polygon.runs) {
+        let mean =
+            |run: &Run| run.samples.deviation_m.iter().sum::<f64>() / run.samples.deviation_m.len() as f64;
+        let shift = mean(polygon) - mean(run);
+        run.samples.deviation_m.iter_mut().for_each(|x| *x += shift);
+    }
     let (mut sum, mut count) = (0.0, 0.0);
     for (run, truth) in case.campaign.runs.iter().zip(&clean.runs) {
         let left: Vec<f64> =
@@ -171,7 +184,7 @@ mod tests {
 
     #[test]
     fn the_perfect_model_leaves_noise_and_spread() {
-        let case = case(&["vibration"]);
+        let case = case(&["squareness"]);
         let expected = (case.instrument.noise_m.powi(2)
             + case.instrument.spread.radius_m.powi(2)
             + case.instrument.spread.oval_m.powi(2))
