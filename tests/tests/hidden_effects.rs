@@ -1,6 +1,7 @@
 //! The fast part of the study of hidden effects: fixed seeds, small campaigns, one of each kind.
 //! `cargo run --release -p giotto-tests --bin power` runs the rest.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of a test fail as the test does")]
+use giotto::diagnosis::{Options, diagnose};
 use giotto_tests::effects::{Case, Keep, Kind, Null};
 use giotto_tests::files;
 use giotto_tests::machine::base::Variety;
@@ -48,7 +49,44 @@ fn pairs_and_triples_are_taken_apart() {
         effects(&["servo_mismatch", "backlash"]),
         effects(&["squareness", "scale_mismatch"]),
         effects(&["higher_order_dynamics", "scale_mismatch", "squareness"]),
+        effects(&["vibration", "interpolation_chord"]),
     ]);
+}
+
+/// Teeth fill the slow runs; what lives in the others is found all the same, and the gain is that of whole circles.
+#[test]
+fn teeth_hide_nothing_else() {
+    all_exact(&[
+        effects(&["squareness", "stick_slip"]),
+        effects(&["radius_offset", "stick_slip"]),
+        effects(&["vibration", "stick_slip"]),
+    ]);
+    let (case, _) = ask(&effects(&["squareness", "stick_slip"]), 3.0, 11);
+    let outcome = answer(&case);
+    let noise_um = case.instrument.noise_m * 1e6;
+    assert!(outcome.baseline_um < 8.0 * noise_um, "the centre is free: {} µm", outcome.baseline_um);
+    assert!(outcome.extended_um < 0.8 * outcome.baseline_um, "{} µm", outcome.extended_um);
+}
+
+/// Amounts that bend a signature end where the machine has them, whatever grid they started from.
+#[test]
+fn shapes_are_climbed_to_the_truth() {
+    let found = |name: &str, seed: u64| {
+        let case = Case::new(&effects(&[name]), 10.0, seed, Variety::Small).unwrap();
+        let diagnosis = diagnose(&case.campaign, &Options::default()).unwrap();
+        let finding = diagnosis.findings.into_iter().find(|f| f.cause.id() == name);
+        (case, finding.unwrap_or_else(|| panic!("{name} was not found")))
+    };
+    for seed in [1, 2, 3] {
+        let (case, spike) = found("reversal_spike", seed);
+        let friction = case.machine.axes[case.truth[0].axis.unwrap()].friction.unwrap();
+        let decay = spike.params["decay_s"] / friction.decay_s;
+        assert!((decay - 1.0).abs() < 0.05, "decay, seed {seed}: {decay} of the truth");
+        let (case, cyclic) = found("cyclic_error", seed);
+        let truth = case.machine.geometry.cyclic[case.truth[0].axis.unwrap()].unwrap();
+        let pitch = 1e-3 * cyclic.params["pitch_mm"] / truth.pitch_m;
+        assert!((pitch - 1.0).abs() < 1e-3, "pitch, seed {seed}: {pitch} of the truth");
+    }
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Unequal second cumulants: `r = −(Δκ2/4)(f²/R)·cos2ψ`, the same both ways.
+//! Unequal second cumulants: `r = −(Δκ2/4)(f²/R)·|G|·cos2ψ`, the same both ways: a filter before or behind the servo.
 use super::{Cause, CauseModel, Effect, RunView, Words};
 use crate::simulation::machine::Machine;
 use giotto_shared::Axis;
@@ -36,7 +36,7 @@ impl CauseModel for BandwidthMismatch {
         view: &RunView,
         out: &mut [f64],
     ) {
-        let size = -0.25 * view.radius_m * view.omega_rad_s.powi(2);
+        let size = -0.25 * view.radius_m * view.omega_rad_s.powi(2) * view.gain;
         for (out, psi) in out.iter_mut().zip(&view.psi_rad) {
             *out = size * (2.0 * psi).cos();
         }

@@ -1,6 +1,6 @@
 //! Periodic error of screw or gear: `r = A·cosψ·sin(2πR·cosψ/P + φ)` for X, with sin for Y: a chirp over the circle.
 use super::view::axes_of;
-use super::{Cause, CauseModel, EACH_AXIS, Effect, RunView, Words};
+use super::{Bend, Cause, CauseModel, EACH_AXIS, Effect, RunView, Words};
 use crate::simulation::machine::Cyclic;
 use crate::simulation::machine::Machine;
 use giotto_shared::Axis;
@@ -54,6 +54,11 @@ impl CauseModel for CyclicError {
             wave_per_m += 0.35 / travel;
         }
         shapes
+    }
+
+    /// A hundredth of a wave over the travel.
+    fn bend(&self, _which: usize, pitch_m: f64, travel_m: f64) -> Bend {
+        Bend::Amount(0.01 * pitch_m * pitch_m / travel_m)
     }
 
     fn columns(&self) -> usize {

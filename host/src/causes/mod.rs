@@ -140,6 +140,17 @@ pub enum Evidence {
     NotLooked,
 }
 
+/// How a shape parameter moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Bend {
+    /// Smoothly: a step that changes the signature by a few percent.
+    Amount(f64),
+    /// By choice: the other value.
+    Choice(f64),
+    /// In jerks: it has no slope to climb.
+    Stiff,
+}
+
 /// What a cause has to say for itself.
 pub trait CauseModel: Sync {
     /// Its name in the list.
@@ -167,6 +178,14 @@ pub trait CauseModel: Sync {
     fn shapes(&self, _views: &[RunView]) -> Vec<Vec<f64>> {
         vec![Vec::new()]
     }
+
+    /// How shape parameter `which` moves from `value`. `travel_m` is the diameter of the largest circle.
+    fn bend(&self, _which: usize, _value: f64, _travel_m: f64) -> Bend {
+        Bend::Stiff
+    }
+
+    /// Brings shape parameters back to where they mean something.
+    fn tidy(&self, _shape: &mut [f64]) {}
 
     /// Number of linear columns: 2 where the phase of the signature is free.
     fn columns(&self) -> usize {

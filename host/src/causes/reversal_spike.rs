@@ -5,7 +5,7 @@
 //! Stribeck dip, doi 10.1109/9.376053). The loop answers a step of it with e^{−t/decay} − e^{−t/rise}, scaled
 //! to peak 1. At high acceleration the pulse keeps its height and duration; at very low speed it is smeared.
 use super::view::axes_of;
-use super::{Cause, CauseModel, EACH_AXIS, Effect, RunView, Words};
+use super::{Bend, Cause, CauseModel, EACH_AXIS, Effect, RunView, Words};
 use crate::simulation::machine::Machine;
 use giotto_shared::Axis;
 use giotto_shared::term::Term;
@@ -52,6 +52,14 @@ impl CauseModel for ReversalSpike {
             }
         }
         shapes
+    }
+
+    fn bend(&self, _which: usize, value: f64, _travel_m: f64) -> Bend {
+        Bend::Amount(0.05 * value)
+    }
+
+    fn tidy(&self, shape: &mut [f64]) {
+        shape.iter_mut().for_each(|value| *value = value.abs());
     }
 
     fn signature(&self, axis: Option<Axis>, shape: &[f64], _column: usize, view: &RunView, out: &mut [f64]) {

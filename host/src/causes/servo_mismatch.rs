@@ -3,7 +3,7 @@
 //! With loops of unequal gain the response differs by −jωΔτ·G², so that the oval is turned by the lag φ once
 //! more and shrunk by |G|²: `d·½fΔτ|G|²·sin(2ψ − dφ)`. With unequal dead times it is not. The shape parameter
 //! `turned` (1 or 0) is that choice.
-use super::{Cause, CauseModel, Effect, RunView, Words};
+use super::{Bend, Cause, CauseModel, Effect, RunView, Words};
 use crate::simulation::machine::Machine;
 use giotto_shared::Axis;
 use giotto_shared::term::Term;
@@ -38,6 +38,10 @@ impl CauseModel for ServoMismatch {
 
     fn shapes(&self, _views: &[RunView]) -> Vec<Vec<f64>> {
         vec![vec![1.0], vec![0.0]]
+    }
+
+    fn bend(&self, _which: usize, turned: f64, _travel_m: f64) -> Bend {
+        Bend::Choice(1.0 - turned)
     }
 
     fn signature(&self, _axis: Option<Axis>, shape: &[f64], _column: usize, view: &RunView, out: &mut [f64]) {

@@ -40,6 +40,9 @@ impl CauseModel for StickSlip {
         for axis in axes_of(effect) {
             let mut friction = machine.friction[axis.index()].unwrap_or_default();
             friction.stick_slip_m += effect.value * 1e-6;
+            // It stands still between slips.
+            friction.stick_travel_m = friction.stick_slip_m.abs().max(1e-7);
+            friction.stick_speed_m_s = effect.param("below_mm_s", 5.0) * 1e-3;
             machine.friction[axis.index()] = Some(friction);
         }
     }

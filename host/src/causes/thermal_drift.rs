@@ -1,5 +1,6 @@
-//! Growth with campaign time: `r = R·α·ΔT(t)`, taken linear in time or settling (shape `settling`: time constant as a share of the campaign).
-use super::{Cause, CauseModel, Effect, RunView, Words};
+//! Growth with campaign time: `r = R·α·ΔT(t)`, `ΔT` linear in time (shape `curvature` 0) or
+//! settling: `(1 − e^{−ct})/(1 − e^{−c})`, `c` the campaign in time constants.
+use super::{Bend, Cause, CauseModel, Effect, RunView, Words};
 use crate::simulation::machine::Machine;
 use giotto_shared::Axis;
 
@@ -28,19 +29,25 @@ impl CauseModel for ThermalDrift {
     }
 
     fn shape_names(&self) -> &'static [&'static str] {
-        &["settling"]
+        &["curvature"]
     }
 
     fn shapes(&self, views: &[RunView]) -> Vec<Vec<f64>> {
         // All runs at one time: nothing can drift.
         let spread = views.iter().any(|view| (view.elapsed - views[0].elapsed).abs() > 1e-9);
-        if spread { [f64::INFINITY, 0.5, 0.2].map(|share| vec![share]).to_vec() } else { Vec::new() }
+        if spread { [0.0, 2.0, 5.0].map(|curvature| vec![curvature]).to_vec() } else { Vec::new() }
+    }
+
+    fn bend(&self, _which: usize, _value: f64, _travel_m: f64) -> Bend {
+        Bend::Amount(0.1)
+    }
+
+    fn tidy(&self, shape: &mut [f64]) {
+        shape.iter_mut().for_each(|value| *value = value.clamp(0.0, SETTLED));
     }
 
     fn signature(&self, _axis: Option<Axis>, shape: &[f64], _column: usize, view: &RunView, out: &mut [f64]) {
-        out.fill(
-            1e-6 * view.radius_m * growth(shape.first().copied().unwrap_or(f64::INFINITY), view.elapsed),
-        );
+        out.fill(1e-6 * view.radius_m * growth(shape.first().copied().unwrap_or(0.0), view.elapsed));
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
@@ -53,11 +60,10 @@ impl CauseModel for ThermalDrift {
     }
 }
 
-/// Growth after a share of the campaign, 0 at the start and 1 at its end.
-fn growth(settling: f64, elapsed: f64) -> f64 {
-    if settling.is_finite() {
-        (1.0 - (-elapsed / settling).exp()) / (1.0 - (-1.0 / settling).exp())
-    } else {
-        elapsed
-    }
+/// Most time constants to a campaign: with more, it is a machine of another size that was cold in the first runs.
+const SETTLED: f64 = 5.0;
+
+/// Growth after a share of the campaign, 0 at the start and 1 at its end; what would grow ever faster is taken as linear.
+fn growth(curvature: f64, elapsed: f64) -> f64 {
+    if curvature > 1e-3 { (-curvature * elapsed).exp_m1() / (-curvature).exp_m1() } else { elapsed }
 }

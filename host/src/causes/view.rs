@@ -13,8 +13,10 @@ pub struct RunView {
     pub omega_rad_s: f64,
     /// d: +1 CCW, −1 CW.
     pub sign: f64,
-    /// Start of the run as a share (0…1) of the campaign's duration.
+    /// Middle of the run as a share of the time between the first start and the last.
     pub elapsed: f64,
+    /// Time between the first start and the last, s; an hour where the starts are not known.
+    pub campaign_s: f64,
     /// Largest radius of the campaign, m.
     pub largest_radius_m: f64,
     /// Polar angle of the machine ψ = θ − d·φ(ω) at each sample, rad: the lag of the servo removed.

@@ -78,9 +78,19 @@ impl Basis {
         axpy(amount, &self.columns[k], samples);
     }
 
+    /// Length of a column of ones over the samples seen.
+    pub fn length_of_ones(&self) -> f64 {
+        self.triangle[0][0]
+    }
+
     /// Harmonics of the samples: `[mean, 0]`, then `[cos, sin]` of each order.
     pub fn harmonics(&self, samples: &[f64]) -> [[f64; 2]; ORDERS + 1] {
-        let mut x = self.coordinates(samples);
+        self.harmonics_of(self.coordinates(samples))
+    }
+
+    /// The same from their coordinates.
+    pub fn harmonics_of(&self, coordinates: [f64; COLUMNS]) -> [[f64; 2]; ORDERS + 1] {
+        let mut x = coordinates;
         for k in (0..COLUMNS).rev() {
             let above: f64 = (k + 1..COLUMNS).map(|j| self.triangle[k][j] * x[j]).sum();
             x[k] = if self.triangle[k][k] > 0.0 { (x[k] - above) / self.triangle[k][k] } else { 0.0 };

@@ -4,11 +4,13 @@
 //! their sizes; the shapes (pitch, time constants) are those found on all runs. The machine with the causes
 //! built in runs the circles left out, in the time domain, and what is measured there is compared.
 use super::baseline::{Size, fit_lag};
-use super::basis::dot;
+use super::basis::{Basis, dot};
 use super::duration::Clamp;
-use super::explain::{Explained, prune};
+use super::explained::Explained;
+use super::item::Kind;
 use super::linear::solve;
-use super::search::{Kind, columns_of, select};
+use super::material::prune;
+use super::search::{columns_of, select};
 use super::survey::Response;
 use crate::campaign::Campaign;
 use crate::causes::{Cause, Effect};
@@ -107,6 +109,7 @@ fn fitted(found: &Explained, weights: &[f64], set: &[usize]) -> Option<(Response
         }
         effects.push(Effect { cause: *cause, axis: *axis, value: size, ci95: [size; 2], params });
     }
+    effects.extend(found.teeth.iter().map(super::verdict::teeth_effect));
     Some((response, effects))
 }
 
@@ -214,7 +217,8 @@ fn fold(
     let lag_only = fit_lag(&programmed);
     let baseline = given.cloned().unwrap_or_else(|| machine(&lag_only, &[], None));
     set.sort_unstable();
-    let nothing_new = clamp.is_none() && !set.iter().any(|&i| found.items[i].listed());
+    let nothing_new =
+        clamp.is_none() && found.teeth.is_empty() && !set.iter().any(|&i| found.items[i].listed());
     let extended = fitted(found, &weights, &set).filter(|_| !nothing_new).map(|(response, effects)| {
         let lag = found.lag.measured.then_some(found.lag.tau_s);
         let mut machine = machine(&response, &effects, lag);
@@ -229,10 +233,12 @@ fn fold(
         .map(|&i| {
             let run = &runs[i];
             let mut test = CircleTest::of(run);
-            if started.is_finite() {
-                test.started_s -= started;
+            match run.started_s {
+                Some(started_s) => test.started_s = started_s - started,
+                None => test.started_s = found.runs[i].view.elapsed * found.runs[i].view.campaign_s,
             }
-            let basis = &found.runs[i].basis;
+            // What the search hid from itself is measured all the same.
+            let basis = Basis::new(&run.samples.angle_rad);
             let samples = run.samples.deviation_m.len() as f64;
             let left = |prediction: &[f64]| -> f64 {
                 let rest: Vec<f64> =
@@ -247,7 +253,7 @@ fn fold(
             let size = beta[0] * x + beta[1] * x * x / run.radius_m;
             let flat = |value: f64| left(&vec![value; run.samples.deviation_m.len()]);
             // The phase of a tone is new in each run: no model could foretell it.
-            let tone = found.tone.as_ref().map_or(0.0, |tone| tone.energy_m2[i].max(0.0)) / samples;
+            let tone = found.tones.iter().map(|tone| tone.energy_m2[i].max(0.0)).sum::<f64>() / samples;
             let scatter = tone + found.spread.order_m2[0] + found.spread.order_m2[2..].iter().sum::<f64>();
             Errors {
                 run: i,

@@ -41,7 +41,7 @@ pub struct Ledger {
 impl Ledger {
     /// Opens a ledger on the data.
     pub fn open(runs: &[Prepared], spread: &Spread, data: Samples) -> Self {
-        let discounts = runs.iter().map(|run| spread.discounts(run.deviation_m.len())).collect();
+        let discounts = runs.iter().map(|run| spread.discounts(run.visible())).collect();
         let mut ledger = Self {
             entries: Vec::new(),
             discounts,
@@ -70,6 +70,19 @@ impl Ledger {
     pub fn replace(&mut self, runs: &[Prepared], at: usize, samples: Samples) {
         self.entries[at] = entry(runs, samples);
         self.cross(at);
+    }
+
+    /// Takes out all columns from number `size` on.
+    pub fn truncate(&mut self, size: usize) {
+        self.entries.truncate(size);
+        for matrix in self.white.iter_mut().chain(&mut self.plain) {
+            *matrix = std::mem::replace(matrix, DMatrix::zeros(0, 0)).resize(size, size, 0.0);
+        }
+    }
+
+    /// Number of columns, that of the data included.
+    pub fn size(&self) -> usize {
+        self.entries.len()
     }
 
     /// Samples of a column.
@@ -108,6 +121,11 @@ impl Ledger {
     /// Energy products of one run.
     pub fn plain_of(&self, run: usize) -> &DMatrix<f64> {
         &self.plain[run]
+    }
+
+    /// Coordinates of a column in the low orders of each run.
+    pub fn coordinates(&self, at: usize) -> &[[f64; COLUMNS]] {
+        &self.entries[at].coordinates
     }
 
     /// A column outside the ledger over the runs `over`, one vector of samples for each.
@@ -155,6 +173,11 @@ fn entry(runs: &[Prepared], samples: Samples) -> Entry {
         .par_iter()
         .zip(&samples)
         .map(|(run, samples)| {
+            if let Some(level) = flat(run, samples) {
+                let mut coordinates = [0.0; COLUMNS];
+                coordinates[0] = level * run.basis.length_of_ones();
+                return (coordinates, vec![0.0; samples.len()], [0.0, coordinates[0].powi(2)]);
+            }
             let coordinates = run.basis.coordinates(samples);
             let mut outside = samples.clone();
             for (k, amount) in coordinates.iter().enumerate() {
@@ -175,6 +198,13 @@ fn entry(runs: &[Prepared], samples: Samples) -> Entry {
         }
     }
     Entry { samples, coordinates, outside }
+}
+
+/// The level of a column that is the same at every sample seen: most of them are, and lie wholly in the first order.
+fn flat(run: &Prepared, samples: &[f64]) -> Option<f64> {
+    let seen = |i: usize| !run.hidden.get(i).copied().unwrap_or(false);
+    let level = samples[(0..samples.len()).find(|&i| seen(i))?];
+    samples.iter().enumerate().all(|(i, x)| *x == level || !seen(i)).then_some(level)
 }
 
 /// Product of what scatter between runs leaves of the low orders.

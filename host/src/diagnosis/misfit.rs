@@ -1,7 +1,12 @@
 //! The misfit, seen: what the baseline leaves, by kind.
 use super::basis::{ORDERS, dot};
-use super::explain::{Explained, PLACES, place_means, residual};
+use super::explained::{Explained, residual};
 use super::ledger::Samples;
+use super::places::{PLACES, place_means};
+use super::roughness;
+use super::spread::WHOLE;
+use super::survey::Prepared;
+use super::tone::Tone;
 use serde::Serialize;
 
 /// Root mean squares over all samples, µm.
@@ -17,7 +22,7 @@ pub struct Misfit {
     pub harmonics_even_um: f64,
     /// Harmonics 2 to 8 that flip with the direction.
     pub harmonics_odd_um: f64,
-    /// Beyond these, what sits at fixed places.
+    /// Beyond these, what sits at fixed places, teeth of stick–slip among it.
     pub localised_um: f64,
     /// Periodic in time.
     pub periodic_um: f64,
@@ -51,8 +56,14 @@ pub fn split(found: &Explained) -> Misfit {
     let amount = if down > 0.0 { up / down } else { 0.0 };
     let left: Samples =
         data.iter().zip(own).map(|(y, x)| y.iter().zip(x).map(|(y, x)| y - amount * x).collect()).collect();
-    let harmonics: Vec<Harmonics> =
-        found.runs.iter().zip(&left).map(|(run, left)| run.basis.harmonics(left)).collect();
+    // Of a circle that teeth hide for the most part no harmonics are read.
+    let seen = |run: &Prepared| run.visible() as f64 > WHOLE * run.deviation_m.len() as f64;
+    let harmonics: Vec<Harmonics> = found
+        .runs
+        .iter()
+        .zip(&left)
+        .map(|(run, left)| if seen(run) { run.basis.harmonics(left) } else { Harmonics::default() })
+        .collect();
     let (mut whole, mut size) = (0.0, 0.0);
     for (run, (left, harmonics)) in found.runs.iter().zip(left.iter().zip(&harmonics)) {
         let c = run.basis.coordinates(left);
@@ -61,15 +72,16 @@ pub fn split(found: &Explained) -> Misfit {
     }
     let [even, odd] = parity(found, &harmonics);
     let places = localised(&place_means(&found.runs, &left), count);
-    let tone: f64 = found.tone.iter().flat_map(|tone| &tone.energy_m2).sum::<f64>().max(0.0);
+    let tone: f64 = found.tones.iter().map(Tone::whole_energy_m2).sum();
+    let teeth: f64 = found.teeth.iter().map(|teeth| roughness::energy_m2(teeth, &found.runs)).sum();
     let rms = |energy: f64| (energy / count).max(0.0).sqrt() * 1e6;
     Misfit {
-        total_um: rms(whole + tone),
+        total_um: rms(whole + tone + teeth),
         size_um: rms(size),
         drift_um: drift_um(found, &harmonics),
         harmonics_even_um: rms(even),
         harmonics_odd_um: rms(odd),
-        localised_um: rms(places),
+        localised_um: rms(places + teeth),
         periodic_um: rms(tone),
         random_um: rms(whole - size - even - odd - places),
     }

@@ -1,8 +1,9 @@
 //! Run by run, what was measured and what the simulation leaves of it, before and after: what plots draw.
 use super::basis::{axpy, dot};
-use super::explain::{Explained, residual};
+use super::explained::{Explained, residual};
+use super::item::Kind;
 use super::ledger::Samples;
-use super::search::{Kind, columns_of};
+use super::search::columns_of;
 use crate::campaign::Campaign;
 use std::f64::consts::TAU;
 

@@ -29,9 +29,14 @@ const BINS: usize = 18;
 const FIRST_EDGE_M_S: f64 = 2.5e-4;
 /// Left out after a reversal, s.
 const SPIKE_S: f64 = 0.25;
+/// Left out on both sides of a reversal, rad.
+const BESIDE_RAD: f64 = 0.07;
 /// Variance ratio above which a bin is rough, and the significance it needs.
 const ROUGH: f64 = 1.6;
 const SIGNIFICANT: f64 = 8.0;
+/// Variance ratio below which a bin is smooth, and above which it is rough in part.
+const SMOOTH: f64 = 1.3;
+const PARTLY: f64 = 1.15;
 /// Variance ratio of the slow parts of runs that have fast parts too.
 const CONTRAST: f64 = 1.25;
 
@@ -74,9 +79,15 @@ fn find_on(
         .map(|(run, left)| {
             let (mut sums, mut counts) = ([0.0; BINS], [0.0; BINS]);
             for i in 1..left.len().saturating_sub(1) {
-                let near = run.view.since_reversal(run.view.psi_rad[i], quarter).0 * run.view.half_turn_s();
+                let share = run.view.since_reversal(run.view.psi_rad[i], quarter).0;
                 let facing = run.view.direction[i][axis.index()].abs();
-                if near < SPIKE_S || facing < 0.3 || known.is_some_and(|known| known.covers(run, i)) {
+                // A step at the reversal itself shows beside it, if the lag is off.
+                let beside = share.min(1.0 - share) * std::f64::consts::PI < BESIDE_RAD;
+                if share * run.view.half_turn_s() < SPIKE_S
+                    || beside
+                    || facing < 0.3
+                    || known.is_some_and(|known| known.covers(run, i))
+                {
                     continue;
                 }
                 if let Some(bin) = bin_of(axis_speed(run, axis, i)) {
@@ -105,16 +116,18 @@ fn find_on(
         })
         .collect();
     let (&highest, &lowest) = (rough.last()?, rough.first()?);
-    // Rough up to a speed and smooth above it; else it is something else.
-    let above: Vec<usize> = (highest + 1..BINS).filter(|&bin| counts[bin] >= 50.0).collect();
+    // Rough up to a speed, which lies within the bin above the last rough one, and smooth beyond it; else it is
+    // something else.
+    let above: Vec<usize> = (highest + 2..BINS).filter(|&bin| counts[bin] >= 50.0).collect();
     if above.is_empty()
         || highest - lowest + 1 > rough.len() + 2
-        || above.iter().any(|&bin| excess(bin).0 > 1.3)
+        || above.iter().any(|&bin| excess(bin).0 > SMOOTH)
     {
         return None;
     }
     let significance = rough.iter().map(|&bin| excess(bin).1).fold(0.0, f64::max);
-    let below_m_s = FIRST_EDGE_M_S * 2f64.powf(0.5 * (highest + 1) as f64);
+    let reached = highest + 1 + usize::from(counts[highest + 1] >= 20.0 && excess(highest + 1).0 > PARTLY);
+    let below_m_s = FIRST_EDGE_M_S * 2f64.powf(0.5 * reached as f64);
     if !contrast(axis, below_m_s, runs, residual, spread.noise_m2) {
         return None;
     }

@@ -4,55 +4,10 @@
 //! each member. The price grows with the number of competitors and of shapes tried (extended BIC, Chen &
 //! Chen 2008, doi 10.1093/biomet/asn034), so that pure noise is left alone. Members enter one by one, leave
 //! when others make them needless, and are exchanged for better ones until nothing improves.
+use super::item::Item;
 use super::linear::Factor;
-use super::pattern::Pattern;
-use crate::causes::Cause;
-use giotto_shared::Axis;
 use nalgebra::DMatrix;
 
-/// An explanation the search may choose.
-#[derive(Clone, Debug)]
-pub struct Item {
-    /// What it is.
-    pub kind: Kind,
-    /// Its columns in the ledger.
-    pub columns: Vec<usize>,
-    /// What it has to take off χ² to be worth while.
-    pub price: f64,
-    /// Beside which other columns its shape was fitted last.
-    pub fitted_beside: Option<Vec<usize>>,
-}
-
-/// Cause or pattern.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Kind {
-    /// A cause of the list.
-    Cause {
-        /// Which.
-        cause: Cause,
-        /// Where.
-        axis: Option<Axis>,
-        /// Its shape parameters, in the order of the cause's names.
-        shape: Vec<f64>,
-    },
-    /// Something without a name.
-    Pattern(Pattern),
-}
-
-impl Item {
-    /// Whether it is in the closed list.
-    pub fn listed(&self) -> bool {
-        matches!(self.kind, Kind::Cause { .. })
-    }
-}
-
-/// Price of one listed column: ln(78 runs) + 2·ln(25 competitors), about 11, and a margin for the scatter
-/// being estimated.
-pub const PRICE: f64 = 14.0;
-/// Further price of a second column.
-pub const PRICE_OF_PHASE: f64 = 5.0;
-/// Further price of a pattern: there are hundreds of them, and a name is worth more.
-pub const PRICE_OF_PATTERN: f64 = 14.0;
 /// Most members.
 const MOST: usize = 14;
 
@@ -121,6 +76,7 @@ fn without(set: &[usize], at: usize) -> Vec<usize> {
 mod tests {
     use super::*;
     use crate::causes::Cause;
+    use crate::diagnosis::item::Kind;
 
     /// Products of the data and three columns: the first explains it, the second nearly does, the third not at all.
     fn products() -> DMatrix<f64> {

@@ -2,18 +2,21 @@
 //!
 //! A coarse scan on a stratified part of the runs, then a simplex on all of them; each trial costs one column,
 //! not one refit of everything.
-use super::explain::{Explained, column, residual, width};
+use super::explained::{Explained, residual};
+use super::item::Kind;
 use super::ledger::{Samples, Trial};
 use super::linear::Factor;
 use super::pitch;
-use super::search::{Kind, columns_of};
+use super::search::columns_of;
 use super::survey::Prepared;
-use crate::causes::{Cause, RunView};
+use crate::causes::{Bend, Cause, RunView};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 /// Runs of the coarse scan.
 const SCAN_RUNS: usize = 16;
+/// χ² within which a simplex has arrived.
+const CLOSE: f64 = 0.5;
 /// A scan is worth refining above this share of its price.
 const PROMISING: f64 = 0.6;
 
@@ -39,6 +42,11 @@ pub fn improve(found: &mut Explained, runs: &[Prepared]) {
         let Kind::Cause { cause, axis, shape } = found.items[item].kind.clone() else { continue };
         let model = cause.model();
         if model.shape_names().is_empty() {
+            continue;
+        }
+        // What is chosen and has a slope is climbed beside all others (see `tangent`).
+        let slope = |which: usize| matches!(model.bend(which, shape[which], 1.0), Bend::Amount(_));
+        if found.chosen.contains(&item) && (0..shape.len()).all(slope) {
             continue;
         }
         let others: Vec<usize> = found.chosen.iter().copied().filter(|&i| i != item).collect();
@@ -75,7 +83,9 @@ pub fn improve(found: &mut Explained, runs: &[Prepared]) {
                 _ => continue,
             }
         };
-        let polished = if discrete(&start) || model.shape_names() == ["turned"] {
+        let choice =
+            (0..start.len()).any(|which| matches!(model.bend(which, start[which], 1.0), Bend::Choice(_)));
+        let polished = if choice {
             best_of(model.shapes(&views), &all).map_or(start, |(_, shape)| shape)
         } else {
             let first_step = if cause == Cause::CyclicError {
@@ -91,10 +101,12 @@ pub fn improve(found: &mut Explained, runs: &[Prepared]) {
                 near
             }
         };
+        let mut polished = polished;
+        model.tidy(&mut polished);
         if polished != shape {
             let kind = Kind::Cause { cause, axis, shape: polished };
             for (index, &at) in found.items[item].columns.clone().iter().enumerate() {
-                found.ledger.replace(runs, at, column(&kind, index, runs));
+                found.ledger.replace(runs, at, kind.samples(index, runs));
             }
             found.items[item].kind = kind;
         }
@@ -105,7 +117,7 @@ pub fn improve(found: &mut Explained, runs: &[Prepared]) {
 fn whitened_residual(found: &Explained, runs: &[Prepared]) -> Samples {
     let mut left = residual(found);
     left.par_iter_mut().zip(runs).for_each(|(left, run)| {
-        let discounts = found.spread.discounts(left.len());
+        let discounts = found.spread.discounts(run.visible());
         let coordinates = run.basis.coordinates(left);
         for (k, (amount, discount)) in coordinates.iter().zip(discounts).enumerate() {
             run.basis.add(k, -amount * discount, left);
@@ -113,11 +125,6 @@ fn whitened_residual(found: &Explained, runs: &[Prepared]) -> Samples {
         left.iter_mut().for_each(|x| *x /= found.spread.noise_m2);
     });
     left
-}
-
-/// Shapes that are choices, not amounts.
-fn discrete(shape: &[f64]) -> bool {
-    shape.iter().any(|value| !value.is_finite())
 }
 
 /// Every so many runs in the order of radius and feed.
@@ -139,7 +146,7 @@ fn gain(found: &Explained, runs: &[Prepared], kind: &Kind, with: &[usize], over:
         weights[run] = 1.0;
     }
     let known = with.len() + 1;
-    let wide = width(kind);
+    let wide = kind.columns();
     let mut products = DMatrix::zeros(known + wide, known + wide);
     let base: Vec<usize> = std::iter::once(0).chain(with.iter().copied()).collect();
     for &run in over {
@@ -152,17 +159,7 @@ fn gain(found: &Explained, runs: &[Prepared], kind: &Kind, with: &[usize], over:
     }
     let mut trials: Vec<Trial> = Vec::with_capacity(wide);
     for index in 0..wide {
-        let samples: Samples = over
-            .iter()
-            .map(|&run| {
-                let mut out = vec![0.0; runs[run].deviation_m.len()];
-                if let Kind::Cause { cause, axis, shape } = kind {
-                    cause.model().signature(*axis, shape, index, &runs[run].view, &mut out);
-                }
-                runs[run].mask(&mut out);
-                out
-            })
-            .collect();
+        let samples: Samples = over.iter().map(|&run| kind.samples_of(index, &runs[run])).collect();
         let trial = found.ledger.trial(runs, over, samples);
         let (cross, own) = found.ledger.probe(&trial, &base, over);
         for (i, value) in cross.iter().enumerate() {
@@ -222,7 +219,7 @@ fn simplex(start: &[f64], first_step: f64, most: usize, score: impl Fn(&[f64]) -
         };
         let spread = points.iter().map(|p| p.0).fold(f64::NEG_INFINITY, f64::max)
             - points.iter().map(|p| p.0).fold(f64::INFINITY, f64::min);
-        if spread.abs() < 0.3 {
+        if spread.abs() < CLOSE {
             break;
         }
     }

@@ -22,7 +22,7 @@ impl Spread {
         self.noise_m2.sqrt()
     }
 
-    /// Share of a basis column that scatter between runs takes away from `samples` samples: 0 nothing, 1 all.
+    /// Share of a basis column that scatter between runs takes away from `samples` samples that are seen: 0 nothing, 1 all.
     pub fn discounts(&self, samples: usize) -> [f64; COLUMNS] {
         let mut out = [0.0; COLUMNS];
         for (column, out) in out.iter_mut().enumerate() {
@@ -39,20 +39,29 @@ impl Spread {
     }
 }
 
+/// Share of a circle that has to be seen for its harmonics to be read.
+pub const WHOLE: f64 = 0.7;
+
 /// Measures noise and scatter. `residual` holds, run by run, what the current model leaves.
 pub fn measure(runs: &[Prepared], residual: &[Vec<f64>]) -> Spread {
     let noise_m2 = noise(residual);
     let mut order_m2 = [0.0; ORDERS + 1];
-    let harmonics: Vec<_> =
-        runs.iter().zip(residual).map(|(run, left)| machine_frame(run, &run.basis.harmonics(left))).collect();
+    // Of a circle that is hidden for the most part nothing low can be read.
+    let seen = |run: &Prepared| run.visible() as f64 > WHOLE * run.deviation_m.len() as f64;
+    let (runs, harmonics): (Vec<&Prepared>, Vec<_>) = runs
+        .iter()
+        .zip(residual)
+        .filter(|(run, _)| seen(run))
+        .map(|(run, left)| (run, machine_frame(run, &run.basis.harmonics(left))))
+        .unzip();
     for (order, slot) in order_m2.iter_mut().enumerate() {
         if order == 1 {
             continue;
         }
-        let within = noise_m2 * mean_inverse_samples(runs) * if order == 0 { 1.0 } else { 2.0 };
+        let within = noise_m2 * mean_inverse_samples(&runs) * if order == 0 { 1.0 } else { 2.0 };
         let parts = if order == 0 { 1 } else { 2 };
         let total: f64 = (0..parts)
-            .map(|part| pure_error(runs, &harmonics.iter().map(|h| h[order][part]).collect::<Vec<_>>()))
+            .map(|part| pure_error(&runs, &harmonics.iter().map(|h| h[order][part]).collect::<Vec<_>>()))
             .sum();
         *slot = (total / parts as f64 - within).max(0.0);
     }
@@ -71,8 +80,8 @@ fn machine_frame(run: &Prepared, harmonics: &[[f64; 2]; ORDERS + 1]) -> [[f64; 2
     out
 }
 
-fn mean_inverse_samples(runs: &[Prepared]) -> f64 {
-    runs.iter().map(|run| 1.0 / run.deviation_m.len().max(1) as f64).sum::<f64>() / runs.len().max(1) as f64
+fn mean_inverse_samples(runs: &[&Prepared]) -> f64 {
+    runs.iter().map(|run| 1.0 / run.visible().max(1) as f64).sum::<f64>() / runs.len().max(1) as f64
 }
 
 /// Variance of a sample from second differences: smooth effects cancel, and the median over the runs ignores
@@ -103,7 +112,7 @@ fn noise(residual: &[Vec<f64>]) -> f64 {
 const TRIMMED_MEAN_OF_CHI2: f64 = 0.623_015;
 
 /// Variance that no function of radius, direction, speed and time explains.
-fn pure_error(runs: &[Prepared], values: &[f64]) -> f64 {
+fn pure_error(runs: &[&Prepared], values: &[f64]) -> f64 {
     let mut radii: Vec<f64> = runs.iter().map(|run| run.view.radius_m).collect();
     radii.sort_by(f64::total_cmp);
     radii.dedup_by(|a, b| (*a - *b).abs() < 1e-6 * *b);
@@ -111,7 +120,7 @@ fn pure_error(runs: &[Prepared], values: &[f64]) -> f64 {
     let mut columns: Vec<Vec<f64>> = Vec::new();
     let mut add = |value: &dyn Fn(&Prepared) -> f64| {
         if columns.len() < most {
-            columns.push(runs.iter().map(value).collect());
+            columns.push(runs.iter().map(|run| value(run)).collect());
         }
     };
     let x = |run: &Prepared| run.view.feed_m_s.powi(2) / run.view.radius_m;

@@ -60,10 +60,10 @@ impl Response {
             let omega_n = self.b_s4.powf(-0.25);
             let zeta = (0.5 + 0.25 * self.a_s2 * omega_n * omega_n).max(0.0).sqrt();
             let tau3_s3 = (8.0 / 3.0 * zeta.powi(3) - 2.0 * zeta) / omega_n.powi(3);
-            Lag { tau_s: 2.0 * zeta / omega_n, tau3_s3, measured: false }
+            Lag { tau_s: 2.0 * zeta / omega_n, tau3_s3, measured: false, se_s: UNSEEN_S }
         } else {
             let tau_s = self.a_s2.max(0.0).sqrt();
-            Lag { tau_s, tau3_s3: tau_s.powi(3) / 3.0, measured: false }
+            Lag { tau_s, tau3_s3: tau_s.powi(3) / 3.0, measured: false, se_s: UNSEEN_S }
         }
     }
 
@@ -75,6 +75,15 @@ impl Response {
 }
 
 impl Prepared {
+    /// Takes the recorded pattern as one that runs ahead of the machine by the lag `lag_rad`.
+    pub fn turn_to(&mut self, lag_rad: f64) {
+        let turned_rad = self.view.sign * lag_rad;
+        let psi = self.view.psi_rad.iter().map(|psi| psi + self.turned_rad - turned_rad).collect();
+        self.view.lag_rad = lag_rad;
+        self.turned_rad = turned_rad;
+        self.view.place(psi);
+    }
+
     /// Hides samples from every product.
     pub fn hide(&mut self, hidden: Vec<bool>) {
         let angle: Vec<f64> = self.view.psi_rad.iter().map(|psi| psi + self.turned_rad).collect();
@@ -83,6 +92,11 @@ impl Prepared {
         let mut deviation = std::mem::take(&mut self.deviation_m);
         self.mask(&mut deviation);
         self.deviation_m = deviation;
+    }
+
+    /// Number of samples that are not hidden.
+    pub fn visible(&self) -> usize {
+        self.deviation_m.len() - self.hidden.iter().filter(|hidden| **hidden).count()
     }
 
     /// Zero where hidden.
@@ -104,6 +118,8 @@ pub struct Lag {
     pub tau3_s3: f64,
     /// Whether the set-up offset was large enough to measure it (else it is that of the servo model).
     pub measured: bool,
+    /// How far τ may be off, s (standard deviation).
+    pub se_s: f64,
 }
 
 impl Lag {
@@ -128,12 +144,21 @@ pub fn believed_feed_m_s(run: &Run) -> f64 {
     }
 }
 
-/// Makes the runs ready about a first guess of the response.
-pub fn prepare(campaign: &Campaign, response: &Response) -> (Vec<Prepared>, Lag) {
+/// What a campaign without start times is taken to last, s.
+const UNTIMED_S: f64 = 3600.0;
+
+/// Makes the runs ready about a first guess of the response, their lag `more_lag_s` longer than the set-up offset says.
+pub fn prepare(campaign: &Campaign, response: &Response, more_lag_s: f64) -> (Vec<Prepared>, Lag) {
     let starts: Vec<f64> =
         campaign.runs.iter().enumerate().map(|(i, run)| run.started_s.unwrap_or(i as f64)).collect();
     let first = starts.iter().copied().fold(f64::INFINITY, f64::min);
     let span = starts.iter().copied().fold(f64::NEG_INFINITY, f64::max) - first;
+    let timed = campaign.runs.iter().all(|run| run.started_s.is_some());
+    // What a run shows of a drift is that of its middle.
+    let middle = |index: usize, omega: f64| match campaign.runs[index].started_s {
+        Some(started_s) => started_s + std::f64::consts::PI / omega,
+        None => starts[index],
+    };
     let largest = campaign.runs.iter().map(|run| run.radius_m).fold(0.0, f64::max);
     let mut runs: Vec<Prepared> = campaign
         .runs
@@ -161,7 +186,8 @@ pub fn prepare(campaign: &Campaign, response: &Response) -> (Vec<Prepared>, Lag)
                     feed_m_s: feed,
                     omega_rad_s: omega,
                     sign: run.sign(),
-                    elapsed: if span > 0.0 { (starts[index] - first) / span } else { 0.0 },
+                    elapsed: if span > 0.0 { (middle(index, omega) - first) / span } else { 0.0 },
+                    campaign_s: if timed && span > 0.0 { span } else { UNTIMED_S },
                     largest_radius_m: largest,
                     psi_rad: theta.clone(),
                     direction: Vec::new(),
@@ -173,27 +199,26 @@ pub fn prepare(campaign: &Campaign, response: &Response) -> (Vec<Prepared>, Lag)
         })
         .collect();
     let inferred = campaign.runs.iter().any(|run| run.samples.angle_inferred);
-    let lag = if inferred {
+    let mut lag = if inferred {
         measure_lag(&runs, response)
     } else {
-        Lag { tau_s: 0.0, tau3_s3: 0.0, measured: true }
+        Lag { tau_s: 0.0, tau3_s3: 0.0, measured: true, se_s: 0.0 }
     };
+    lag.tau_s += more_lag_s;
     for run in &mut runs {
-        // An angle that was measured holds no lag, but the servo's own phase still turns its signatures.
-        run.view.lag_rad = if inferred {
-            lag.phase(run.view.omega_rad_s)
-        } else {
-            response.own_lag().phase(run.view.omega_rad_s)
-        };
         if inferred {
-            let turn = run.view.sign * run.view.lag_rad;
-            run.turned_rad = turn;
+            run.turn_to(lag.phase(run.view.omega_rad_s));
+        } else {
+            // An angle that was measured holds no lag, but the servo's own phase still turns its signatures.
+            run.view.lag_rad = response.own_lag().phase(run.view.omega_rad_s);
+            run.view.place(run.view.psi_rad.clone());
         }
-        let psi = run.view.psi_rad.iter().map(|theta| theta - run.turned_rad).collect();
-        run.view.place(psi);
     }
     (runs, lag)
 }
+
+/// Dead time that a servo may have on top of its own lag, s.
+const UNSEEN_S: f64 = 0.01;
 
 /// Least eccentricity that shows its turn clearly against a micrometre of noise, m.
 const SMALLEST_OFFSET_M: f64 = 3e-6;
@@ -259,7 +284,8 @@ fn measure_lag(runs: &[Prepared], response: &Response) -> Lag {
     if eccentricity < SMALLEST_OFFSET_M || se > 0.02 {
         return unmeasured;
     }
-    Lag { tau_s: tau, tau3_s3: tau3, measured: true }
+    // τ and τ3 share what the fastest runs tell.
+    Lag { tau_s: tau, tau3_s3: tau3, measured: true, se_s: 2.0 * se / fastest }
 }
 
 #[cfg(test)]

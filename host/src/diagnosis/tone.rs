@@ -49,6 +49,8 @@ const LONGEST_TURN_S: f64 = 12.0;
 const FEWEST_WAVES: f64 = 9.5;
 /// Padding of the transforms.
 const PAD: usize = 4;
+/// Share of a frequency within which it is the same, or a whole multiple.
+const SAME: f64 = 0.03;
 /// Standard errors above both noise and floor that make a tone.
 const SIGNIFICANT: f64 = 8.0;
 
@@ -237,6 +239,20 @@ fn rice_deviance(power: f64, lambda: f64) -> f64 {
 }
 
 impl Tone {
+    /// What it takes off all runs (sum of squares, m²).
+    pub fn whole_energy_m2(&self) -> f64 {
+        self.energy_m2.iter().sum::<f64>().max(0.0)
+    }
+
+    /// Whether it is none of the others, nor an overtone of one.
+    pub fn is_new(&self, others: &[Self]) -> bool {
+        others.iter().all(|other| {
+            let waves = self.frequency_hz / other.frequency_hz;
+            let whole = waves.round().max(1.0);
+            (waves / whole - 1.0).abs() > SAME || self.whole_energy_m2() > other.whole_energy_m2()
+        })
+    }
+
     /// Takes the tone out of the runs' deviations.
     pub fn remove(&self, runs: &mut [Prepared]) {
         runs.par_iter_mut().for_each(|run| {

@@ -1,9 +1,9 @@
 //! Words for what has no name.
 use super::duration::Durations;
-use super::explain::{Explained, energies};
+use super::explained::{Explained, energies};
 use super::finding::{Signature, Unexplained};
+use super::item::Kind;
 use super::pattern::{Law, Pattern};
-use super::search::Kind;
 
 /// Describes the patterns that the search had to take in.
 pub fn describe(found: &Explained, durations: &Durations) -> Unexplained {

@@ -1,10 +1,12 @@
 //! From the chosen explanations to findings: estimate, interval, probability, share, look-alikes.
 use super::duration::Clamp;
-use super::explain::{Explained, energies};
+use super::explained::{Explained, energies};
 use super::finding::{Estimate, Finding};
+use super::item::Kind;
 use super::linear::solve;
-use super::roughness;
-use super::search::{Kind, columns_of, evidence, select};
+use super::roughness::{self, Teeth};
+use super::search::{columns_of, evidence, select};
+use super::tangent;
 use super::tone::{Amplitude, Tone};
 use crate::causes::{Cause, Effect};
 use giotto_shared::Axis;
@@ -19,7 +21,8 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
     let weights = vec![1.0; found.runs.len()];
     let samples: f64 = found.runs.iter().map(|run| run.deviation_m.len() as f64).sum();
     let (each, _) = energies(found, &weights);
-    let tone_energy: f64 = found.tone.iter().flat_map(|tone| &tone.energy_m2).sum::<f64>().max(0.0);
+    let tone_energies: Vec<f64> = found.tones.iter().map(Tone::whole_energy_m2).collect();
+    let tone_energy: f64 = tone_energies.iter().sum();
     let teeth_energy: Vec<f64> =
         found.teeth.iter().map(|teeth| roughness::energy_m2(teeth, &found.runs)).collect();
     let total = each.iter().sum::<f64>()
@@ -69,23 +72,14 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
     }
     let (pieces, energy) = unexplained_energy(found, &each);
     let hidden_by_pieces = pieces >= PIECES && tone_energy < 9.0 * energy;
-    if let Some(tone) = found.tone.as_ref().filter(|_| !hidden_by_pieces) {
-        out.push(tone_finding(tone, share(tone_energy), rms(tone_energy)));
+    for (tone, energy) in found.tones.iter().zip(tone_energies).filter(|_| !hidden_by_pieces) {
+        out.push(tone_finding(tone, share(energy), rms(energy)));
     }
     for (teeth, energy) in found.teeth.iter().zip(teeth_energy) {
-        let params = BTreeMap::from([("below_mm_s".to_string(), teeth.below_m_s * 1e3)]);
         let odds = 0.5 * teeth.significance.powi(2) - 14.0;
-        let (value, half) = (teeth.height_m * 1e6, 2.0 * teeth.se_m * 1e6);
-        out.push(plain(
-            Cause::StickSlip,
-            Some(teeth.axis),
-            value,
-            half,
-            sigmoid(odds),
-            share(energy),
-            rms(energy),
-            params,
-        ));
+        let Effect { cause, axis, value, ci95, params } = teeth_effect(teeth);
+        let half = 0.5 * (ci95[1] - ci95[0]);
+        out.push(plain(cause, axis, value, half, sigmoid(odds), share(energy), rms(energy), params));
     }
     out.sort_by(|a, b| b.share_percent.total_cmp(&a.share_percent));
     out
@@ -159,6 +153,18 @@ fn plain(
     }
 }
 
+/// Teeth as an effect of a machine.
+pub fn teeth_effect(teeth: &Teeth) -> Effect {
+    let (value, half) = (teeth.height_m * 1e6, 2.0 * teeth.se_m * 1e6);
+    Effect {
+        cause: Cause::StickSlip,
+        axis: Some(teeth.axis),
+        value,
+        ci95: [value - half, value + half],
+        params: BTreeMap::from([("below_mm_s".to_string(), teeth.below_m_s * 1e3)]),
+    }
+}
+
 fn tone_finding(tone: &Tone, share: f64, rms: f64) -> Finding {
     let params = BTreeMap::from([
         ("amplitude_um".to_string(), tone.amplitude_m * 1e6),
@@ -202,9 +208,11 @@ fn estimate(found: &Explained, item: usize) -> (f64, f64) {
     let at: Vec<usize> = own.iter().filter_map(|c| columns.iter().position(|other| other == c)).collect();
     let dof = (found.runs.len().saturating_sub(columns.len())).max(1) as f64;
     let t = StudentsT::new(0.0, 1.0, dof).map_or(2.0, |t| t.inverse_cdf(0.975));
-    let robust = robust_variances(found, &columns);
+    // Nuisance and chosen come first with the tangents, too.
+    let (covariance, ..) = tangent::covariance(found);
+    let robust = robust_variances(found);
     let value: Vec<f64> = at.iter().map(|&i| found.solution.coefficients[i]).collect();
-    let variance = |i: usize| found.solution.covariance[(i, i)].max(robust.get(i).copied().unwrap_or(0.0));
+    let variance = |i: usize| covariance[(i, i)].max(robust.get(i).copied().unwrap_or(0.0));
     let doubt = match &found.items[item].kind {
         Kind::Cause { cause, .. } => cause.model().relative_doubt(),
         Kind::Pattern(_) => 0.0,
@@ -222,7 +230,8 @@ fn estimate(found: &Explained, item: usize) -> (f64, f64) {
 }
 
 /// Variances of the coefficients by the scatter of the runs' pulls (sandwich, with the run as the cluster).
-fn robust_variances(found: &Explained, columns: &[usize]) -> Vec<f64> {
+fn robust_variances(found: &Explained) -> Vec<f64> {
+    let (bread, columns, coefficients) = tangent::covariance(found);
     let n = columns.len();
     let mut meat = nalgebra::DMatrix::<f64>::zeros(n, n);
     for run in 0..found.runs.len() {
@@ -230,12 +239,8 @@ fn robust_variances(found: &Explained, columns: &[usize]) -> Vec<f64> {
         let pull: Vec<f64> = columns
             .iter()
             .map(|&a| {
-                white[(a, 0)]
-                    - columns
-                        .iter()
-                        .zip(&found.solution.coefficients)
-                        .map(|(&b, x)| white[(a, b)] * x)
-                        .sum::<f64>()
+                let fitted: f64 = columns.iter().zip(&coefficients).map(|(&b, x)| white[(a, b)] * x).sum();
+                white[(a, 0)] - fitted
             })
             .collect();
         for i in 0..n {
@@ -246,7 +251,6 @@ fn robust_variances(found: &Explained, columns: &[usize]) -> Vec<f64> {
     }
     let runs = found.runs.len() as f64;
     let small = runs / (runs - n as f64).max(1.0);
-    let bread = &found.solution.covariance;
     let sandwich = bread * meat * bread * small;
     (0..n).map(|i| sandwich[(i, i)]).collect()
 }
@@ -276,10 +280,14 @@ fn dynamics_note(found: &Explained, weights: &[f64], at: usize) -> String {
     format!("partial F = {partial_f:.1} (1, {dof}); κ4/κ2² = {ratio:.0}: {class}")
 }
 
-/// Probability of a chosen explanation against the best set that does without it.
+/// Probability of a chosen explanation: the best set with it against the best set that does without its cause. Both
+/// may take in what is too small to be stated.
 fn probability(found: &Explained, weights: &[f64], at: usize) -> f64 {
     let products = found.ledger.white(weights);
-    let with = evidence(&products, &found.nuisance, &found.items, &found.chosen);
+    let best = |start: &[usize], barred: &[usize]| {
+        let set = select(&products, &found.nuisance, &found.items, start, barred);
+        evidence(&products, &found.nuisance, &found.items, &set)
+    };
     let rest: Vec<usize> =
         found.chosen.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, c)| *c).collect();
     let same_cause: Vec<usize> = (0..found.items.len())
@@ -288,9 +296,7 @@ fn probability(found: &Explained, weights: &[f64], at: usize) -> f64 {
             _ => false,
         })
         .collect();
-    let other = select(&products, &found.nuisance, &found.items, &rest, &same_cause);
-    let without = evidence(&products, &found.nuisance, &found.items, &other);
-    match (with, without) {
+    match (best(&found.chosen, &[]), best(&rest, &same_cause)) {
         (Some(with), Some(without)) => sigmoid(0.5 * (with - without)),
         _ => 0.5,
     }
@@ -352,8 +358,11 @@ fn complete(cause: Cause, found: &Explained, item: usize, params: &mut BTreeMap<
             params.insert("over_radius_mm".into(), largest * 1e3);
         }
         Cause::ThermalDrift => {
-            let settling = params.get("settling").copied().filter(|share| share.is_finite());
-            params.insert("settling".into(), settling.unwrap_or(0.0));
+            // Time constant as a share of the campaign; 0: linear.
+            let curvature = params.remove("curvature").filter(|curvature| *curvature > 1e-3);
+            params.insert("settling".into(), curvature.map_or(0.0, f64::recip));
+            let campaign_s = found.runs.first().map(|run| run.view.campaign_s);
+            params.insert("campaign_s".into(), campaign_s.unwrap_or_default());
         }
         Cause::Backlash => {
             params.remove("play_m");

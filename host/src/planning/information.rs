@@ -46,6 +46,7 @@ pub fn views(circles: &[Circle], response: &Response, elapsed: &[f64]) -> Vec<Ru
                 omega_rad_s: omega,
                 sign,
                 elapsed: *elapsed,
+                campaign_s: 3600.0,
                 largest_radius_m: largest,
                 psi_rad: Vec::new(),
                 direction: Vec::new(),

@@ -1,0 +1,98 @@
+//! What a search found, with all that is needed to refit it.
+use super::basis::axpy;
+use super::item::{Item, Kind};
+use super::ledger::{Ledger, Samples};
+use super::linear::{Solution, solve};
+use super::roughness::Teeth;
+use super::search::columns_of;
+use super::spread::Spread;
+use super::survey::{Lag, Prepared, Response};
+use super::tangent::Tangents;
+use super::tone::Tone;
+
+/// What the search found, with all that is needed to refit it.
+#[derive(Clone, Debug)]
+pub struct Explained {
+    /// The runs, ready.
+    pub runs: Vec<Prepared>,
+    /// Shared response, as refined.
+    pub response: Response,
+    /// Lag of the machine behind the command.
+    pub lag: Lag,
+    /// Noise and scatter.
+    pub spread: Spread,
+    /// Products of all columns.
+    pub ledger: Ledger,
+    /// Columns of the model's own parameters: always free.
+    pub nuisance: Vec<usize>,
+    /// Every explanation considered.
+    pub items: Vec<Item>,
+    /// The chosen ones.
+    pub chosen: Vec<usize>,
+    /// The fit of nuisance and chosen.
+    pub solution: Solution,
+    /// The same with what their shapes and the lag may be off by.
+    pub tangents: Option<Tangents>,
+    /// By how much the lag is taken as longer than the set-up offset says, s.
+    pub more_lag_s: f64,
+    /// Axes that stick at low speed.
+    pub teeth: Vec<Teeth>,
+    /// Tones in time.
+    pub tones: Vec<Tone>,
+    /// Energy of what was taken out before the search, teeth and tone, m².
+    pub apart_m2: f64,
+}
+
+/// What nuisance and chosen explanations leave, run by run.
+pub fn residual(found: &Explained) -> Samples {
+    let mut left = found.ledger.samples(0).clone();
+    let columns = columns_of(&found.nuisance, &found.items, &found.chosen);
+    for (&column, &amount) in columns.iter().zip(&found.solution.coefficients) {
+        for (left, samples) in left.iter_mut().zip(found.ledger.samples(column)) {
+            axpy(-amount, samples, left);
+        }
+    }
+    left
+}
+
+/// The chosen explanations, free of the ledger they were found in.
+pub fn chosen_kinds(found: &Explained) -> Vec<Kind> {
+    found.chosen.iter().map(|&i| found.items[i].kind.clone()).collect()
+}
+
+/// Energy (sum of squares, m²) that each chosen explanation alone accounts for, and all of them.
+pub fn energies(found: &Explained, weights: &[f64]) -> (Vec<f64>, f64) {
+    energies_of(found, weights, &found.chosen)
+}
+
+/// The same for any set.
+pub fn energies_of(found: &Explained, weights: &[f64], set: &[usize]) -> (Vec<f64>, f64) {
+    let products = found.ledger.plain(weights);
+    let gain = |set: &[usize]| {
+        solve(&products, &columns_of(&found.nuisance, &found.items, set))
+            .map_or(0.0, |solution| solution.gain)
+    };
+    let whole = gain(set);
+    let each = (0..set.len())
+        .map(|at| {
+            let rest: Vec<usize> =
+                set.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, c)| *c).collect();
+            (whole - gain(&rest)).max(0.0)
+        })
+        .collect();
+    (each, (whole - gain(&[])).max(0.0))
+}
+
+/// Number of samples of all runs.
+pub fn samples(runs: &Samples) -> f64 {
+    runs.iter().map(|run| run.len() as f64).sum()
+}
+
+/// Fits nuisance and chosen again.
+pub fn refit(found: &mut Explained, weights: &[f64]) {
+    let products = found.ledger.white(weights);
+    let columns = columns_of(&found.nuisance, &found.items, &found.chosen);
+    if let Some(solution) = solve(&products, &columns) {
+        found.solution = solution;
+    }
+}

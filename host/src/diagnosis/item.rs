@@ -1,0 +1,87 @@
+//! Explanations that compete: causes of the list and patterns without a name, and what each costs.
+use super::ledger::Samples;
+use super::pattern::Pattern;
+use super::survey::Prepared;
+use crate::causes::Cause;
+use giotto_shared::Axis;
+use rayon::prelude::*;
+
+/// Price of one listed column: ln(78 runs) + 2·ln(25 competitors), about 11, and a margin for the scatter
+/// being estimated.
+const PRICE: f64 = 14.0;
+/// Further price of a second column.
+const PRICE_OF_PHASE: f64 = 5.0;
+/// Further price of a pattern: there are hundreds of them, and a name is worth more.
+const PRICE_OF_PATTERN: f64 = 14.0;
+/// An explanation the search may choose.
+#[derive(Clone, Debug)]
+pub struct Item {
+    /// What it is.
+    pub kind: Kind,
+    /// Its columns in the ledger.
+    pub columns: Vec<usize>,
+    /// What it has to take off χ² to be worth while.
+    pub price: f64,
+    /// Beside which other columns its shape was fitted last.
+    pub fitted_beside: Option<Vec<usize>>,
+}
+
+/// Cause or pattern.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Kind {
+    /// A cause of the list.
+    Cause {
+        /// Which.
+        cause: Cause,
+        /// Where.
+        axis: Option<Axis>,
+        /// Its shape parameters, in the order of the cause's names.
+        shape: Vec<f64>,
+    },
+    /// Something without a name.
+    Pattern(Pattern),
+}
+
+impl Item {
+    /// Whether it is in the closed list.
+    pub fn listed(&self) -> bool {
+        matches!(self.kind, Kind::Cause { .. })
+    }
+}
+
+impl Kind {
+    /// Number of linear columns.
+    pub fn columns(&self) -> usize {
+        match self {
+            Self::Cause { cause, .. } => cause.model().columns(),
+            Self::Pattern(pattern) => pattern.columns(),
+        }
+    }
+
+    /// One column, m per unit, at each sample of each run; 0 where a run hides its samples.
+    pub fn samples(&self, index: usize, runs: &[Prepared]) -> Samples {
+        runs.par_iter().map(|run| self.samples_of(index, run)).collect()
+    }
+
+    /// One column in one run.
+    pub fn samples_of(&self, index: usize, run: &Prepared) -> Vec<f64> {
+        let mut out = vec![0.0; run.deviation_m.len()];
+        match self {
+            Self::Cause { cause, axis, shape } => {
+                cause.model().signature(*axis, shape, index, &run.view, &mut out);
+            }
+            Self::Pattern(pattern) => pattern.samples(index, run, &mut out),
+        }
+        run.mask(&mut out);
+        out
+    }
+
+    /// What it has to take off χ², chosen from `shapes` starting shapes.
+    pub fn price(&self, shapes: usize) -> f64 {
+        let phase = PRICE_OF_PHASE * (self.columns() - 1) as f64;
+        match self {
+            Self::Cause { .. } => PRICE + phase + 2.0 * (shapes.max(1) as f64).ln(),
+            Self::Pattern(_) => PRICE + PRICE_OF_PATTERN + phase,
+        }
+    }
+}
