@@ -17,6 +17,8 @@ pub fn smallest_pattern_m(found: &Explained) -> f64 {
 /// Whether a tone is large enough to be of interest.
 pub fn is_material(found: &Explained, tone: &Tone) -> bool {
     let (_, explained) = energies(found, &vec![1.0; found.runs.len()]);
+    // Teeth and other tones, too, leave something of the kind.
+    let explained = explained + found.apart_m2;
     let count = samples(found.ledger.samples(0));
     let rms = (tone.whole_energy_m2() / count).sqrt();
     rms > 2.0 * SMALLEST_OF_NOISE * found.spread.noise_m()

@@ -7,6 +7,7 @@
 use super::item::Item;
 use super::linear::Factor;
 use nalgebra::DMatrix;
+use std::cell::Cell;
 
 /// Most members.
 const MOST: usize = 14;
@@ -42,9 +43,11 @@ pub fn select(
         let outside: Vec<usize> =
             (0..items.len()).filter(|i| !set.contains(i) && !barred.contains(i)).collect();
         let mut next: Option<(f64, Vec<usize>)> = None;
-        let mut consider = |value: f64, base: &[usize], further: Option<usize>| {
+        let improved = Cell::new(false);
+        let mut consider = |value: f64, base: &[usize], further: &[usize]| {
             if value > best + 1e-6 && next.as_ref().is_none_or(|(other, _)| value > *other) {
-                next = Some((value, base.iter().copied().chain(further).collect()));
+                next = Some((value, [base, further].concat()));
+                improved.set(true);
             }
         };
         // Without one of the members (or all kept), alone and with one from outside.
@@ -52,13 +55,32 @@ pub fn select(
             let base = at.map_or_else(|| set.clone(), |at| without(&set, at));
             let Some(mut factor) = factor(&base) else { continue };
             let paid = price(&base);
-            consider(factor.gain() - paid, &base, None);
+            consider(factor.gain() - paid, &base, &[]);
             if base.len() == MOST {
                 continue;
             }
             for &candidate in &outside {
                 if let Some(gain) = factor.gain_with(&items[candidate].columns) {
-                    consider(gain - paid - items[candidate].price, &base, Some(candidate));
+                    consider(gain - paid - items[candidate].price, &base, &[candidate]);
+                }
+            }
+        }
+        // Two that nearly cancel show only together; looked at where one alone no longer helps.
+        if !improved.get() {
+            let listed: Vec<usize> = outside.iter().copied().filter(|&i| items[i].listed()).collect();
+            for at in (0..set.len()).map(Some).chain([None]) {
+                let base = at.map_or_else(|| set.clone(), |at| without(&set, at));
+                let Some(mut factor) = factor(&base).filter(|_| base.len() + 2 <= MOST) else { continue };
+                let paid = price(&base);
+                for (i, &one) in listed.iter().enumerate() {
+                    for &other in &listed[i + 1..] {
+                        let columns: Vec<usize> =
+                            items[one].columns.iter().chain(&items[other].columns).copied().collect();
+                        if let Some(gain) = factor.gain_with(&columns) {
+                            let value = gain - paid - items[one].price - items[other].price;
+                            consider(value, &base, &[one, other]);
+                        }
+                    }
                 }
             }
         }
@@ -112,6 +134,20 @@ mod tests {
             vec![1],
             "the neighbour stands in when it is barred"
         );
+    }
+
+    #[test]
+    fn two_that_nearly_cancel_are_found_together() {
+        let wave = |i: i32, k: i32| f64::from((i * k + i * i) % 13) - 6.0;
+        let one: Vec<f64> = (0..60).map(|i| wave(i, 3)).collect();
+        let other: Vec<f64> = (0..60).map(|i| -wave(i, 3) + 0.2 * wave(i, 5)).collect();
+        let sum: Vec<f64> = one.iter().zip(&other).map(|(a, b)| a + b).collect();
+        let columns = [sum, one, other, (0..60).map(|i| wave(i, 7)).collect()];
+        let products =
+            DMatrix::from_fn(4, 4, |i, j| columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum());
+        let worth = products[(0, 0)];
+        assert_eq!(select(&products, &[], &items(0.4 * worth), &[], &[]), vec![0, 1]);
+        assert!(select(&products, &[], &items(0.6 * worth), &[], &[]).is_empty(), "above their worth");
     }
 
     #[test]

@@ -249,7 +249,7 @@ impl Tone {
         others.iter().all(|other| {
             let waves = self.frequency_hz / other.frequency_hz;
             let whole = waves.round().max(1.0);
-            (waves / whole - 1.0).abs() > SAME || self.whole_energy_m2() > other.whole_energy_m2()
+            (waves / whole - 1.0).abs() > SAME
         })
     }
 

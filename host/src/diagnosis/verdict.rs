@@ -201,6 +201,9 @@ fn sigmoid(log_odds: f64) -> f64 {
     (1.0 / (1.0 + (-log_odds).exp())).min(HIGHEST)
 }
 
+/// Ratio of variances, by the runs and by the model, above which the former is believed.
+const ROBUST: f64 = 1.5;
+
 /// Value and half-width of its 95 % interval, in the contract's unit.
 fn estimate(found: &Explained, item: usize) -> (f64, f64) {
     let columns = columns_of(&found.nuisance, &found.items, &found.chosen);
@@ -212,7 +215,11 @@ fn estimate(found: &Explained, item: usize) -> (f64, f64) {
     let (covariance, ..) = tangent::covariance(found);
     let robust = robust_variances(found);
     let value: Vec<f64> = at.iter().map(|&i| found.solution.coefficients[i]).collect();
-    let variance = |i: usize| covariance[(i, i)].max(robust.get(i).copied().unwrap_or(0.0));
+    // The scatter of the runs' pulls is itself uncertain by a quarter or so: it counts where it says clearly more.
+    let variance = |i: usize| {
+        let robust = robust.get(i).copied().unwrap_or(0.0);
+        if robust > ROBUST * covariance[(i, i)] { robust } else { covariance[(i, i)] }
+    };
     let doubt = match &found.items[item].kind {
         Kind::Cause { cause, .. } => cause.model().relative_doubt(),
         Kind::Pattern(_) => 0.0,

@@ -1,4 +1,4 @@
-//! The power study of `diagnose`: `power --each 40` writes `tests/POWER.md`.
+//! The power study of `diagnose`: `power` writes `tests/POWER.md`.
 //!
 //! `--only NAME` keeps the rows whose name contains NAME (or one group: `single`, `pair`, `triple`, `null`,
 //! `unlisted`, `permuted`) and then prints instead of writing.
@@ -6,6 +6,7 @@ use clap::Parser;
 use giotto_tests::effects::Case;
 use giotto_tests::files;
 use giotto_tests::machine::base::Variety;
+use giotto_tests::study::schedule::FULL;
 use giotto_tests::study::sheet::{Row, page};
 use giotto_tests::study::{Job, Outcome, judge, schedule};
 use rayon::prelude::*;
@@ -29,7 +30,7 @@ struct Args {
     #[arg(long)]
     strength: Option<f64>,
     /// Campaigns a cause and strength.
-    #[arg(long = "per-case", visible_alias = "each", default_value_t = 40)]
+    #[arg(long = "per-case", visible_alias = "each", default_value_t = FULL)]
     each: usize,
     /// Four campaigns a cause and strength.
     #[arg(long)]

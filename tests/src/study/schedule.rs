@@ -69,7 +69,10 @@ pub const TRIPLES: [[&str; 3]; 10] = [
     ["thermal_drift", "vibration", "lateral_play"],
 ];
 
-/// The whole study with `each` campaigns a cause and strength (40 in full). `only` keeps the rows whose
+/// Campaigns a cause and strength of the full study: with pairs and triples more than 40 a cause, and 200 nulls.
+pub const FULL: usize = 10;
+
+/// The whole study with `each` campaigns a cause and strength ([`FULL`] in full). `only` keeps the rows whose
 /// name contains it.
 pub fn schedule(seed: u64, each: usize, only: Option<&str>) -> Vec<Job> {
     let mut jobs = Vec::new();
@@ -92,7 +95,13 @@ pub fn schedule(seed: u64, each: usize, only: Option<&str>) -> Vec<Job> {
     };
     let names = |list: &[&str]| Kind::Effects(list.iter().map(|s| (*s).to_owned()).collect());
     for null in [Null::Noise, Null::Spread, Null::Lag, Null::Model] {
-        add(Group::Null, Kind::Null(null), 0.0, (each * 3 / 2).max(1));
+        // Two in a hundred are only seen in hundreds.
+        add(
+            Group::Null,
+            Kind::Null(null),
+            0.0,
+            if each < FULL { each.div_ceil(2) } else { 5 * FULL.max(each) },
+        );
     }
     for name in LISTED {
         for (strength, count) in [(1.0, each), (3.0, each), (10.0, each.div_ceil(2))] {
@@ -105,7 +114,7 @@ pub fn schedule(seed: u64, each: usize, only: Option<&str>) -> Vec<Job> {
         }
     }
     for pair in pairs() {
-        add(Group::Pair, names(&pair), 3.0, each.div_ceil(20));
+        add(Group::Pair, names(&pair), 3.0, each.div_ceil(2 * FULL));
     }
     for triple in TRIPLES {
         add(Group::Triple, names(&triple), 3.0, each.div_ceil(4));
