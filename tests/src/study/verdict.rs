@@ -27,6 +27,9 @@ pub struct Verdict {
     pub gain_share: Option<f64>,
 }
 
+/// Share of what a perfect model leaves that it has to gain for a gain to be judged.
+const SOMETHING: f64 = 0.1;
+
 /// Judges `outcome` against the truth of `case`.
 pub fn judge(case: &Case, outcome: &Outcome) -> Verdict {
     let must = |cause: &str| case.truth.iter().any(|t| t.accept.iter().any(|a| a == cause));
@@ -75,7 +78,8 @@ pub fn judge(case: &Case, outcome: &Outcome) -> Verdict {
     if !case.truth.is_empty() && !unlisted {
         let perfect_um = perfect_rms_um(case);
         let possible = outcome.baseline_um - perfect_um;
-        if possible > 0.0 {
+        // Where nothing can be foretold nothing can be gained, and the ratio says nothing.
+        if possible > SOMETHING * perfect_um {
             verdict.gain_share = Some((outcome.baseline_um - outcome.extended_um) / possible);
         }
     }
