@@ -1,7 +1,8 @@
 //! What the simulation gets wrong, and why.
 //!
 //! A campaign is prepared ([`survey`]), its noise and its scatter between runs are measured ([`spread`]),
-//! causes and nameless patterns compete for it ([`search`], [`mod@explain`]); tones in time ([`tone`]), teeth at
+//! causes and nameless patterns compete for it ([`search`], [`mod@explain`]) in their best shapes ([`shape`],
+//! [`tangent`]); tones in time ([`tone`]), teeth at
 //! low speed ([`roughness`]) and the duration of the turns ([`duration`]) are looked at for themselves. What
 //! is found is stated with its doubts ([`verdict`], [`unexplained`]) and proven on runs left out ([`gain`]).
 pub mod baseline;
