@@ -26,7 +26,8 @@ fn write(directory: &Path, rows: usize) -> Result<(), Error> {
         for i in 0..each {
             let turn = i as f64 / each as f64;
             let wobble = ((i * 7919 + run * 104_729) % 41) as f64 * 0.1 - 2.0;
-            let deviation = -100.0 + 20.0 * (std::f64::consts::TAU * turn).cos() + wobble;
+            // Each run has a size of its own: the same samples twice would be a file given twice.
+            let deviation = -100.0 - 0.1 * run as f64 + 20.0 * (std::f64::consts::TAU * turn).cos() + wobble;
             writeln!(text, "{:.6},{deviation:.1}", turn * turn_s)?;
         }
         std::fs::write(directory.join(format!("run{run:03}.csv")), text)?;
