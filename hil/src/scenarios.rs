@@ -6,7 +6,7 @@ use giotto::controller::flash::{Verdict, is_flash_fault};
 use giotto::controller::{Controller, ControllerError, circle};
 use giotto_shared::Direction;
 use giotto_shared::table::{self, MAX_IMAGE_BYTES, TableError};
-use giotto_shared::wire::{CircleRun, Command, MotionRefusal, MotionState, Pose, Refusal, Status};
+use giotto_shared::wire::{Command, ExactCircle, MotionRefusal, MotionState, Pose, Refusal, Status};
 use std::time::Duration;
 
 /// How a scenario ended.
@@ -157,18 +157,18 @@ fn silent_host(controller: &mut Controller) -> Result<(), Trouble> {
 }
 
 fn out_of_bounds(controller: &mut Controller) -> Result<(), Trouble> {
-    let good = circle(0.1, 0.2, Direction::Ccw, 1);
+    let good = circle(0.1, 0.2, Direction::Ccw, 1).exact().map_err(ControllerError::from)?;
     let bad = [
-        CircleRun { radius_m: 2.0, ..good },
-        CircleRun { feed_m_s: f64::NAN, ..good },
-        CircleRun { laps: 0, ..good },
-        CircleRun { centre_m: [f64::INFINITY, 0.0, 0.0], ..good },
-        CircleRun { start_rad: 7.0, ..good },
+        ExactCircle { radius_half_nm: i32::MAX, ..good },
+        ExactCircle { radius_half_nm: -good.radius_half_nm, ..good },
+        ExactCircle { feed_m_s: f32::NAN, ..good },
+        ExactCircle { laps: 0, ..good },
+        ExactCircle { feed_m_s: 1e9, ..good },
     ];
     for run in bad {
         let refused =
             |refusal: &Refusal| matches!(refusal, Refusal::Motion(MotionRefusal::OutOfBounds { .. }));
-        refused_as(controller.start_circle(&run), refused)?;
+        refused_as(controller.command(Command::RunCircle(run)), refused)?;
     }
     ensure(controller.status()?.motion == MotionState::Idle, || "something moves".to_owned())
 }

@@ -5,7 +5,7 @@ use crate::engine::{Planned, Planner, Refused, ZoneError};
 use crate::server::{Motion, Snapshot, TimedSetPoint};
 use core::ops::{Deref, DerefMut};
 use core::sync::atomic::Ordering::Relaxed;
-use giotto_shared::path::CircleRun;
+use giotto_shared::path::ExactCircle;
 use giotto_shared::table::{self, Table, TableError};
 use giotto_shared::wire::{MotionRefusal, MotionState, Refusal};
 
@@ -49,7 +49,7 @@ fn in_words(refused: Refused) -> MotionRefusal {
     match refused {
         Refused::Busy => MotionRefusal::Busy,
         Refused::Fault => MotionRefusal::Fault,
-        Refused::NotANumber(_) | Refused::OutOfBounds(_) => MotionRefusal::Unreachable,
+        Refused::NotANumber(quantity) | Refused::OutOfBounds(quantity) => MotionRefusal::Path(quantity),
     }
 }
 
@@ -88,7 +88,7 @@ where
     }
 
     #[inline(never)]
-    fn run_circle(&mut self, run: &CircleRun) -> Result<(), MotionRefusal> {
+    fn run_circle(&mut self, run: &ExactCircle) -> Result<(), MotionRefusal> {
         let now = self.snapshot();
         match now.state {
             MotionState::Idle => {}

@@ -43,14 +43,15 @@ fn bench() -> Bench {
 
 impl Bench {
     fn circle(&mut self, radius_m: f64) -> Result<(), MotionRefusal> {
-        self.desk.run_circle(&CircleRun {
+        let run = CircleRun {
             centre_m: [0.0; 3],
             radius_m,
             feed_m_s: 0.3,
             direction: Direction::Ccw,
             laps: 1,
             start_rad: 0.0,
-        })
+        };
+        self.desk.run_circle(&run.exact().unwrap())
     }
 
     fn ticks(&mut self, count: usize) {

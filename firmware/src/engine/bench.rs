@@ -68,9 +68,11 @@ impl Arc {
         let sweep_rad = 3.0 * core::f64::consts::PI;
         let arc = Segment::Arc { centre_m: CENTRE_M, normal, sweep_rad, rise_m, feed_m_s: FEED_M_S };
         if planner.set_table(Some(&table(extended))).is_ok()
-            && let Ok(planned) = planner.segment(&arc)
+            && let Ok(exact) = arc.exact(start)
         {
-            // The queue is empty.
+            let mut planned = Planned::default();
+            // Looked at in `sound`; the queue is empty.
+            let _ = planner.segment(&exact, &mut planned);
             let _ = queue.enqueue(planned);
         }
         Self { executor: Executor::new(start, config.engage_ticks(), false), queue }

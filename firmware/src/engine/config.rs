@@ -7,10 +7,6 @@ pub const RATE_HZ: [u32; 2] = [250, 20_000];
 pub const MIN_RAMP_TICKS: u32 = 32;
 /// Longest feed ramp or blend, ticks.
 pub const MAX_RAMP_TICKS: u32 = 1 << 24;
-/// Largest circle, m: its vectors are i32 half nanometres.
-pub const MAX_RADIUS_M: f64 = 1.05;
-/// Largest coordinate, m: positions are i32 nanometres, ±2.147 m.
-pub const MAX_POSITION_M: f64 = 2.1;
 
 /// Limits of the machine and of the correction. SI.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -43,9 +43,12 @@ mod sides;
 mod stream;
 mod zones;
 
-pub use config::{Config, ConfigError, MAX_POSITION_M, MAX_RADIUS_M, MIN_RAMP_TICKS, RATE_HZ};
+pub use config::{Config, ConfigError, MIN_RAMP_TICKS, RATE_HZ};
 pub use executor::{Executor, Inbox};
-pub use giotto_shared::path::{CircleRun, MotionLimits, Segment};
+pub use giotto_shared::path::{
+    CircleRun, ExactArc, ExactCircle, ExactSegment, MAX_POSITION_M, MAX_RADIUS_M, MotionLimits, Quantity,
+    Segment,
+};
 pub use planned::Planned;
 pub use planner::{Planner, Refused};
 pub use stream::{MAX_STRIDE, Stream, StreamCounters, StreamPlan, StreamSample, StreamState};
@@ -161,9 +164,10 @@ impl Engine {
     /// Moves to where the circle starts, then runs it.
     pub fn run_circle(&mut self, run: &CircleRun) -> Result<(), Refused> {
         self.ready(2)?;
+        let run = run.exact()?;
         let before = self.planner.position_nm();
         let (mut approach, mut circle) = (None, Planned::default());
-        let planned = self.planner.circle(run, &mut approach, &mut circle);
+        let planned = self.planner.circle(&run, &mut approach, &mut circle);
         planned.inspect_err(|_| self.planner.rewind(before))?;
         // Room for both was checked.
         if let Some(approach) = approach {
@@ -176,7 +180,9 @@ impl Engine {
     /// Appends a segment; it runs with an exact stop at its ends.
     pub fn push(&mut self, segment: &Segment) -> Result<(), Refused> {
         self.ready(1)?;
-        let planned = self.planner.segment(segment)?;
+        let exact = segment.exact(self.planner.position_nm())?;
+        let mut planned = Planned::default();
+        self.planner.segment(&exact, &mut planned)?;
         let _ = self.queue.enqueue(planned);
         Ok(())
     }

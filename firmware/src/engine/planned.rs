@@ -2,6 +2,7 @@
 use super::extra::Extra;
 use super::ramp::Shapes;
 use giotto_shared::fixed::{mulh, mulh_add, mulh_sub};
+use giotto_shared::path::{on_arc, risen};
 
 /// Which curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -35,7 +36,7 @@ impl Axis {
     /// Position on an arc, nm (rounded down), at cosine and sine in Q31.
     #[inline(always)]
     pub(crate) fn on_arc(&self, c: i32, s: i32) -> i32 {
-        mulh_add(mulh_add(self.base, self.u, c), self.v, s)
+        on_arc([self.base, self.u, self.v], c, s)
     }
 
     /// Position on a line, nm (rounded down). The share is Q30 and signed: rounding may carry it past either end.
@@ -184,10 +185,7 @@ pub struct Planned {
 impl Planned {
     /// How far a helix has risen, nm, at so many turns (whole, and their fraction).
     pub(crate) fn risen(&self, turns: i32, fraction_q32: u32) -> [i32; 3] {
-        self.rise_nm.map(|rise| {
-            let part = i64::from(rise).wrapping_mul(i64::from(fraction_q32)) >> 32;
-            rise.wrapping_mul(turns).wrapping_add(part as i32)
-        })
+        risen(self.rise_nm, turns, fraction_q32)
     }
 
     /// Where it ends, nm.

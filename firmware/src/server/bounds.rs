@@ -1,6 +1,6 @@
 //! What no run may ask for, whatever the table says.
 use giotto_shared::table::bounds;
-use giotto_shared::wire::{CircleRun, MotionRefusal, RunField};
+use giotto_shared::wire::{ExactCircle, MotionRefusal, Quantity};
 
 /// Most turns of one run.
 pub const MAX_LAPS: u32 = 10_000;
@@ -8,24 +8,20 @@ pub const MAX_LAPS: u32 = 10_000;
 pub const CENTRIPETAL_MAX_M_S2: f32 = 50.0;
 
 /// Checks a run against the bounds of the image.
-pub(super) fn check_run(run: &CircleRun) -> Result<(), MotionRefusal> {
-    let within = |field, value: f32, lo: f32, hi: f32| {
+pub(super) fn check_run(run: &ExactCircle) -> Result<(), MotionRefusal> {
+    let within = |quantity, value: f32, lo: f32, hi: f32| {
         // Programmed values are decimal: a bound that was meant to be met is met in single precision. Written so that
         // NaN fails.
         if value >= lo - 1e-6 * lo.abs() && value <= hi + 1e-6 * hi.abs() {
             Ok(())
         } else {
-            Err(MotionRefusal::OutOfBounds { field, value, lo, hi })
+            Err(MotionRefusal::OutOfBounds { quantity, value, lo, hi })
         }
     };
-    let (radius_m, feed_m_s) = (run.radius_m as f32, run.feed_m_s as f32);
-    within(RunField::Radius, radius_m, bounds::RADIUS_MIN_M, bounds::RADIUS_MAX_M)?;
-    within(RunField::Feed, feed_m_s, bounds::FEED_MIN_M_S, bounds::FEED_MAX_M_S)?;
-    within(RunField::Laps, run.laps as f32, 1.0, MAX_LAPS as f32)?;
-    within(RunField::Start, run.start_rad as f32, -bounds::PHASE_MAX_RAD, bounds::PHASE_MAX_RAD)?;
-    for coordinate in run.centre_m {
-        within(RunField::Centre, coordinate as f32, -bounds::PLACE_MAX_M, bounds::PLACE_MAX_M)?;
-    }
+    let (radius_m, feed_m_s) = (run.radius_half_nm as f32 * 0.5e-9, run.feed_m_s);
+    within(Quantity::Radius, radius_m, bounds::RADIUS_MIN_M, bounds::RADIUS_MAX_M)?;
+    within(Quantity::Feed, feed_m_s, bounds::FEED_MIN_M_S, bounds::FEED_MAX_M_S)?;
+    within(Quantity::Laps, run.laps as f32, 1.0, MAX_LAPS as f32)?;
     let centripetal = feed_m_s * feed_m_s / radius_m;
-    within(RunField::Acceleration, centripetal, 0.0, CENTRIPETAL_MAX_M_S2)
+    within(Quantity::Acceleration, centripetal, 0.0, CENTRIPETAL_MAX_M_S2)
 }

@@ -27,7 +27,7 @@ use core::ops::DerefMut;
 use embedded_storage::nor_flash::NorFlash;
 use giotto_shared::table::{FORMAT_VERSION, MAX_IMAGE_BYTES, SCHEMA_HASH};
 use giotto_shared::wire::{
-    self, Accumulator, CHUNK, Chunk, CircleRun, Command, Counters, FromController, Identity, MAX_FRAME,
+    self, Accumulator, CHUNK, Chunk, Command, Counters, ExactCircle, FromController, Identity, MAX_FRAME,
     MotionState, PROTOCOL_VERSION, Probation, Refusal, Reply, SET_POINTS, SUPERVISE_MS, SetPoints, Status,
 };
 use session::{Session, Turn};
@@ -311,7 +311,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     }
 
     #[inline(never)]
-    fn run_circle(&mut self, run: &CircleRun) -> Result<(), Refusal> {
+    fn run_circle(&mut self, run: &ExactCircle) -> Result<(), Refusal> {
         self.idle()?;
         bounds::check_run(run).map_err(Refusal::Motion)?;
         if self.probation == Probation::FirstRun {

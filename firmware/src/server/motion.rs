@@ -1,5 +1,5 @@
 //! What the server needs of an engine.
-use giotto_shared::wire::{CircleRun, FaultCause, MotionRefusal, MotionState, Pose, Refusal, SetPoint};
+use giotto_shared::wire::{ExactCircle, FaultCause, MotionRefusal, MotionState, Pose, Refusal, SetPoint};
 
 /// The engine as its tick last left it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,7 +62,7 @@ pub trait Motion {
     ///
     /// # Errors
     /// Any [`MotionRefusal`]; nothing has started then.
-    fn run_circle(&mut self, run: &CircleRun) -> Result<(), MotionRefusal>;
+    fn run_circle(&mut self, run: &ExactCircle) -> Result<(), MotionRefusal>;
 
     /// Stops within limits.
     fn stop(&mut self);

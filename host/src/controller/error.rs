@@ -1,4 +1,5 @@
 //! What can go wrong between host and controller, and what to do about it.
+use giotto_shared::path::PathError;
 use giotto_shared::table::TableError;
 use giotto_shared::wire::{MotionRefusal, Refusal};
 use std::path::PathBuf;
@@ -77,6 +78,9 @@ pub enum ControllerError {
         /// First byte that differs.
         offset: usize,
     },
+    /// A path that no controller could be told.
+    #[error("{0}")]
+    Path(#[from] PathError),
     /// The table itself is wrong.
     #[error("{0}")]
     Table(#[from] TableError),
@@ -124,6 +128,7 @@ impl ControllerError {
                 "use the giotto and the firmware of the same release"
             }
             Self::Refused(refusal) => return refusal_help(refusal),
+            Self::Path(_) => "choose numbers inside what is possible",
             Self::ReadBack { .. } => "the table in use is untouched; flash again, and replace worn flash",
             Self::Table(TableError::NewerVersion { .. }) => "use the giotto that wrote it, or a newer one",
             Self::Table(_) => "make the table anew with `giotto table MODEL.toml -o TABLE.bin`",

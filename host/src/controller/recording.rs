@@ -2,7 +2,8 @@
 use super::client::Controller;
 use super::error::ControllerError;
 use giotto_shared::Direction;
-use giotto_shared::wire::{CircleRun, Command, MotionState, Pose, SUPERVISE_MS};
+use giotto_shared::path::CircleRun;
+use giotto_shared::wire::{Command, MotionState, Pose, SUPERVISE_MS};
 use std::time::Duration;
 
 /// How often the controller hears from us during a run, by the link's clock, so that it does not take us for dead.
@@ -41,9 +42,9 @@ impl Controller {
     /// Starts circles; returns at once.
     ///
     /// # Errors
-    /// [`ControllerError::Refused`] and those of the link.
+    /// [`ControllerError::Path`], [`ControllerError::Refused`] and those of the link.
     pub fn start_circle(&mut self, circle: &CircleRun) -> Result<(), ControllerError> {
-        self.command(Command::RunCircle(*circle))
+        self.command(Command::RunCircle(circle.exact()?))
     }
 
     /// Runs circles to their end and returns every `every`th set-point.

@@ -1,11 +1,10 @@
 //! The bytes in the pages on protocol and table.
 use super::holds;
 use giotto_shared::model::Cumulants;
+use giotto_shared::path::CircleRun;
 use giotto_shared::table::{self, Limits, Table, Travel, Zone};
 use giotto_shared::term::Term;
-use giotto_shared::wire::{
-    self, CircleRun, Command, FromController, MAX_FRAME, Reply, Request, SetPoint, SetPoints,
-};
+use giotto_shared::wire::{self, Command, FromController, MAX_FRAME, Reply, Request, SetPoint, SetPoints};
 use giotto_shared::{Axis, Direction};
 use serde::Serialize;
 
@@ -55,7 +54,7 @@ fn frames_are_those_of_the_page() {
         laps: 2,
         start_rad: 0.0,
     };
-    holds(page, "bytes circle", &frame(&request(3, Command::RunCircle(circle))));
+    holds(page, "bytes circle", &frame(&request(3, Command::RunCircle(circle.exact().unwrap()))));
     let point = SetPoint { raw_nm: [50_000_000, 0, 0], corrected_nm: [50_012_000, 0, 0] };
     let points = std::iter::once(point).collect();
     let batch = FromController::SetPoints(SetPoints { tick: 1000, every: 10, last: false, points });
@@ -88,7 +87,7 @@ fn the_numbers_of_requests_are_those_of_the_page() {
         ("Confirm", Command::Confirm),
         ("Rollback", Command::Rollback),
         ("Bypass", Command::Bypass { on: true }),
-        ("RunCircle", Command::RunCircle(circle)),
+        ("RunCircle", Command::RunCircle(circle.exact().unwrap())),
         ("Stop", Command::Stop),
         ("Subscribe", Command::Subscribe { every: 1, on_link: true }),
         ("Reset", Command::Reset),

@@ -1,10 +1,9 @@
 //! What a program asks for. SI, machine coordinates.
 use crate::Direction;
-use serde::{Deserialize, Serialize};
 
 /// Full circles in the plane Z = const: an entry that gains speed along the circle, whole turns at constant feed,
 /// an exit that loses it along the circle.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CircleRun {
     /// Centre, m.
     pub centre_m: [f64; 3],
@@ -21,7 +20,7 @@ pub struct CircleRun {
 }
 
 /// One piece of a path, starting where the one before it ended.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Segment {
     /// Straight to a point.
     Line {

@@ -1,10 +1,10 @@
 //! The messages. A change here is a change of [`PROTOCOL_VERSION`].
 use super::Refusal;
-use crate::path::CircleRun;
+use crate::path::ExactCircle;
 use serde::{Deserialize, Serialize};
 
 /// Version of the messages of this build; both sides must have the same.
-pub const PROTOCOL_VERSION: u16 = 2;
+pub const PROTOCOL_VERSION: u16 = 3;
 
 /// Most bytes of a table in one message.
 pub const CHUNK: usize = 128;
@@ -73,7 +73,7 @@ pub enum Command {
         on: bool,
     },
     /// Run circles.
-    RunCircle(CircleRun),
+    RunCircle(ExactCircle),
     /// Stop within limits.
     Stop,
     /// Send every so many ticks' set-point while a run is in progress; 0: none.

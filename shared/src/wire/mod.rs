@@ -20,15 +20,15 @@ pub mod frame;
 pub mod message;
 pub mod refusal;
 
-/// A circle is asked for as the engine takes it.
-pub use crate::path::CircleRun;
+/// Paths are asked for in the engine's own numbers.
+pub use crate::path::{ExactArc, ExactCircle, ExactSegment, Quantity};
 pub use frame::{Accumulator, FrameCounts, MAX_FRAME, MAX_PAYLOAD, encode};
 pub use message::{
     CHUNK, Chunk, Command, Counters, FaultCause, FromController, Identity, MotionState, PROTOCOL_VERSION,
     Pose, Probation, Reply, Request, SET_POINTS, SUPERVISE_MS, SetPoint, SetPoints, SlotState, Status,
     TableInfo,
 };
-pub use refusal::{FlashFault, MotionRefusal, Refusal, RunField};
+pub use refusal::{FlashFault, MotionRefusal, Refusal};
 
 /// CRC-32 ISO-HDLC, of frames and tables alike (check value cbf43926).
 pub const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);

@@ -1,4 +1,5 @@
 //! Why a controller says no, in a form the host can put into words.
+use crate::path::Quantity;
 use crate::table::TableError;
 use serde::{Deserialize, Serialize};
 
@@ -90,32 +91,14 @@ pub enum FlashFault {
     Full,
 }
 
-/// Which number of a run is out of bounds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
-#[allow(missing_docs, reason = "the name is the field of the run")]
-pub enum RunField {
-    #[error("radius (m)")]
-    Radius,
-    #[error("feed (m/s)")]
-    Feed,
-    #[error("laps")]
-    Laps,
-    #[error("centre (m)")]
-    Centre,
-    #[error("start angle (rad)")]
-    Start,
-    #[error("centripetal acceleration (m/s^2)")]
-    Acceleration,
-}
-
 /// Why the engine does not start.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
 pub enum MotionRefusal {
     /// A number beyond the bounds of the image, or not a number.
-    #[error("{field} is {value}, allowed are {lo} to {hi}")]
+    #[error("{quantity} is {value}, allowed are {lo} to {hi}")]
     OutOfBounds {
         /// Which.
-        field: RunField,
+        quantity: Quantity,
         /// Its value.
         value: f32,
         /// Smallest allowed.
@@ -123,9 +106,9 @@ pub enum MotionRefusal {
         /// Largest allowed.
         hi: f32,
     },
-    /// Each number is inside its bounds, but the path or its duration is not.
-    #[error("the path does not fit the feed, the workspace or the time of this controller")]
-    Unreachable,
+    /// Not a number, or one that does not fit what this controller can plan.
+    #[error("{0}: does not fit the feed, the workspace or the time of this controller")]
+    Path(Quantity),
     /// The queue of segments is full.
     #[error("no room in the queue of segments")]
     QueueFull,

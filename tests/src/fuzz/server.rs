@@ -1,7 +1,7 @@
 //! The server's state machine, with the engine behind it: a conversation of frames, raw bytes, time and resets.
 use super::bench::{Bench, Flash};
 use giotto_shared::wire::{
-    self, Accumulator, CHUNK, CRC, Chunk, CircleRun, Command, FromController, MAX_FRAME, Reply, Request,
+    self, Accumulator, CHUNK, CRC, Chunk, Command, ExactCircle, FromController, MAX_FRAME, Reply, Request,
     Status,
 };
 
@@ -118,18 +118,18 @@ pub fn run(bytes: &[u8]) {
             7 => drop(talk.ask(Command::Rollback)),
             8 => drop(talk.ask(Command::Bypass { on: step > 128 })),
             9 => {
-                let number = |byte: Option<u8>| f64::from(byte.unwrap_or(1)) / 255.0;
-                let run = CircleRun {
-                    centre_m: [number(script.byte()) - 0.5, 0.0, 0.0],
-                    radius_m: number(script.byte()),
-                    feed_m_s: 2.0 * number(script.byte()),
+                let mut number = || f32::from(script.byte().unwrap_or(1)) / 255.0;
+                let run = ExactCircle {
+                    centre_nm: [((number() - 0.5) * 1e9) as i32, 0, 0],
+                    radius_half_nm: (number() * 2e9) as i32,
+                    feed_m_s: 2.0 * number(),
                     direction: if step > 128 {
                         giotto_shared::Direction::Cw
                     } else {
                         giotto_shared::Direction::Ccw
                     },
                     laps: 1,
-                    start_rad: 6.0 * number(script.byte()),
+                    start: (number() * 4e9) as u32,
                 };
                 drop(talk.ask(Command::RunCircle(run)));
             }

@@ -1,107 +1,84 @@
-//! Arcs and helices of a program. Their geometry is worked out in double precision: a metre in nanometres is beyond single.
-use super::numbers::{finite, positive, to_half_nm, to_nm};
+//! Arcs and helices of a program. Whoever asks for one has worked out its vectors; here they are looked at: a plane that
+//! is none, or a start elsewhere, must not move a machine, wherever it comes from.
+use super::numbers::{arm, dot, inside, length, positive, to_m};
 use super::round::{MAX_GAIN, Round};
-use super::timing::Way;
+use super::timing::{TURNS_PER_UNIT, Way};
 use super::{Planner, Refused};
-use crate::engine::config::{MAX_POSITION_M, MAX_RADIUS_M};
 use crate::engine::planned::Planned;
-use core::f64::consts::TAU;
-use giotto_shared::fixed::rounded;
+use core::f32::consts::TAU;
+use giotto_shared::path::{ExactArc, MAX_RADIUS_M, MAX_TURNS, MIN_FRACTION, MIN_RADIUS_M, Quantity};
 
-/// Units of phase in a turn.
-const TURN: f64 = 18_446_744_073_709_551_616.0;
+/// Vectors of a plane may be so far from square or equally long, m and of the radius: what rounding them leaves.
+const SLACK: [f32; 2] = [1.5e-9, 1e-6];
+/// Farthest start from where the machine stands, nm: what rounding of centre and vectors leaves.
+const MAX_GAP_NM: u32 = 4;
 
-/// What a program says of an arc, SI.
-pub(super) struct Arc {
-    pub(super) centre: [f64; 3],
-    pub(super) normal: [f64; 3],
-    pub(super) sweep: f64,
-    pub(super) rise: f64,
-    pub(super) feed: f64,
+/// Vectors that are a circle's, and a rise square to them.
+fn is_plane(u: [f32; 3], v: [f32; 3], rise: [f32; 3], radius: f32) -> bool {
+    let [rounding, share] = SLACK;
+    let slack = rounding + share * radius;
+    let square = |a: f32, slack: f32| a.abs() <= slack * radius;
+    let across = rounding + share * length(rise);
+    (length(v) - radius).abs() <= slack
+        && square(dot(u, v), slack)
+        && square(dot(u, rise), across)
+        && square(dot(v, rise), across)
 }
 
 impl Planner {
     /// From where the last segment ends.
-    pub(super) fn arc(&mut self, arc: &Arc, segment: &mut Planned) -> Result<(), Refused> {
-        finite(&arc.centre, "centre")?;
-        finite(&arc.normal, "normal")?;
-        finite(&[arc.sweep, arc.rise], "sweep and rise")?;
-        let feed = positive(arc.feed, "feed")?;
+    pub(super) fn arc(&mut self, arc: &ExactArc, segment: &mut Planned) -> Result<(), Refused> {
+        let feed = positive(arc.feed_m_s, Quantity::Feed)?;
         self.check_feed(feed)?;
-        let n = unit(arc.normal).ok_or(Refused::NotANumber("normal"))?;
-        let from = self.position_nm.map(|p| f64::from(p) * 1e-9);
-        // The centre may be given anywhere on the axis: its foot is the centre.
-        let height = dot(sub(from, arc.centre), n);
-        let centre = add(arc.centre, n.map(|n| height * n));
-        let u = sub(from, centre);
-        let radius = libm::sqrt(dot(u, u));
-        if !(1e-6..=MAX_RADIUS_M).contains(&radius) {
-            return Err(Refused::OutOfBounds("radius"));
+        inside(&arc.centre_nm, Quantity::Centre)?;
+        inside(&arc.rise_nm, Quantity::Rise)?;
+        let (u, v, rise) = (arm(arc.u_half_nm), arm(arc.v_half_nm), to_m(arc.rise_nm));
+        let radius = length(u);
+        if !(MIN_RADIUS_M as f32 * 0.999..=MAX_RADIUS_M as f32 * 1.001).contains(&radius) {
+            return Err(Refused::OutOfBounds(Quantity::Radius));
         }
-        let sign = if arc.sweep < 0.0 { -1.0 } else { 1.0 };
-        let sweep = libm::fabs(arc.sweep);
-        if !(1e-9..=1e6 * TAU).contains(&sweep) {
-            return Err(Refused::OutOfBounds("sweep"));
+        if !is_plane(u, v, rise, radius) {
+            return Err(Refused::OutOfBounds(Quantity::Plane));
         }
-        let rise_per_turn = n.map(|n| n * arc.rise * TAU / sweep);
-        // Steeper than that it is more of a line: the travel of a whole turn would not fit into a coordinate.
-        if rise_per_turn.iter().any(|travel| libm::fabs(*travel) > MAX_POSITION_M) {
-            return Err(Refused::OutOfBounds("rise"));
+        if arc.turns > MAX_TURNS || (arc.turns == 0 && arc.fraction < MIN_FRACTION) {
+            return Err(Refused::OutOfBounds(Quantity::Sweep));
         }
-        let slope = (libm::fabs(arc.rise) / (sweep * radius)) as f32;
-        let [_, _, up] = n;
+        if arc.gap_nm(self.position_nm).iter().any(|gap| gap.unsigned_abs() > MAX_GAP_NM) {
+            return Err(Refused::OutOfBounds(Quantity::Gap));
+        }
+        let end = arc.end_nm(self.position_nm);
+        inside(&end, Quantity::Position)?;
+        let slope = length(rise) / (TAU * radius);
+        let ([ux, uy, _], [vx, vy, _]) = (u, v);
         let round = Round {
-            centre_nm: to_nm(&centre, "centre")?,
-            u: u.map(to_half_nm),
-            v: cross(n, u).map(|v| to_half_nm(sign * v)),
-            rise_nm: rise_per_turn.map(|travel| rounded(travel, 1e9) as i32),
-            radius_m: radius as f32,
+            centre_nm: arc.centre_nm,
+            u: arc.u_half_nm,
+            v: arc.v_half_nm,
+            rise_nm: arc.rise_nm,
+            radius_m: radius,
             feed_m_s: feed,
-            ccw: up * sign >= 0.0,
+            // A plane that stands upright counts as one, whatever rounding says.
+            ccw: ux * vy - uy * vx >= -1e-6 * radius * radius,
             steep: libm::sqrtf(1.0 + slope * slope),
         };
-        let turns = libm::floor(sweep / TAU);
-        let way = Way { turns: turns as u32, fraction: ((sweep / TAU - turns) * TURN) as u64 };
+        let way = Way { turns: arc.turns, fraction: arc.fraction };
         // Centripetal acceleration, with what the correction adds, takes at most nine tenths of the limit.
         let limit = self.machine.acceleration_m_s2;
-        let feed = feed.min(libm::sqrtf(0.9 / (1.0 + MAX_GAIN) * limit * round.radius_m));
+        let feed = feed.min(libm::sqrtf(0.9 / (1.0 + MAX_GAIN) * limit * radius));
         // The feed is that in the plane: a steep helix is slower, so that feed and acceleration hold along its axis too.
         let feed = feed.min(self.machine.feed_m_s / slope.max(1e-9));
-        let length = (sweep * radius) as f32;
+        let angle = (arc.turns as f32 + arc.fraction as f32 * TURNS_PER_UNIT) * TAU;
         let timing = |stretch: f32| {
-            let (ramp_ticks, cruise_ticks) = self.profile(length, feed, stretch)?;
-            way.share_out(ramp_ticks, cruise_ticks).ok_or(Refused::OutOfBounds("feed"))
+            let (ramp_ticks, cruise_ticks) = self.profile(angle * radius, feed, stretch)?;
+            way.share_out(ramp_ticks, cruise_ticks).ok_or(Refused::OutOfBounds(Quantity::Feed))
         };
         self.round(&round, limit, &timing, segment)?;
-        // Rounding of centre and radius must not show as a gap at the start: move the arc by that nm or two.
-        let ends = segment.end_nm.iter_mut().zip(segment.start_nm).zip(self.position_nm);
-        for (axis, ((end, start), here)) in segment.axes.iter_mut().zip(ends) {
-            let gap = here.wrapping_sub(start);
-            (axis.base, *end) = (axis.base.wrapping_add(gap), end.wrapping_add(gap));
+        // Rounding of centre and radius must not show as a gap at the start: the arc moves by that nm or two.
+        for (axis, gap) in segment.axes.iter_mut().zip(arc.gap_nm(self.position_nm)) {
+            axis.base = axis.base.wrapping_add(gap);
         }
-        segment.start_nm = self.position_nm;
-        self.position_nm = segment.end_nm;
+        (segment.start_nm, segment.end_nm) = (self.position_nm, end);
+        self.position_nm = end;
         Ok(())
     }
-}
-
-fn dot([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> f64 {
-    a * x + b * y + c * z
-}
-
-fn add([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
-    [a + x, b + y, c + z]
-}
-
-fn sub([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
-    [a - x, b - y, c - z]
-}
-
-fn cross([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
-    [b * z - c * y, c * x - a * z, a * y - b * x]
-}
-
-fn unit(a: [f64; 3]) -> Option<[f64; 3]> {
-    let length = libm::sqrt(dot(a, a));
-    (length > 1e-12).then(|| a.map(|x| x / length))
 }

@@ -7,6 +7,7 @@ use super::{Planner, Refused, terms, worst};
 use crate::engine::planned::{Axis, Kind, Planned};
 use crate::engine::zones::Asked;
 use giotto_shared::fixed::single_to_fixed;
+use giotto_shared::path::Quantity;
 
 impl Planner {
     /// To a place, at no more than a feed.
@@ -15,7 +16,7 @@ impl Planner {
         let from = self.position_nm;
         let mut span_nm = [0; 3];
         for ((span, to), from) in span_nm.iter_mut().zip(to).zip(from) {
-            *span = to.checked_sub(from).ok_or(Refused::OutOfBounds("length"))?;
+            *span = to.checked_sub(from).ok_or(Refused::OutOfBounds(Quantity::Length))?;
         }
         if span_nm == [0; 3] {
             self.dwell(1, segment);
@@ -30,7 +31,8 @@ impl Planner {
         let mut stretch = 1.0;
         let (timing, law) = loop {
             let (ramp_ticks, cruise_ticks) = self.profile(whole, feed, stretch)?;
-            let timing = Way::LINE.share_out(ramp_ticks, cruise_ticks).ok_or(Refused::OutOfBounds("feed"))?;
+            let timing =
+                Way::LINE.share_out(ramp_ticks, cruise_ticks).ok_or(Refused::OutOfBounds(Quantity::Feed))?;
             let speed = turns_per_tick(&timing) / Way::LINE_TURNS * whole * self.machine.rate_hz;
             let ramp_s = ramp_ticks as f32 * self.machine.tick_s;
             let law = zone.as_ref().map(|zone| LineLaw::new(zone, speed, ramp_s));
@@ -65,7 +67,7 @@ impl Planner {
                 segment.extra = terms::on_line(&profile, &motion, span, seen);
                 segment.extended = true;
                 if !segment.extra.within_numbers() {
-                    return Err(Refused::OutOfBounds("profile term"));
+                    return Err(Refused::OutOfBounds(Quantity::Terms));
                 }
             }
         }

@@ -1,6 +1,6 @@
 //! From what a program asks for to integers that the tick runs. Runs in the background.
 //!
-//! Places and angles are exact: double precision at the border, then whole nanometres and phases. The correction is
+//! Places and angles come exact, as whole nanometres and phases, and stay so. The correction is
 //! millimetres at most and computed in single precision, which a Cortex-M4F has; 24 bits of them are below a nanometre.
 //!
 //! | file | plans |
@@ -11,7 +11,7 @@
 //! | `law`, `terms` | the correction, from the numbers of a zone to those of the tick |
 //! | `worst`, `demand` | what a path asks for at most, and the ramp that keeps it within the bounds |
 //! | `machine` | the configuration, in the form that planning needs |
-//! | `timing`, `numbers` | phases, ticks, numbers at the border |
+//! | `timing`, `numbers` | phases, ticks; numbers at the border, vectors |
 mod arc;
 mod circle;
 mod demand;
@@ -29,25 +29,33 @@ use super::planned::{Planned, Timing};
 use super::ramp::clock_step;
 use super::stream::{StreamNeeds, StreamPlan};
 use super::zones::{Asked, ZoneError, Zones};
-use arc::Arc;
 use demand::Bounds;
-use giotto_shared::path::Segment;
+use giotto_shared::path::{ExactSegment, PathError, Quantity};
 use giotto_shared::table::Table;
 use machine::Machine;
-use numbers::{positive, to_m, to_nm};
+use numbers::{inside, positive, to_m};
 use timing::{Motion, turns_per_tick};
 
 /// Why a segment was not accepted. Nothing has moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refused {
     /// A number is not finite, or not positive where it must be.
-    NotANumber(&'static str),
+    NotANumber(Quantity),
     /// Beyond what the configuration or the image allows.
-    OutOfBounds(&'static str),
+    OutOfBounds(Quantity),
     /// The queue is full, or the engine is not at rest where it has to be.
     Busy,
     /// A fault has to be cleared first.
     Fault,
+}
+
+impl From<PathError> for Refused {
+    fn from(error: PathError) -> Self {
+        match error {
+            PathError::NotANumber(quantity) => Self::NotANumber(quantity),
+            PathError::OutOfBounds { quantity, .. } => Self::OutOfBounds(quantity),
+        }
+    }
 }
 
 /// The engine's slow half: plans segments one after the other.
@@ -106,32 +114,29 @@ impl Planner {
         self.position_nm = position_nm;
     }
 
-    /// One segment from where the last one ends.
-    pub fn segment(&mut self, segment: &Segment) -> Result<Planned, Refused> {
-        let mut planned = Planned::default();
-        match *segment {
-            Segment::Line { to_m, feed_m_s } => {
-                let to = to_nm(&to_m, "end")?;
-                self.line_to(to, positive(feed_m_s, "feed")?, &mut planned)?;
+    /// One segment from where the last one ends, written in place: it is large.
+    #[inline(never)]
+    pub fn segment(&mut self, segment: &ExactSegment, planned: &mut Planned) -> Result<(), Refused> {
+        match segment {
+            ExactSegment::Line { to_nm, feed_m_s } => {
+                inside(to_nm, Quantity::Position)?;
+                self.line_to(*to_nm, positive(*feed_m_s, Quantity::Feed)?, planned)
             }
-            Segment::Arc { centre_m, normal, sweep_rad, rise_m, feed_m_s } => {
-                let arc = Arc { centre: centre_m, normal, sweep: sweep_rad, rise: rise_m, feed: feed_m_s };
-                self.arc(&arc, &mut planned)?;
-            }
-            Segment::Dwell { time_s } => {
-                let ticks = whole_above(positive(time_s, "time")? * self.machine.rate_hz);
+            ExactSegment::Arc(arc) => self.arc(arc, planned),
+            ExactSegment::Dwell { time_s } => {
+                let ticks = whole_above(positive(*time_s, Quantity::Time)? * self.machine.rate_hz);
                 if ticks == u32::MAX {
-                    return Err(Refused::OutOfBounds("time"));
+                    return Err(Refused::OutOfBounds(Quantity::Time));
                 }
-                self.dwell(ticks, &mut planned);
+                self.dwell(ticks, planned);
+                Ok(())
             }
         }
-        Ok(planned)
     }
 
     /// A stream of set-points from where the last segment ends, at no more than a feed; its zone is chosen there.
-    pub fn stream(&self, feed_m_s: f64) -> Result<StreamPlan, Refused> {
-        let feed_m_s = positive(feed_m_s, "feed")?;
+    pub fn stream(&self, feed_m_s: f32) -> Result<StreamPlan, Refused> {
+        let feed_m_s = positive(feed_m_s, Quantity::Feed)?;
         self.check_feed(feed_m_s)?;
         let place_m = to_m(self.position_nm);
         let zone = self.zones.choose(&Asked { place_m, radius_m: None, feed_m_s, ccw: None });
@@ -146,7 +151,7 @@ impl Planner {
             engage_ticks: self.machine.engage_ticks,
             bounds_nm: self.machine.bounds_nm(bounds.offset_m, bounds.slew_m_s),
         };
-        StreamPlan::build(&needs).ok_or(Refused::OutOfBounds("stream window"))
+        StreamPlan::build(&needs).ok_or(Refused::OutOfBounds(Quantity::Window))
     }
 
     fn dwell(&self, ticks: u32, segment: &mut Planned) {
@@ -169,7 +174,7 @@ impl Planner {
         let ramp_ticks = self.machine.ramp_ticks(feed, stretch);
         let ticks = whole_above(length / feed * self.machine.rate_hz);
         if ticks == u32::MAX {
-            return Err(Refused::OutOfBounds("duration"));
+            return Err(Refused::OutOfBounds(Quantity::Time));
         }
         Ok((ramp_ticks, ticks.saturating_sub(ramp_ticks)))
     }
@@ -215,6 +220,6 @@ impl Planner {
     }
 
     fn check_feed(&self, feed: f32) -> Result<(), Refused> {
-        if feed > self.machine.feed_m_s { Err(Refused::OutOfBounds("feed")) } else { Ok(()) }
+        if feed > self.machine.feed_m_s { Err(Refused::OutOfBounds(Quantity::Feed)) } else { Ok(()) }
     }
 }

@@ -1,37 +1,19 @@
-//! Numbers at the border: what a program gives in double precision becomes whole nanometres and single precision here.
+//! Numbers at the border, which may be anything, and vectors in single precision.
 use super::Refused;
-use crate::engine::config::MAX_POSITION_M;
-use giotto_shared::fixed::rounded;
+use giotto_shared::path::{MAX_POSITION_M, Quantity};
 
-/// Nanometres in a metre.
-const NM: f64 = 1e9;
 /// Largest coordinate, nm.
-const MAX_POSITION_NM: u64 = (MAX_POSITION_M * NM) as u64;
+const MAX_POSITION_NM: u32 = (MAX_POSITION_M * 1e9) as u32;
 
-/// Every number is finite, and of a size that single precision has.
-pub(super) fn finite(values: &[f64], name: &'static str) -> Result<(), Refused> {
-    if values.iter().all(|v| (*v as f32).is_finite()) { Ok(()) } else { Err(Refused::NotANumber(name)) }
+/// Finite and above 0.
+pub(super) fn positive(value: f32, quantity: Quantity) -> Result<f32, Refused> {
+    if value.is_finite() && value > 0.0 { Ok(value) } else { Err(Refused::NotANumber(quantity)) }
 }
 
-/// In single precision, finite and above 0.
-pub(super) fn positive(value: f64, name: &'static str) -> Result<f32, Refused> {
-    let single = value as f32;
-    if single.is_finite() && single > 0.0 { Ok(single) } else { Err(Refused::NotANumber(name)) }
-}
-
-/// A place, nm.
-pub(super) fn to_nm(metres: &[f64; 3], name: &'static str) -> Result<[i32; 3], Refused> {
-    finite(metres, name)?;
-    let nm = metres.map(|m| rounded(m, NM));
-    if nm.iter().any(|nm| nm.unsigned_abs() > MAX_POSITION_NM) {
-        return Err(Refused::OutOfBounds("position"));
-    }
-    Ok(nm.map(|nm| nm as i32))
-}
-
-/// A length in half nanometres, one on an arm of a circle; for lengths up to [`MAX_RADIUS_M`](crate::engine::MAX_RADIUS_M).
-pub(super) fn to_half_nm(metres: f64) -> i32 {
-    rounded(metres, 2.0 * NM) as i32
+/// Every coordinate is one that the engine can hold.
+pub(super) fn inside(place_nm: &[i32; 3], quantity: Quantity) -> Result<(), Refused> {
+    let inside = place_nm.iter().all(|nm| nm.unsigned_abs() <= MAX_POSITION_NM);
+    if inside { Ok(()) } else { Err(Refused::OutOfBounds(quantity)) }
 }
 
 /// Metres from nanometres, to 24 bits.
@@ -39,9 +21,18 @@ pub(super) fn to_m(nm: [i32; 3]) -> [f32; 3] {
     nm.map(|nm| nm as f32 * 1e-9)
 }
 
+/// Metres from half nanometres, to 24 bits.
+pub(super) fn arm(half_nm: [i32; 3]) -> [f32; 3] {
+    half_nm.map(|half_nm| half_nm as f32 * 0.5e-9)
+}
+
+pub(super) fn dot([a, b, c]: [f32; 3], [x, y, z]: [f32; 3]) -> f32 {
+    a * x + b * y + c * z
+}
+
 /// Length of a vector.
-pub(super) fn length([x, y, z]: [f32; 3]) -> f32 {
-    libm::sqrtf(x * x + y * y + z * z)
+pub(super) fn length(v: [f32; 3]) -> f32 {
+    libm::sqrtf(dot(v, v))
 }
 
 /// X and Y of a point seen from another.

@@ -1,16 +1,15 @@
 //! What circles, arcs and helices have in common: the law on them, and ramps long enough for it.
 use super::demand::Demand;
 use super::law::ArcLaw;
-use super::numbers::{length, seen_from, to_m};
-use super::timing::{Motion, end_term, travel};
+use super::numbers::{arm, length, seen_from, to_m};
+use super::timing::{Motion, end_term};
 use super::worst::{self, Worst};
 use super::{Planner, Refused, terms};
-use crate::engine::config::MAX_POSITION_M;
 use crate::engine::planned::{Axis, Kind, Planned, Timing};
 use crate::engine::zones::{Asked, Built};
 use core::f32::consts::TAU;
-use giotto_shared::angle::sincos;
 use giotto_shared::fixed::single_to_fixed;
+use giotto_shared::path::{MAX_POSITION_M, Quantity};
 
 /// Most share of the radius by which the fixed-point law can move a circle.
 pub(super) const MAX_GAIN: f32 = 0.12;
@@ -34,11 +33,6 @@ pub(super) struct Round {
 }
 
 impl Round {
-    /// A vector of the plane, m.
-    fn arm(vector: [i32; 3]) -> [f32; 3] {
-        vector.map(|half_nm| half_nm as f32 * 0.5e-9)
-    }
-
     /// The centre seen from where position errors of a zone are counted from.
     fn seen(&self, zone: &Built) -> [f32; 2] {
         let centre = to_m(self.centre_nm);
@@ -47,7 +41,7 @@ impl Round {
 }
 
 impl Planner {
-    /// Plans with the shortest ramp in which acceleration, offset and slew keep their bounds; `timing` makes it from a factor on
+    /// All but where it starts and ends, with the shortest ramp in which acceleration, offset and slew keep their bounds; `timing` makes it from a factor on
     /// the quickest. Where constant rate alone is beyond the bounds of the table, no ramp can help: the tick cuts and counts.
     pub(super) fn round(
         &self,
@@ -58,7 +52,7 @@ impl Planner {
     ) -> Result<(), Refused> {
         let place_m = to_m(round.centre_nm);
         if round.radius_m + length(place_m) > MAX_POSITION_M as f32 {
-            return Err(Refused::OutOfBounds("position"));
+            return Err(Refused::OutOfBounds(Quantity::Position));
         }
         let radius_m = Some(round.radius_m);
         let asked = Asked { place_m, radius_m, feed_m_s: round.feed_m_s, ccw: Some(round.ccw) };
@@ -103,15 +97,6 @@ impl Planner {
         }
         segment.rise.end_term_q1 = end_term(&timing);
         segment.fall = segment.rise.turned_round();
-        let at = |phase: u64| {
-            let (c, s) = sincos((phase >> 32) as u32);
-            segment.axes.map(|axis| axis.on_arc(c, s))
-        };
-        let (start_nm, [x, y, z]) = (at(timing.start), at(timing.end));
-        let (turns, fraction_q32) = travel(&timing);
-        let [rx, ry, rz] = segment.risen(turns, fraction_q32);
-        segment.end_nm = [x.wrapping_add(rx), y.wrapping_add(ry), z.wrapping_add(rz)];
-        segment.start_nm = start_nm;
         Ok(())
     }
 
@@ -133,9 +118,9 @@ fn correct(
         (axis.a, axis.b) = (share(axis.u), share(axis.v));
     }
     let Some(profile) = &zone.profile else { return Ok(()) };
-    let extra = terms::on_arc(profile, motion, Round::arm(round.u), Round::arm(round.v), round.seen(zone));
+    let extra = terms::on_arc(profile, motion, arm(round.u), arm(round.v), round.seen(zone));
     if !extra.within_numbers() {
-        return Err(Refused::OutOfBounds("profile term"));
+        return Err(Refused::OutOfBounds(Quantity::Terms));
     }
     for (axis, linear) in segment.axes.iter_mut().zip(&extra.linear) {
         let (a, b) = linear.steady();

@@ -5,7 +5,7 @@ use crate::engine::ramp::FIRST;
 use crate::engine::sides::FINE;
 use core::f32::consts::TAU;
 use core::num::NonZeroU64;
-use giotto_shared::angle::{RAD_PER_UNIT, phase_from_rad, sincos};
+use giotto_shared::angle::{RAD_PER_UNIT, sincos};
 use giotto_shared::fixed::single_to_fixed;
 use giotto_shared::law::{CyclicError, Profile};
 
@@ -125,15 +125,20 @@ fn periodic(c: &CyclicError<f32>) -> Cyclic {
         amplitude: axis(nm2(-c.amplitude_m)),
         per_nm: axis(whole as i32),
         rest_q32: axis(rest_q24 << 8),
-        phase: phase_from_rad(f64::from(c.phase_rad)),
+        phase: phase(c.phase_rad),
     }
+}
+
+/// Phase (2³² a turn) of an angle in rad, to the 24 bits of single precision.
+fn phase(angle_rad: f32) -> u32 {
+    (angle_rad * (1.0 / RAD_PER_UNIT) as f32) as i64 as u32
 }
 
 /// Cosine and sine of the angle by which reversals are seen early: the middle of the take-up falls on the reversal, which
 /// is noticed half a tick late on average, and the take-up begins in the next tick.
 fn lead(m: &Motion) -> (f32, f32) {
     let ticks = 0.5 * m.take_up_ticks as f32 + 0.5;
-    let (c, s) = sincos((m.rate * ticks * m.tick_s * (1.0 / RAD_PER_UNIT) as f32) as i64 as u32);
+    let (c, s) = sincos(phase(m.rate * ticks * m.tick_s));
     let real = |q31: i32| q31 as f32 * (1.0 / 2_147_483_648.0);
     (real(c), real(s))
 }

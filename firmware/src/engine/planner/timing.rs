@@ -5,7 +5,7 @@ use core::num::NonZeroU64;
 use giotto_shared::fixed::single_to_fixed;
 
 /// 2⁻⁶⁴: turns in a unit of phase.
-const TURNS_PER_UNIT: f32 = 1.0 / 18_446_744_073_709_551_616.0;
+pub(super) const TURNS_PER_UNIT: f32 = 1.0 / 18_446_744_073_709_551_616.0;
 
 /// What laws and terms need of a motion. SI.
 #[derive(Clone, Copy, Debug)]
@@ -75,14 +75,6 @@ pub(super) fn turns_per_tick(timing: &Timing) -> f32 {
 pub(super) fn end_term(timing: &Timing) -> i32 {
     let step_q32 = timing.step as f32 / 4_294_967_296.0;
     single_to_fixed(step_q32 / timing.ramp_ticks as f32 * (FIRST / 12.0), 1)
-}
-
-/// From start to end: whole turns, and the rest in units of 2⁻³² turn.
-pub(super) fn travel(timing: &Timing) -> (i32, u32) {
-    let ticks = u64::from(timing.ramp_ticks).saturating_add(u64::from(timing.cruise_ticks));
-    let low = (timing.step & 0xffff_ffff).wrapping_mul(ticks) >> 32;
-    let sum = (timing.step >> 32).wrapping_mul(ticks).wrapping_add(low);
-    ((sum >> 32) as i32, sum as u32)
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! What must hold whatever the program: limits, no jumps, exact ends, stops, bypass, bounds, no drift.
 use super::endurance::{Random, segment};
 use super::{no_jump, run_out, std, table};
-use crate::engine::{CircleRun, Config, Engine, Fault, Output, Refused, Segment, flag};
+use crate::engine::{CircleRun, Config, Engine, Fault, Output, Quantity, Refused, Segment, flag};
 use core::f64::consts::PI;
 use giotto_shared::term::Term;
 use giotto_shared::{Axis, Direction};
@@ -121,7 +121,7 @@ fn random_programs_keep_the_configured_acceleration_on_the_commanded_path() {
         for piece in pieces {
             // Helices too steep are refused.
             let refused = engine.push(&piece).err();
-            assert!(refused.is_none_or(|why| why == Refused::OutOfBounds("rise")), "{refused:?}");
+            assert!(refused.is_none_or(|why| why == Refused::OutOfBounds(Quantity::Rise)), "{refused:?}");
         }
         let out = run_out(&mut engine);
         let (nominal, corrected) = accelerations(&out);

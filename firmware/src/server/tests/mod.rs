@@ -7,6 +7,7 @@ use crate::store::power_cut::{PowerCut, Tear};
 use crate::store::ram::RamFlash;
 use giotto_shared::Direction;
 use giotto_shared::model::Cumulants;
+use giotto_shared::path::CircleRun;
 use giotto_shared::table::{self, Limits, Table, Travel, Zone};
 use giotto_shared::wire::{MotionRefusal, Request, TableInfo};
 use std::boxed::Box;
@@ -70,7 +71,7 @@ impl Motion for Bench {
         self.bypass = on;
     }
 
-    fn run_circle(&mut self, _: &CircleRun) -> Result<(), MotionRefusal> {
+    fn run_circle(&mut self, _: &ExactCircle) -> Result<(), MotionRefusal> {
         self.state = MotionState::Running;
         self.runs += 1;
         Ok(())
@@ -203,12 +204,13 @@ fn image(name: &str) -> Vec<u8> {
 }
 
 fn circle() -> Command {
-    Command::RunCircle(CircleRun {
+    let run = CircleRun {
         centre_m: [0.0; 3],
         radius_m: 0.1,
         feed_m_s: 0.2,
         direction: Direction::Ccw,
         laps: 1,
         start_rad: 0.0,
-    })
+    };
+    Command::RunCircle(run.exact().unwrap())
 }

@@ -173,13 +173,13 @@ fn strangers_and_newer_hosts_are_told() {
 fn runs_out_of_bounds_are_refused() {
     let Command::RunCircle(good) = circle() else { panic!() };
     let bad = [
-        CircleRun { radius_m: f64::NAN, ..good },
-        CircleRun { radius_m: 2.0, ..good },
-        CircleRun { feed_m_s: 0.0, ..good },
-        CircleRun { laps: 0, ..good },
-        CircleRun { start_rad: 7.0, ..good },
-        CircleRun { centre_m: [0.0, f64::INFINITY, 0.0], ..good },
-        CircleRun { radius_m: 0.01, feed_m_s: 1.0, ..good },
+        ExactCircle { radius_half_nm: 0, ..good },
+        ExactCircle { radius_half_nm: -200_000_000, ..good },
+        ExactCircle { radius_half_nm: i32::MAX, ..good },
+        ExactCircle { feed_m_s: 0.0, ..good },
+        ExactCircle { feed_m_s: f32::NAN, ..good },
+        ExactCircle { laps: 0, ..good },
+        ExactCircle { radius_half_nm: 20_000_000, feed_m_s: 1.0, ..good },
     ];
     let mut desk = fresh();
     for run in bad {

@@ -17,7 +17,8 @@ use super::status::words;
 use super::{Failure, Output};
 use crate::campaign::Direction;
 use crate::controller::{Controller, ControllerError};
-use giotto_shared::wire::{CircleRun, Status};
+use giotto_shared::path::CircleRun;
+use giotto_shared::wire::Status;
 use std::io::IsTerminal;
 use std::time::Duration;
 

@@ -1,6 +1,7 @@
 //! The line in a thread of its own, since a controller that is gone takes seconds to be given up.
 use crate::controller::{Controller, ControllerError};
-use giotto_shared::wire::{CircleRun, Command, Identity, SetPoint, Status};
+use giotto_shared::path::CircleRun;
+use giotto_shared::wire::{Command, Identity, SetPoint, Status};
 use std::sync::mpsc::{Receiver, Sender, TryRecvError};
 use std::time::Duration;
 
@@ -83,14 +84,14 @@ fn serve(
     let mut since = interval;
     loop {
         loop {
-            let command = match wishes.try_recv() {
-                Ok(Wish::Bypass(on)) => Command::Bypass { on },
-                Ok(Wish::Stop) => Command::Stop,
-                Ok(Wish::Run(circle)) => Command::RunCircle(circle),
+            let done = match wishes.try_recv() {
+                Ok(Wish::Bypass(on)) => controller.command(Command::Bypass { on }),
+                Ok(Wish::Stop) => controller.command(Command::Stop),
+                Ok(Wish::Run(circle)) => controller.start_circle(&circle),
                 Err(TryRecvError::Empty) => break,
                 Err(TryRecvError::Disconnected) => return None,
             };
-            match controller.command(command) {
+            match done {
                 Err(error) if super::gone(&error) => return Some(error.to_string()),
                 Err(error) => events.send(Event::Refused(error.to_string())).ok()?,
                 Ok(()) => {}

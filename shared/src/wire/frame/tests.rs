@@ -1,6 +1,7 @@
 //! Whatever bytes arrive, the next whole frame is found.
 use super::*;
 use crate::Direction;
+use crate::path::CircleRun;
 use crate::wire::*;
 use proptest::prelude::*;
 use std::vec::Vec;
@@ -87,26 +88,25 @@ fn largest_messages_fit() {
 #[test]
 fn golden_frame() {
     let run = CircleRun {
-        centre_m: [0.0; 3],
+        centre_m: [-0.29, 0.0, 0.0],
         radius_m: 0.1,
         feed_m_s: 0.5,
         direction: Direction::Cw,
         laps: 2,
-        start_rad: 0.0,
+        start_rad: core::f64::consts::FRAC_PI_2,
     };
-    let frame = framed(&Request { session: 1, seq: 300, command: Command::RunCircle(run) });
+    let command = Command::RunCircle(run.exact().unwrap());
+    let frame = framed(&Request { session: 1, seq: 300, command });
     #[rustfmt::skip]
     let payload = [
         1,                                              // session
         0xac, 0x02,                                     // sequence 300
         10,                                             // run circle
-        0, 0, 0, 0, 0, 0, 0, 0,                         // centre
-        0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0,
-        0x9a, 0x99, 0x99, 0x99, 0x99, 0x99, 0xb9, 0x3f, // radius
-        0, 0, 0, 0, 0, 0, 0xe0, 0x3f,                   // feed
+        0xff, 0xb1, 0xc8, 0x94, 0x02, 0, 0,             // centre -290 mm, 0, 0 in nanometres
+        0x80, 0x88, 0xde, 0xbe, 0x01,                   // radius 100 mm in half nanometres
+        0, 0, 0, 0x3f,                                  // feed 0.5 m/s
         1, 2,                                           // clockwise, two laps
-        0, 0, 0, 0, 0, 0, 0, 0,                         // start
+        0x80, 0x80, 0x80, 0x80, 0x04,                   // from a quarter turn
     ];
     let mut accumulator = Accumulator::new();
     let found = frame.iter().find_map(|&byte| accumulator.push(byte).map(<[u8]>::to_vec)).unwrap();
