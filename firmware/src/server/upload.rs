@@ -1,7 +1,7 @@
 //! A table on its way in: bytes in order, counted, checked against what was announced.
 use crate::store::ImageBuffer;
 use giotto_shared::table::MAX_IMAGE_BYTES;
-use giotto_shared::wire::{CRC, Refusal};
+use giotto_shared::wire::{Refusal, crc32};
 
 /// What was announced and what has come.
 #[derive(Debug)]
@@ -54,7 +54,7 @@ impl Upload {
         let (length, crc) = self.announced.take().ok_or(Refusal::NoUpload)?;
         let image = buffer.get(..length).filter(|_| self.received == length);
         let image = image.ok_or(Refusal::UploadIncomplete)?;
-        if CRC.checksum(image) != crc {
+        if crc32(image) != crc {
             return Err(Refusal::UploadIncomplete);
         }
         Ok(length)

@@ -1,5 +1,5 @@
 //! The provisioned public key: 32 bytes, their check, and FF up to 40.
-use giotto_shared::wire::CRC;
+use giotto_shared::wire::Crc32;
 
 /// An Ed25519 public key.
 pub type PublicKey = [u8; 32];
@@ -21,10 +21,7 @@ pub enum StoredKey {
 }
 
 fn check(key: &PublicKey) -> [u8; 4] {
-    let mut digest = CRC.digest();
-    digest.update(b"giotto key");
-    digest.update(key);
-    digest.finalize().to_le_bytes()
+    Crc32::new().with(b"giotto key").with(key).value().to_le_bytes()
 }
 
 pub(super) fn read(bytes: &[u8; KEY_BYTES]) -> Option<PublicKey> {

@@ -1,5 +1,5 @@
 //! A confirmation: generation and check, eight bytes.
-use giotto_shared::wire::CRC;
+use giotto_shared::wire::Crc32;
 
 /// Length of a confirmation.
 pub(super) const RECORD_BYTES: usize = 8;
@@ -11,10 +11,7 @@ pub(super) struct Record {
 }
 
 fn check(generation: [u8; 4], table_crc: u32) -> [u8; 4] {
-    let mut digest = CRC.digest();
-    digest.update(&generation);
-    digest.update(&table_crc.to_le_bytes());
-    digest.finalize().to_le_bytes()
+    Crc32::new().with(&generation).with(&table_crc.to_le_bytes()).value().to_le_bytes()
 }
 
 impl Record {

@@ -3,7 +3,7 @@ use super::client::Controller;
 use super::error::ControllerError;
 use giotto_shared::table::{self, Header};
 use giotto_shared::wire::{
-    CHUNK, CRC, Chunk, Command, FlashFault, Refusal, Reply, SlotState, Status, TableInfo,
+    CHUNK, Chunk, Command, FlashFault, Refusal, Reply, SlotState, Status, TableInfo, crc32,
 };
 
 /// How often an upload begins anew before it is given up.
@@ -117,7 +117,7 @@ impl Controller {
         let max = self.identity().max_image_bytes;
         let length = u16::try_from(image.len()).ok().filter(|length| *length <= max);
         let length = length.ok_or(ControllerError::Refused(Refusal::UploadTooLong { max }))?;
-        self.command(Command::WriteBegin { length, crc: CRC.checksum(image) })?;
+        self.command(Command::WriteBegin { length, crc: crc32(image) })?;
         for (index, piece) in image.chunks(CHUNK).enumerate() {
             let sent = index * CHUNK;
             progress(Progress::Sent(sent, image.len()));

@@ -15,7 +15,7 @@
 //! The CRC is ISO-HDLC (the one of Ethernet and zip). The order of checks is magic, length, CRC, version,
 //! flags, schema, body, numbers: a flipped bit is called a flipped bit, not a newer version.
 use super::{Limits, MAX_TERMS, MAX_ZONES, Table, TableError, Zone};
-use crate::wire::CRC;
+use crate::wire::{Crc32, crc32};
 
 /// First four bytes of a table.
 pub const MAGIC: [u8; 4] = *b"GIOT";
@@ -28,7 +28,7 @@ pub const HEADER_BYTES: usize = 20;
 /// Length of a signature.
 pub const SIGNATURE_BYTES: usize = 64;
 /// Changes when the body's meaning does.
-pub const SCHEMA_HASH: u32 = CRC.checksum(include_bytes!("schema.txt"));
+pub const SCHEMA_HASH: u32 = crc32(include_bytes!("schema.txt"));
 
 /// Longest body: every string, vector and option full, every term the longest (tag, axis, three numbers).
 const MAX_BODY_BYTES: usize = {
@@ -58,10 +58,8 @@ fn word<const N: usize>(bytes: &[u8], at: usize) -> Option<[u8; N]> {
 
 /// CRC-32 of an image without its own CRC field.
 fn crc_of(image: &[u8]) -> u32 {
-    let mut digest = CRC.digest();
-    digest.update(image.get(..12).unwrap_or(&[]));
-    digest.update(image.get(16..).unwrap_or(&[]));
-    digest.finalize()
+    let head = Crc32::new().with(image.get(..12).unwrap_or(&[]));
+    head.with(image.get(16..).unwrap_or(&[])).value()
 }
 
 impl Header {

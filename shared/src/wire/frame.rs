@@ -1,7 +1,8 @@
 //! Frames: `COBS(payload · CRC-32) · 00`. Bytes may be lost, changed or joined anywhere; whatever arrives,
 //! [`Accumulator`] finds the next whole frame after the next zero.
-use super::CRC;
+use super::crc32;
 use cobs::{DecodeResult, DecoderState};
+use postcard::ser_flavors::Flavor;
 use serde::Serialize;
 
 /// Longest payload: the largest message is a batch of set-points.
@@ -10,8 +11,10 @@ pub const MAX_PAYLOAD: usize = 208;
 const CRC_BYTES: usize = 4;
 /// Longest content of a frame before COBS.
 const MAX_CONTENT: usize = MAX_PAYLOAD + CRC_BYTES;
-/// Longest frame with its COBS overhead (one byte in 254, and one) and the closing zero.
-pub const MAX_FRAME: usize = cobs::max_encoding_length(MAX_CONTENT) + 1;
+/// Longest frame with its COBS overhead, one byte, and the closing zero.
+pub const MAX_FRAME: usize = MAX_CONTENT + 2;
+const _: () =
+    assert!(MAX_FRAME == cobs::max_encoding_length(MAX_CONTENT) + 1, "longer ones take more overhead");
 
 /// A message that does not fit into [`MAX_PAYLOAD`] or the buffer. Messages are bounded by their types, so
 /// this is a defect of the build; the tests encode the largest of each kind.
@@ -19,23 +22,66 @@ pub const MAX_FRAME: usize = cobs::max_encoding_length(MAX_CONTENT) + 1;
 #[error("message does not fit into a frame")]
 pub struct TooLong;
 
+/// The place of a payload. Its calls are not inlined into each of the hundreds of places that make one: in an image they
+/// took 2 KB.
+struct Payload<'a> {
+    bytes: &'a mut [u8],
+    length: usize,
+}
+
+impl Flavor for Payload<'_> {
+    type Output = usize;
+
+    #[inline(never)]
+    fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
+        let place = self.bytes.get_mut(self.length).ok_or(postcard::Error::SerializeBufferFull)?;
+        *place = byte;
+        self.length += 1;
+        Ok(())
+    }
+
+    #[inline(never)]
+    fn try_extend(&mut self, bytes: &[u8]) -> postcard::Result<()> {
+        bytes.iter().try_for_each(|byte| self.try_push(*byte))
+    }
+
+    fn finalize(self) -> postcard::Result<usize> {
+        Ok(self.length)
+    }
+}
+
 /// Writes the frame of `message` to the start of `out` and returns it.
 ///
 /// # Errors
 /// [`TooLong`] if the payload exceeds [`MAX_PAYLOAD`] or the frame `out`.
 pub fn encode<'a, M: Serialize>(message: &M, out: &'a mut [u8]) -> Result<&'a mut [u8], TooLong> {
-    let mut content = [0; MAX_CONTENT];
-    let payload = content.get_mut(..MAX_PAYLOAD).ok_or(TooLong)?;
-    let length = postcard::to_slice(message, payload).map_err(|_| TooLong)?.len();
-    let (payload, rest) = content.split_at_mut_checked(length).ok_or(TooLong)?;
-    *rest.first_chunk_mut().ok_or(TooLong)? = CRC.checksum(payload).to_le_bytes();
-    let content = content.get(..length + CRC_BYTES).ok_or(TooLong)?;
-    let mut encoder = cobs::CobsEncoder::new(out);
-    encoder.push(content).map_err(|_| TooLong)?;
-    let end = encoder.finalize();
+    let (_, place) = out.split_first_mut().ok_or(TooLong)?;
+    let most = place.len().min(MAX_PAYLOAD);
+    let payload = Payload { bytes: place.get_mut(..most).ok_or(TooLong)?, length: 0 };
+    let length = postcard::serialize_with_flavor(message, payload).map_err(|_| TooLong)?;
+    close(length, out)
+}
+
+/// Makes a frame of a payload that begins at the second byte of `out`: CRC, COBS in its place, zero.
+#[inline(never)]
+fn close(length: usize, out: &mut [u8]) -> Result<&mut [u8], TooLong> {
+    let crc = crc32(out.get(1..=length).ok_or(TooLong)?).to_le_bytes();
+    let end = length + 1 + CRC_BYTES;
+    *out.get_mut(length + 1..).and_then(<[u8]>::first_chunk_mut).ok_or(TooLong)? = crc;
     let frame = out.get_mut(..=end).ok_or(TooLong)?;
-    if let Some(last) = frame.last_mut() {
-        *last = 0;
+    // Each zero becomes the distance to the next one; the first byte stands for one before them all. None is further than
+    // 254 away.
+    let mut distance = 1;
+    for (at, byte) in frame.iter_mut().enumerate().rev() {
+        if at == end {
+            *byte = 0;
+            continue;
+        }
+        if at == 0 || *byte == 0 {
+            *byte = distance;
+            distance = 0;
+        }
+        distance += 1;
     }
     Ok(frame)
 }
@@ -105,7 +151,7 @@ impl Accumulator {
             return None;
         };
         let (payload, crc) = self.bytes.get(..end)?.split_last_chunk::<CRC_BYTES>()?;
-        if CRC.checksum(payload) != u32::from_le_bytes(*crc) {
+        if crc32(payload) != u32::from_le_bytes(*crc) {
             self.counts.crc_errors = self.counts.crc_errors.wrapping_add(1);
             return None;
         }

@@ -1,7 +1,8 @@
 //! The messages. A change here is a change of [`PROTOCOL_VERSION`].
 use super::Refusal;
 use crate::path::ExactCircle;
-use serde::{Deserialize, Serialize};
+use serde::de::{Error, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// Version of the messages of this build; both sides must have the same.
 pub const PROTOCOL_VERSION: u16 = 3;
@@ -88,6 +89,7 @@ pub enum Command {
     /// Provision the public key: from now on only tables signed with it are accepted. Once.
     Provision {
         /// Ed25519 public key.
+        #[serde(deserialize_with = "array")]
         key: [u8; 32],
     },
     /// After so long without a request the link counts as dead: the segment in hand finishes, nothing else starts.
@@ -96,6 +98,27 @@ pub enum Command {
         /// ms.
         after_ms: u16,
     },
+}
+
+/// Reads an array of bytes in a loop: serde's own way is a piece of code a byte, 700 bytes of an image.
+fn array<'de, D: Deserializer<'de>, const N: usize>(from: D) -> Result<[u8; N], D::Error> {
+    struct Bytes<const N: usize>;
+    impl<'de, const N: usize> Visitor<'de> for Bytes<N> {
+        type Value = [u8; N];
+
+        fn expecting(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+            f.write_str("bytes")
+        }
+
+        fn visit_seq<A: SeqAccess<'de>>(self, mut from: A) -> Result<[u8; N], A::Error> {
+            let mut bytes = [0; N];
+            for byte in &mut bytes {
+                *byte = from.next_element()?.ok_or_else(|| A::Error::custom("too few"))?;
+            }
+            Ok(bytes)
+        }
+    }
+    from.deserialize_tuple(N, Bytes)
 }
 
 /// From the controller.

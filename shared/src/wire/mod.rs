@@ -15,13 +15,16 @@
 //! |---|---|
 //! | [`message`] | what is said |
 //! | [`frame`] | how it is put into bytes, and found again among any bytes |
+//! | [`crc`] | the CRC-32 of frames and tables alike |
 //! | [`refusal`] | why a controller says no |
+pub mod crc;
 pub mod frame;
 pub mod message;
 pub mod refusal;
 
 /// Paths are asked for in the engine's own numbers.
 pub use crate::path::{ExactArc, ExactCircle, ExactSegment, Quantity};
+pub use crc::{Crc32, crc32};
 pub use frame::{Accumulator, FrameCounts, MAX_FRAME, MAX_PAYLOAD, encode};
 pub use message::{
     CHUNK, Chunk, Command, Counters, FaultCause, FromController, Identity, MotionState, PROTOCOL_VERSION,
@@ -29,6 +32,3 @@ pub use message::{
     TableInfo,
 };
 pub use refusal::{FlashFault, MotionRefusal, Refusal};
-
-/// CRC-32 ISO-HDLC, of frames and tables alike (check value cbf43926).
-pub const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);

@@ -1,7 +1,7 @@
 //! The flash image at boot: whatever it holds, the controller boots, corrects with whole tables only, and can be flashed.
 use super::bench::{Bench, FLASH, Flash};
 use giotto_shared::wire::{
-    self, Accumulator, CHUNK, CRC, Chunk, Command, FromController, MAX_FRAME, Reply, Request, Status,
+    self, Accumulator, CHUNK, Chunk, Command, Crc32, FromController, MAX_FRAME, Reply, Request, Status, crc32,
 };
 
 fn ask(bench: &mut Bench, seq: &mut u16, command: Command) -> Reply {
@@ -46,10 +46,8 @@ pub fn run(bytes: &[u8]) {
         // A confirmation that fits the table in the first slot.
         let crc = [12, 13, 14, 15].map(|at| cells[at]);
         let generation = u32::from(how >> 3).to_le_bytes();
-        let mut digest = CRC.digest();
-        digest.update(&generation);
-        digest.update(&crc);
-        let record = [generation, digest.finalize().to_le_bytes()].concat();
+        let check = Crc32::new().with(&generation).with(&crc).value();
+        let record = [generation, check.to_le_bytes()].concat();
         cells[half - 128..half - 120].copy_from_slice(&record);
     }
     let mut bench = Bench::boot(flash);
@@ -63,7 +61,7 @@ pub fn run(bytes: &[u8]) {
     bench.ticks(20, false);
     // And it can be flashed, unless what it holds says that it takes signed tables only.
     let table = &super::table::tables()[0];
-    ask(&mut bench, &mut seq, Command::WriteBegin { length: table.len() as u16, crc: CRC.checksum(table) });
+    ask(&mut bench, &mut seq, Command::WriteBegin { length: table.len() as u16, crc: crc32(table) });
     for (index, piece) in table.chunks(CHUNK).enumerate() {
         let data = Chunk::from_slice(piece).expect("a chunk fits");
         ask(&mut bench, &mut seq, Command::WriteChunk { offset: (index * CHUNK) as u16, data });

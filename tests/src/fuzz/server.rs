@@ -1,8 +1,8 @@
 //! The server's state machine, with the engine behind it: a conversation of frames, raw bytes, time and resets.
 use super::bench::{Bench, Flash};
 use giotto_shared::wire::{
-    self, Accumulator, CHUNK, CRC, Chunk, Command, ExactCircle, FromController, MAX_FRAME, Reply, Request,
-    Status,
+    self, Accumulator, CHUNK, Chunk, Command, ExactCircle, FromController, MAX_FRAME, Reply, Request, Status,
+    crc32,
 };
 
 /// Reads a conversation.
@@ -47,7 +47,7 @@ impl Talk {
 
     fn payload(&mut self, payload: &[u8]) -> Option<Reply> {
         let mut content = payload.to_vec();
-        content.extend(CRC.checksum(payload).to_le_bytes());
+        content.extend(crc32(payload).to_le_bytes());
         let mut frame = vec![0; cobs::max_encoding_length(content.len()) + 1];
         let length = cobs::encode(&content, &mut frame);
         frame.truncate(length + 1);
@@ -70,7 +70,7 @@ impl Talk {
     }
 
     fn upload(&mut self, image: &[u8]) {
-        self.ask(Command::WriteBegin { length: image.len() as u16, crc: CRC.checksum(image) });
+        self.ask(Command::WriteBegin { length: image.len() as u16, crc: crc32(image) });
         for (index, piece) in image.chunks(CHUNK).enumerate() {
             let data = Chunk::from_slice(piece).expect("a chunk fits");
             self.ask(Command::WriteChunk { offset: (index * CHUNK) as u16, data });

@@ -3,7 +3,7 @@ use giotto_firmware::engine::{Config, Planner};
 use giotto_shared::model::Cumulants;
 use giotto_shared::table::{self, Limits, MAX_IMAGE_BYTES, Table, Travel, Zone};
 use giotto_shared::term::Term;
-use giotto_shared::wire::CRC;
+use giotto_shared::wire::Crc32;
 
 /// Makes length and CRC of a header right, so that what is behind it is reached.
 pub fn mend(image: &mut [u8]) {
@@ -13,10 +13,7 @@ pub fn mend(image: &mut [u8]) {
     let length = image.len() as u32;
     image[..4].copy_from_slice(b"GIOT");
     image[8..12].copy_from_slice(&length.to_le_bytes());
-    let mut digest = CRC.digest();
-    digest.update(&image[..12]);
-    digest.update(&image[16..]);
-    let crc = digest.finalize();
+    let crc = Crc32::new().with(&image[..12]).with(&image[16..]).value();
     image[12..16].copy_from_slice(&crc.to_le_bytes());
 }
 

@@ -144,7 +144,7 @@ impl Desk {
     }
 
     fn upload(&mut self, image: &[u8]) -> bool {
-        let crc = wire::CRC.checksum(image);
+        let crc = wire::crc32(image);
         let chunks = image.chunks(CHUNK).enumerate();
         self.done(Command::WriteBegin { length: image.len() as u16, crc })
             && chunks.into_iter().all(|(index, data)| {

@@ -114,7 +114,7 @@ fn a_bad_table_never_touches_the_flash() {
     let crc = {
         let mut bytes = out_of_bounds[..12].to_vec();
         bytes.extend(&out_of_bounds[16..]);
-        wire::CRC.checksum(&bytes)
+        wire::crc32(&bytes)
     };
     out_of_bounds[12..16].copy_from_slice(&crc.to_le_bytes());
     assert!(desk.upload(&out_of_bounds));
@@ -240,7 +240,7 @@ proptest! {
             let slot = (number % 3) as u8;
             let data = Chunk::from_slice(&bytes).unwrap();
             let command = match kind {
-                0 => Command::WriteBegin { length: number % 100, crc: wire::CRC.checksum(&bytes) },
+                0 => Command::WriteBegin { length: number % 100, crc: wire::crc32(&bytes) },
                 1 => Command::WriteChunk { offset: number % 100, data },
                 2 => Command::WriteEnd,
                 3 => Command::Commit,
