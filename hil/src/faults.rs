@@ -3,8 +3,9 @@ use crate::ticks::largest_table;
 use giotto::controller::flash::Verdict;
 use giotto::controller::link::Link;
 use giotto::controller::virtual_controller::VirtualLink;
-use giotto::controller::{Controller, ControllerError};
+use giotto::controller::{Controller, ControllerError, Segment, Step};
 use giotto_shared::table::{self, MAX_IMAGE_BYTES};
+use giotto_shared::wire::{Command, MotionState};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::collections::VecDeque;
@@ -198,6 +199,69 @@ fn table(number: u64) -> Vec<u8> {
     let length = table::encode(&table, &mut image).unwrap_or(0);
     image.truncate(length);
     image
+}
+
+/// A program of its own for each number: out and back on a line, an arc and a helix.
+fn program(number: u64) -> Vec<Step> {
+    let x = 0.01 + 0.001 * (number % 20) as f64;
+    let arc = |sweep_rad, rise_m| {
+        let (centre_m, normal) = ([x, 0.01, 0.0], [0.0, 0.0, 1.0]);
+        Segment::Arc { centre_m, normal, sweep_rad, rise_m, feed_m_s: 0.3 }
+    };
+    let line = |to_m| Segment::Line { to_m, feed_m_s: 0.3 };
+    let segments = [line([x, 0.0, 0.0]), arc(2.0, 0.002), arc(-2.0, -0.002), line([0.0; 3]), arc(0.5, 0.0)];
+    segments.map(|segment| Step { segment, tolerance_m: 0.0 }).to_vec()
+}
+
+/// What came of programs over a link that breaks what passes.
+#[derive(Debug)]
+pub struct ProgramReport {
+    /// Programs run to the end that the host foretold, to the nanometre.
+    pub programs: u64,
+    /// Programs that ended elsewhere though every segment was accepted.
+    pub astray: u64,
+    /// Programs that the host gave up.
+    pub given_up: u64,
+    /// Requests repeated.
+    pub repeats: u32,
+    /// What passed.
+    pub tally: Arc<Tally>,
+}
+
+/// Runs one program after the other until so many frames have been sent to the virtual controller, and looks where each ends.
+///
+/// # Errors
+/// Those of opening the session.
+pub fn programs_over_faults(frames: u64, share: f64, seed: u64) -> Result<ProgramReport, ControllerError> {
+    let link = FaultyLink::new(VirtualLink::new(), seed, share);
+    let tally = link.tally();
+    let mut controller = Controller::connect(Box::new(link), "sim with faults", 1)?;
+    // A disturbed line is not a dead one.
+    controller.supervise(None)?;
+    let mut report = ProgramReport { programs: 0, astray: 0, given_up: 0, repeats: 0, tally };
+    while report.tally.frames_sent() < frames {
+        let sent = controller.send_program(&program(report.programs));
+        if sent.is_err() {
+            // Half a program: it ends somewhere, within limits.
+            let _ = controller.command(Command::Stop);
+        }
+        let ended = loop {
+            controller.listen(Duration::from_millis(100))?;
+            match controller.status() {
+                Ok(status) if matches!(status.motion, MotionState::Idle | MotionState::Fault) => {
+                    break status.raw_nm;
+                }
+                _ => {}
+            }
+        };
+        match sent {
+            Ok(expected) if expected == ended => report.programs += 1,
+            Ok(_) => report.astray += 1,
+            Err(_) => report.given_up += 1,
+        }
+    }
+    report.repeats = controller.repeats();
+    Ok(report)
 }
 
 /// Flashes one table after the other until so many frames have been sent to the virtual controller, and looks after each

@@ -83,7 +83,8 @@ enum Command {
         #[arg(long)]
         check: bool,
     },
-    /// Flashes tables over a link that breaks a tenth of what passes; fails if a wrong one is ever in use.
+    /// Flashes tables and runs programs over a link that breaks a tenth of what passes; fails if a wrong table is ever in use
+    /// or a program ends elsewhere.
     Faults {
         /// Frames to send.
         #[arg(long, default_value_t = 100_000)]
@@ -308,6 +309,10 @@ fn names(names: impl Iterator<Item = impl std::fmt::Display>) -> String {
 }
 
 fn run_faults(frames: u64, share: f64, seed: u64) -> Result<ExitCode, ControllerError> {
+    let broken = |tally: &faults::Tally| {
+        let kinds = tally.broken().map(|(fault, count)| format!("{fault:?} {count}").to_lowercase());
+        println!("broken: {}", kinds.join(", "));
+    };
     let report = faults::flash_over_faults(frames, share, seed)?;
     println!(
         "seed {seed}: {} frames sent, {:.0} % of {} pieces broken, {} tables flashed, {} flashes begun anew, \
@@ -320,7 +325,17 @@ fn run_faults(frames: u64, share: f64, seed: u64) -> Result<ExitCode, Controller
         report.repeats,
         report.wrong
     );
-    let kinds = report.tally.broken().map(|(fault, count)| format!("{fault:?} {count}").to_lowercase());
-    println!("broken: {}", kinds.join(", "));
-    Ok(if report.wrong == 0 && report.flashes > 0 { ExitCode::SUCCESS } else { ExitCode::from(5) })
+    broken(&report.tally);
+    let paths = faults::programs_over_faults(frames / 4, share, seed)?;
+    println!(
+        "seed {seed}: {} frames sent, {} programs run, {} given up, {} requests repeated, {} programs astray",
+        paths.tally.frames_sent(),
+        paths.programs,
+        paths.given_up,
+        paths.repeats,
+        paths.astray
+    );
+    broken(&paths.tally);
+    let good = report.wrong + paths.astray == 0 && report.flashes > 0 && paths.programs > 0;
+    Ok(if good { ExitCode::SUCCESS } else { ExitCode::from(5) })
 }

@@ -1,6 +1,7 @@
 //! What every controller has to stand: the image under QEMU, the virtual one, or a real one on its port.
 //!
 //! The machine moves: on a real port the scenarios run circles of up to 100 mm about the origin.
+use crate::programs;
 use crate::ticks::largest_table;
 use giotto::controller::flash::{Verdict, is_flash_fault};
 use giotto::controller::{Controller, ControllerError, circle};
@@ -39,14 +40,17 @@ impl From<ControllerError> for Trouble {
 }
 
 /// All of them, in the order they run in.
-pub const ALL: [Scenario; 8] = [
+pub const ALL: [Scenario; 11] = [
     ("says who it is", identity),
     ("a circle bypassed is the programmed one", bypassed_circle),
     ("a stop command ends a run within the limits", stop),
     ("a silent host: the segment in hand finishes, nothing else starts", silent_host),
     ("runs out of bounds are refused", out_of_bounds),
+    ("a program ends where its segments do, to the nanometre", programs::ends_exactly),
+    ("a silent host in a program: the segment in hand finishes, nothing else starts", programs::silent_host),
     ("a broken table is refused and changes nothing", broken_table),
     ("flash, verify, reset, verify; the circle is corrected", flash_and_run),
+    ("flash, programs: contour of arcs between lines, through a machine", programs::contour),
     ("a table that is not confirmed is gone after a reset", unconfirmed),
 ];
 
@@ -73,11 +77,14 @@ impl std::fmt::Display for Trouble {
     }
 }
 
-fn ensure(holds: bool, what: impl Fn() -> String) -> Result<(), Trouble> {
+pub(crate) fn ensure(holds: bool, what: impl Fn() -> String) -> Result<(), Trouble> {
     if holds { Ok(()) } else { Err(Trouble::Wrong(what())) }
 }
 
-fn refused_as(result: Result<(), ControllerError>, wanted: impl Fn(&Refusal) -> bool) -> Result<(), Trouble> {
+pub(crate) fn refused_as(
+    result: Result<(), ControllerError>,
+    wanted: impl Fn(&Refusal) -> bool,
+) -> Result<(), Trouble> {
     match result {
         Err(ControllerError::Refused(refusal)) if wanted(&refusal) => Ok(()),
         other => Err(Trouble::Wrong(format!("not refused as it should be: {other:?}"))),
@@ -92,7 +99,7 @@ fn after_flash_fault(controller: &mut Controller) -> Result<(), Trouble> {
     bypassed_circle(controller)
 }
 
-fn at_rest(controller: &mut Controller) -> Result<Status, Trouble> {
+pub(crate) fn at_rest(controller: &mut Controller) -> Result<Status, Trouble> {
     for _ in 0..100_000 {
         let status = controller.status()?;
         match status.motion {

@@ -3,7 +3,7 @@ use crate::elf::{Image, Reach};
 use crate::ticks::largest_table;
 use giotto::controller::emulator::{Emulator, Pace};
 use giotto::controller::image::{self, Board};
-use giotto::controller::{Controller, ControllerError, circle};
+use giotto::controller::{Controller, ControllerError, Segment, Step, circle};
 use giotto_shared::Direction;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -95,6 +95,20 @@ pub fn measure(
     Ok(Report { board, text: image.size.text, variables: image.size.variables, stack, panics, tick })
 }
 
+/// One of each kind of segment, where a zone of the largest table holds.
+fn path() -> [Segment; 4] {
+    let normal = [0.0, 0.0, 1.0];
+    let arc = |rise_m| Segment::Arc {
+        centre_m: [0.0; 3],
+        normal,
+        sweep_rad: if rise_m > 0.0 { -2.0 } else { 2.0 },
+        rise_m,
+        feed_m_s: 0.3,
+    };
+    let line = Segment::Line { to_m: [0.1, 0.0, 0.0], feed_m_s: 0.3 };
+    [line, arc(0.0), arc(0.01), Segment::Dwell { time_s: 0.01 }]
+}
+
 /// Flashes the largest table twice, rolls back, runs corrected circles, resets; asks how deep the stack went.
 fn deepest_stack(board: Board, image: &Path, note: &mut dyn FnMut(&str)) -> Result<u32, ControllerError> {
     use giotto_shared::wire::Command;
@@ -108,6 +122,9 @@ fn deepest_stack(board: Board, image: &Path, note: &mut dyn FnMut(&str)) -> Resu
     }
     for direction in [Direction::Ccw, Direction::Cw] {
         controller.run_circle(&circle(0.1, 0.5, direction, 1), EVERY)?;
+    }
+    for segment in path() {
+        controller.run_program(&[Step { segment, tolerance_m: 0.0 }], EVERY).map_err(|e| e.error)?;
     }
     if flashed {
         controller.command(Command::Rollback)?;

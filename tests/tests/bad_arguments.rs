@@ -11,7 +11,7 @@ const MODEL: &str = "format = 1\ncampaign = \"bench\"\nmachine = \"mill\"\n[serv
                      [valid]\nradius_mm = [50.0, 100.0]\nfeed_mm_s = [20.0, 200.0]\n";
 
 /// Commands that read a file, `{}` standing for it.
-const READERS: [&str; 15] = [
+const READERS: [&str; 16] = [
     "import {} --radius 100 --feed 100 --direction ccw -o new",
     "analyze {}",
     "fit {}",
@@ -25,6 +25,7 @@ const READERS: [&str; 15] = [
     "table show {}",
     "flash {} --port sim",
     "verify {} --port sim",
+    "run program {} --port sim",
     "analyze campaign --ballbar {}",
     "diagnose campaign --model {}",
 ];
@@ -39,7 +40,7 @@ const FILES: [(&str, &[u8], &str); 5] = [
 ];
 
 /// Talks to a port.
-const TALKERS: [&str; 7] = [
+const TALKERS: [&str; 8] = [
     "status",
     "rollback",
     "bypass on",
@@ -47,6 +48,7 @@ const TALKERS: [&str; 7] = [
     "flash table.bin",
     "monitor",
     "run circle --radius 50 --feed 100 --direction ccw",
+    "run program part.nc",
 ];
 
 fn run(folder: &Path, line: &str) -> (i32, String, String) {
@@ -96,6 +98,13 @@ fn every_command_refuses_what_is_not_its_file() {
     // A line and a column where there is one to name.
     let errors = refused(folder, "diagnose campaign --model bad.toml", 3, "bad.toml");
     assert!(errors.contains("bad.toml:2:10:"), "{errors}");
+    // So with a block that no controller can run.
+    fs::write(folder.join("stop.nc"), "G1 X1 F100\n M0\n").unwrap();
+    refused(folder, "run program stop.nc --port sim", 3, "stop.nc:2:2: M0 waits");
+    fs::write(folder.join("far.nc"), "G1 X1 F100\nX1e9\n").unwrap();
+    refused(folder, "run program far.nc --port sim", 3, "far.nc:2:3: a word E");
+    fs::write(folder.join("far.nc"), "G1 X1 F100\nX2500\n").unwrap();
+    refused(folder, "run program far.nc --port sim", 3, "far.nc:2:1: position");
     // A measurement whose circle is not given is wrong usage, no bad input.
     fs::write(folder.join("ball.csv"), "time_s,deviation_um\n0,1\n1,2\n").unwrap();
     for command in ["analyze", "fit", "diagnose", "plan"] {
@@ -119,6 +128,10 @@ fn a_port_that_is_not_there_is_no_answer() {
     }
     refused(folder, "status --port qemu --image nowhere", 4, "nowhere");
     refused(folder, "run circle --radius -5 --feed 100 --direction ccw --port sim", 4, "radius");
+    refused(folder, "run circle --radius 5000 --feed 100 --direction ccw --port sim", 4, "radius");
+    // What the controller refuses is named with its block; the part is too fast for it.
+    fs::write(folder.join("fast.nc"), "F600 G1 X1\nG1 X2 F90000\n").unwrap();
+    refused(folder, "run program fast.nc --port sim", 4, "fast.nc:2:1: refused");
 }
 
 #[test]
@@ -134,6 +147,7 @@ fn what_cannot_be_written_is_said_with_its_path() {
         "compensate part.nc --model model.toml -o folder",
         "man -o empty",
         "run circle --radius 50 --feed 100 --direction ccw --port sim -o folder",
+        "run program part.nc --port sim -o folder",
     ] {
         refused(folder, line, 3, line.rsplit(' ').next().unwrap());
     }
@@ -149,6 +163,8 @@ fn wrong_usage_is_two_and_json_keeps_stdout_clean() {
         "analyze",
         "import",
         "run square --port sim",
+        "run program part.nc --port sim --tolerance-mm -1",
+        "run program part.nc --port sim --rapid 0",
         "completions csh",
         "fit campaign --train-radius 77",
         "fit campaign --alpha 2",

@@ -20,7 +20,7 @@ pub use ports::{Receiver, Sender};
 pub use shared::Shared;
 pub use tick::Tick;
 
-/// Segments that wait for the tick, at most: the approach to a circle, and the circle.
+/// Segments that wait for the tick, at most: the look-ahead of a program.
 pub const SEGMENTS: usize = 3;
 /// Set-points that wait for the link, at most.
 pub const SET_POINTS: usize = 64;

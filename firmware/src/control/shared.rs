@@ -23,7 +23,10 @@ pub struct Shared {
     dropped_segments: AtomicU32,
     uncorrected: AtomicU32,
     stops: AtomicU32,
+    segments: AtomicU32,
     // Written by the background.
+    /// Epoch of the program that is open, or [`NO_PROGRAM`]. A stop ends the epoch, and the program with it.
+    pub(super) program: AtomicU16,
     pub(super) bypass: AtomicBool,
     pub(super) hold: AtomicBool,
     /// Raised by the background, lowered by the tick that obeys.
@@ -38,6 +41,8 @@ impl Default for Shared {
         Self::new()
     }
 }
+
+const NO_PROGRAM: u16 = u16::MAX;
 
 const REST: u8 = 0;
 const RUNNING: u8 = 1;
@@ -65,6 +70,8 @@ impl Shared {
             dropped_segments: AtomicU32::new(0),
             uncorrected: AtomicU32::new(0),
             stops: AtomicU32::new(0),
+            segments: AtomicU32::new(0),
+            program: AtomicU16::new(NO_PROGRAM),
             bypass: AtomicBool::new(true),
             hold: AtomicBool::new(false),
             stop: AtomicBool::new(false),
@@ -109,6 +116,7 @@ impl Shared {
         self.dropped_segments.store(counters.dropped, Relaxed);
         self.uncorrected.store(counters.uncorrected, Relaxed);
         self.stops.store(counters.stops, Relaxed);
+        self.segments.store(counters.segments, Relaxed);
         let fault = match fault {
             None => NO_FAULT,
             Some(Fault::Overrun) => OVERRUN,
@@ -122,6 +130,16 @@ impl Shared {
     /// Counts a set-point that found no room.
     pub(super) fn drop_one(&self) {
         self.dropped.store(self.dropped.load(Relaxed).wrapping_add(1), Relaxed);
+    }
+
+    /// Opens a program in the present epoch, or closes it.
+    pub(super) fn set_program(&self, open: bool) {
+        self.program.store(if open { u16::from(self.epoch()) } else { NO_PROGRAM }, Relaxed);
+    }
+
+    /// Whether a program is open in this epoch.
+    pub(super) fn program_open(&self, epoch: u8) -> bool {
+        self.program.load(Relaxed) == u16::from(epoch)
     }
 
     /// Epoch of the executor after the last tick.
@@ -161,6 +179,8 @@ impl Shared {
             dropped_segments: self.dropped_segments.load(Relaxed),
             uncorrected_segments: self.uncorrected.load(Relaxed),
             stops: self.stops.load(Relaxed),
+            segments: self.segments.load(Relaxed),
+            queued: 0,
             fault: match self.fault.load(Relaxed) {
                 NO_FAULT => None,
                 OVERRUN => Some(FaultCause::Overrun),

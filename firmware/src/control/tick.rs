@@ -103,6 +103,9 @@ where
             if self.executor.stopping() { MotionState::Stopping } else { MotionState::Running }
         } else if self.executor.fault().is_some() {
             MotionState::Fault
+        } else if self.shared.program_open(self.executor.epoch()) {
+            // It waits for more.
+            MotionState::Running
         } else {
             MotionState::Idle
         }

@@ -165,16 +165,11 @@ impl Engine {
     pub fn run_circle(&mut self, run: &CircleRun) -> Result<(), Refused> {
         self.ready(2)?;
         let run = run.exact()?;
-        let before = self.planner.position_nm();
-        let (mut approach, mut circle) = (None, Planned::default());
-        let planned = self.planner.circle(&run, &mut approach, &mut circle);
-        planned.inspect_err(|_| self.planner.rewind(before))?;
-        // Room for both was checked.
-        if let Some(approach) = approach {
-            let _ = self.queue.enqueue(approach);
-        }
-        let _ = self.queue.enqueue(circle);
-        Ok(())
+        let Self { planner, queue, .. } = self;
+        planner.circle_from_here(&run, &mut Planned::default(), |planned| {
+            // Room for both was checked.
+            let _ = queue.enqueue(*planned);
+        })
     }
 
     /// Appends a segment; it runs with an exact stop at its ends.

@@ -27,8 +27,9 @@ use core::ops::DerefMut;
 use embedded_storage::nor_flash::NorFlash;
 use giotto_shared::table::{FORMAT_VERSION, MAX_IMAGE_BYTES, SCHEMA_HASH};
 use giotto_shared::wire::{
-    self, Accumulator, CHUNK, Chunk, Command, Counters, ExactCircle, FromController, Identity, MAX_FRAME,
-    MotionState, PROTOCOL_VERSION, Probation, Refusal, Reply, SET_POINTS, SUPERVISE_MS, SetPoints, Status,
+    self, Accumulator, CHUNK, Chunk, Command, Counters, ExactCircle, ExactSegment, FromController, Identity,
+    MAX_FRAME, MotionState, PROTOCOL_VERSION, Probation, Refusal, Reply, SET_POINTS, SUPERVISE_MS, SetPoints,
+    Status,
 };
 use session::{Session, Turn};
 use supervision::Supervision;
@@ -265,6 +266,9 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
                 self.apply_bypass();
             }
             Command::RunCircle(run) => self.run_circle(&run)?,
+            Command::Begin => self.begin()?,
+            Command::Append { segment, tolerance_nm } => self.append(&segment, tolerance_nm)?,
+            Command::End => self.motion.end().map_err(Refusal::Motion)?,
             Command::Stop => self.motion.stop(),
             Command::Subscribe { every, on_link } => self.subscribe(every, on_link),
             Command::Reset => {
@@ -312,16 +316,39 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
 
     #[inline(never)]
     fn run_circle(&mut self, run: &ExactCircle) -> Result<(), Refusal> {
-        self.idle()?;
+        self.may_run()?;
         bounds::check_run(run).map_err(Refusal::Motion)?;
-        if self.probation == Probation::FirstRun {
-            return Err(Refusal::ProbationOver);
-        }
         self.motion.run_circle(run).map_err(Refusal::Motion)?;
+        self.has_run();
+        Ok(())
+    }
+
+    /// A program is one run however many segments it has, and however long it waits for them.
+    #[inline(never)]
+    fn begin(&mut self) -> Result<(), Refusal> {
+        self.may_run()?;
+        self.motion.begin().map_err(Refusal::Motion)?;
+        self.has_run();
+        Ok(())
+    }
+
+    #[inline(never)]
+    fn append(&mut self, segment: &ExactSegment, tolerance_nm: u32) -> Result<(), Refusal> {
+        bounds::check_segment(segment)
+            .and_then(|()| self.motion.append(segment, tolerance_nm))
+            .map_err(Refusal::Motion)
+    }
+
+    /// At rest, and a table on probation has not had its run yet.
+    fn may_run(&self) -> Result<(), Refusal> {
+        self.idle()?;
+        if self.probation == Probation::FirstRun { Err(Refusal::ProbationOver) } else { Ok(()) }
+    }
+
+    fn has_run(&mut self) {
         if self.probation == Probation::Fresh {
             self.probation = Probation::FirstRun;
         }
-        Ok(())
     }
 
     #[inline(never)]
@@ -350,6 +377,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             active: self.active,
             slots: [self.store.state(0), self.store.state(1)],
             probation: self.probation,
+            queued: now.queued,
             tick: now.tick,
             stack_bytes: self.stack_bytes,
             idle_permille: self.idle_permille,
@@ -368,6 +396,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
                 dropped_segments: now.dropped_segments,
                 uncorrected_segments: now.uncorrected_segments,
                 stops: now.stops,
+                segments: now.segments,
                 link_losses: self.supervision.losses(),
             },
         }

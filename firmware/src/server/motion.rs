@@ -1,5 +1,7 @@
 //! What the server needs of an engine.
-use giotto_shared::wire::{ExactCircle, FaultCause, MotionRefusal, MotionState, Pose, Refusal, SetPoint};
+use giotto_shared::wire::{
+    ExactCircle, ExactSegment, FaultCause, MotionRefusal, MotionState, Pose, Refusal, SetPoint,
+};
 
 /// The engine as its tick last left it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,6 +28,10 @@ pub struct Snapshot {
     pub uncorrected_segments: u32,
     /// Stops.
     pub stops: u32,
+    /// Segments finished.
+    pub segments: u32,
+    /// Segments that wait.
+    pub queued: u8,
     /// Why nothing runs, if so.
     pub fault: Option<FaultCause>,
     /// The stop input is active.
@@ -63,6 +69,25 @@ pub trait Motion {
     /// # Errors
     /// Any [`MotionRefusal`]; nothing has started then.
     fn run_circle(&mut self, run: &ExactCircle) -> Result<(), MotionRefusal>;
+
+    /// Opens a program.
+    ///
+    /// # Errors
+    /// Any [`MotionRefusal`]; nothing is open then.
+    fn begin(&mut self) -> Result<(), MotionRefusal>;
+
+    /// Appends to it, leaving the joint with the segment before by no more than a tolerance.
+    ///
+    /// # Errors
+    /// [`MotionRefusal::QueueFull`]: to be tried again. [`MotionRefusal::NoProgram`], or what does not fit; the program stays as
+    /// it was.
+    fn append(&mut self, segment: &ExactSegment, tolerance_nm: u32) -> Result<(), MotionRefusal>;
+
+    /// It has no more segments.
+    ///
+    /// # Errors
+    /// [`MotionRefusal::NoProgram`].
+    fn end(&mut self) -> Result<(), MotionRefusal>;
 
     /// Stops within limits.
     fn stop(&mut self);

@@ -74,7 +74,7 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
             return Err(Failure::usage(format_args!("{name} {value}: expected a positive number")));
         }
     }
-    let program = read(&args.program)?;
+    let program = read(&args.program, Kind::Any)?;
     let model = ModelFile::load(&args.model)?;
     let options = Options {
         keep: match args.keep {
@@ -94,12 +94,23 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     if out.json { out.document(&document) } else { say(&args, &result, &document, out) }
 }
 
-fn read(path: &Path) -> Result<Vec<u8>, Failure> {
+/// What a program may be written in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    GCode,
+    Any,
+}
+
+/// The bytes of a program.
+pub(super) fn read(path: &Path, kind: Kind) -> Result<Vec<u8>, Failure> {
     let fail =
         |what: &str| Failure::input(format_args!("{}: {what}; expected an NC program", path.display()));
     match std::fs::read(path) {
         Ok(bytes) if bytes.is_empty() => Err(fail("is empty").help("check which file this is")),
         Ok(bytes) if bytes.contains(&0) => Err(fail("holds zero bytes").help("check which file this is")),
+        Ok(bytes) if kind == Kind::GCode && gcode::rapid::is_rapid(&bytes) => {
+            Err(fail("is RAPID, which only a robot's own controller runs").help("write it as G-code"))
+        }
         Ok(bytes) if !gcode::rapid::is_rapid(&bytes) && !gcode::is_program(&bytes) => {
             Err(fail("no line of it is a block").help("check which file this is; RAPID begins with MODULE"))
         }

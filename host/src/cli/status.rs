@@ -62,6 +62,7 @@ fn document(controller: &Controller, status: &Status) -> Value {
         "bypass": status.bypass,
         "active_slot": status.active,
         "probation": probation,
+        "queued_segments": status.queued,
         "slots": status.slots.iter().map(slot_document).collect::<Vec<_>>(),
         "ticks": status.tick,
         "stack_bytes": status.stack_bytes,
@@ -143,8 +144,13 @@ pub(super) fn words(controller: &Controller, status: &Status) -> Table {
     row(
         "segments",
         format!(
-            "{} dropped, {} uncorrected; {} stops, {} runs without a host",
-            counts.dropped_segments, counts.uncorrected_segments, counts.stops, counts.link_losses
+            "{} done, {} waiting, {} dropped, {} uncorrected; {} stops, {} runs without a host",
+            counts.segments,
+            status.queued,
+            counts.dropped_segments,
+            counts.uncorrected_segments,
+            counts.stops,
+            counts.link_losses
         ),
     );
     row(

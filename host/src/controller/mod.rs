@@ -6,6 +6,7 @@
 //! | [`client`] | requests and replies over any [`link`](link::Link): status, slots, runs |
 //! | [`flash`] | a table onto a controller, and the proof that it is there |
 //! | [`recording`] | circles run, set-points received |
+//! | [`program`] | programs run, sent ahead of the machine |
 //! | [`port`] | what `--port` may name, and opening it |
 //! | [`serial`] | a serial device |
 //! | [`virtual_controller`] | the firmware's library in this process, in simulated time, or behind a pty |
@@ -18,6 +19,7 @@ pub mod flash;
 pub mod image;
 pub mod link;
 pub mod port;
+pub mod program;
 pub mod recording;
 pub mod serial;
 pub mod virtual_controller;
@@ -27,7 +29,8 @@ mod tests;
 
 pub use client::Controller;
 pub use error::ControllerError;
-pub use giotto_shared::path::CircleRun;
+pub use giotto_shared::path::{CircleRun, Segment};
 pub use image::Board;
 pub use port::{OpenOptions, Port, open};
+pub use program::{ProgramError, Step};
 pub use recording::{Recording, SetPointRecord, circle};

@@ -1,4 +1,4 @@
-//! Circles run on a controller, and the set-points it made of them.
+//! Runs on a controller, and the set-points it made of them.
 use super::client::Controller;
 use super::error::ControllerError;
 use giotto_shared::Direction;
@@ -25,7 +25,7 @@ pub struct SetPointRecord {
     pub corrected_m: [f64; 3],
 }
 
-/// All set-points of a run, evenly spaced: from rest through approach, entry, turns and exit to rest.
+/// All set-points of a run, evenly spaced: from rest to rest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
     /// Distance in time, s.
@@ -52,10 +52,21 @@ impl Controller {
     /// # Errors
     /// [`ControllerError::Refused`]; [`ControllerError::SetPointsLost`] if the record has a gap; those of the link.
     pub fn run_circle(&mut self, circle: &CircleRun, every: u16) -> Result<Recording, ControllerError> {
-        let every = every.max(1);
-        self.command(Command::Subscribe { every, on_link: true })?;
-        self.set_points.clear();
+        self.begin_recording(every)?;
         self.start_circle(circle)?;
+        self.end_recording(every)
+    }
+
+    /// Set-points are put away from now on.
+    pub(super) fn begin_recording(&mut self, every: u16) -> Result<(), ControllerError> {
+        self.command(Command::Subscribe { every: every.max(1), on_link: true })?;
+        self.set_points.clear();
+        Ok(())
+    }
+
+    /// All set-points to the end of the run.
+    pub(super) fn end_recording(&mut self, every: u16) -> Result<Recording, ControllerError> {
+        let every = every.max(1);
         let mut spoke_at = self.now();
         while !self.set_points.last().is_some_and(|batch| batch.last) {
             let came = self.wait_for_set_points(KEEP_ALIVE)?;

@@ -1,4 +1,5 @@
-//! Programs for machines: arcs rewritten with the inverse correction, everything else to the letter.
+//! Programs for machines: arcs rewritten with the inverse correction, everything else to the letter; or read as the
+//! segments that a controller runs ([`program`]).
 //!
 //! RS-274 as LinuxCNC and Grbl speak it, and plain RAPID ([`rapid`]). An arc of radius R at feed f becomes one of the radius that the machine
 //! turns into R, with tangent transitions where it meets its neighbours (`blend`); the blocks of lines are not
@@ -11,6 +12,7 @@ mod blend;
 mod correct;
 mod emit;
 mod inverse;
+pub mod program;
 #[cfg(test)]
 mod proof;
 pub mod rapid;

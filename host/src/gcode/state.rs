@@ -131,6 +131,26 @@ impl State {
         }
     }
 
+    /// At a place, mm.
+    pub(super) fn at(position_mm: [f64; 3]) -> Self {
+        Self { position: position_mm.map(Some), ..Self::new() }
+    }
+
+    /// Where the lines so far lead, mm; `None` where they do not say.
+    pub(super) fn position(&self) -> [Option<f64>; 3] {
+        self.position
+    }
+
+    /// The F word in force and what it means.
+    pub(super) fn feed(&self) -> (Option<f64>, FeedMode) {
+        (self.feed, self.modes.feed_mode)
+    }
+
+    /// Whether moves are positioning moves (G0).
+    pub(super) fn is_rapid(&self) -> bool {
+        self.motion == Some(0)
+    }
+
     /// Takes one line.
     pub(super) fn step(&mut self, line: &Line<'_>) -> Action {
         match line.sort {
@@ -272,7 +292,7 @@ impl State {
     }
 
     /// Millimetres of one program unit.
-    fn unit_mm(&self) -> f64 {
+    pub(super) fn unit_mm(&self) -> f64 {
         if self.modes.inch { 25.4 } else { 1.0 }
     }
 

@@ -1,10 +1,12 @@
 //! The bytes in the pages on protocol and table.
 use super::holds;
 use giotto_shared::model::Cumulants;
-use giotto_shared::path::CircleRun;
+use giotto_shared::path::{CircleRun, Segment};
 use giotto_shared::table::{self, Limits, Table, Travel, Zone};
 use giotto_shared::term::Term;
-use giotto_shared::wire::{self, Command, FromController, MAX_FRAME, Reply, Request, SetPoint, SetPoints};
+use giotto_shared::wire::{
+    self, Command, ExactSegment, FromController, MAX_FRAME, Reply, Request, SetPoint, SetPoints,
+};
 use giotto_shared::{Axis, Direction};
 use serde::Serialize;
 
@@ -55,6 +57,15 @@ fn frames_are_those_of_the_page() {
         start_rad: 0.0,
     };
     holds(page, "bytes circle", &frame(&request(3, Command::RunCircle(circle.exact().unwrap()))));
+    holds(page, "bytes begin", &frame(&request(4, Command::Begin)));
+    let line = Segment::Line { to_m: [0.05, 0.0, 0.0], feed_m_s: 0.1 }.exact([0; 3]).unwrap();
+    holds(page, "bytes line", &frame(&request(5, Command::Append { segment: line, tolerance_nm: 10_000 })));
+    let (centre_m, normal) = ([0.05, 0.02, 0.0], [0.0, 0.0, 1.0]);
+    let (sweep_rad, rise_m) = (std::f64::consts::FRAC_PI_2, 0.0);
+    let arc = Segment::Arc { centre_m, normal, sweep_rad, rise_m, feed_m_s: 0.1 }
+        .exact([50_000_000, 0, 0])
+        .unwrap();
+    holds(page, "bytes arc", &frame(&request(6, Command::Append { segment: arc, tolerance_nm: 0 })));
     let point = SetPoint { raw_nm: [50_000_000, 0, 0], corrected_nm: [50_012_000, 0, 0] };
     let points = std::iter::once(point).collect();
     let batch = FromController::SetPoints(SetPoints { tick: 1000, every: 10, last: false, points });
@@ -93,6 +104,9 @@ fn the_numbers_of_requests_are_those_of_the_page() {
         ("Reset", Command::Reset),
         ("Provision", Command::Provision { key: [0; 32] }),
         ("Supervise", Command::Supervise { after_ms: 0 }),
+        ("Begin", Command::Begin),
+        ("Append", Command::Append { segment: ExactSegment::Dwell { time_s: 1.0 }, tolerance_nm: 0 }),
+        ("End", Command::End),
     ];
     let versions = [
         format!("protocol version {}.", wire::PROTOCOL_VERSION),

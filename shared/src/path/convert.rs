@@ -135,6 +135,7 @@ fn arc(
     let (sign, angle) = (if sweep < 0.0 { -1.0 } else { 1.0 }, libm::fabs(sweep));
     let least = MIN_FRACTION as f64 / TURN * TAU;
     within(Quantity::Sweep, angle, [least * (1.0 - 1e-9), f64::from(MAX_TURNS) * TAU])?;
+    within(Quantity::Rise, rise, [-2.0 * MAX_POSITION_M, 2.0 * MAX_POSITION_M])?;
     let per_turn = n.map(|n| n * rise * TAU / angle);
     // Steeper than that it is more of a line: the travel of a whole turn would not fit into a coordinate.
     for travel in per_turn {

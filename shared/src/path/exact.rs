@@ -81,11 +81,14 @@ pub const fn on_arc([base_nm, u_half_nm, v_half_nm]: [i32; 3], c: i32, s: i32) -
 }
 
 /// Travel along the axis, nm, after so many turns (whole, and their fraction).
+#[inline(always)]
 pub fn risen(per_turn_nm: [i32; 3], turns: i32, fraction_q32: u32) -> [i32; 3] {
-    per_turn_nm.map(|rise| {
-        let part = (i64::from(rise) * i64::from(fraction_q32)) >> 32;
+    let along = |rise: i32| {
+        let part = i64::from(rise).wrapping_mul(i64::from(fraction_q32)) >> 32;
         rise.wrapping_mul(turns).wrapping_add(part as i32)
-    })
+    };
+    let [x, y, z] = per_turn_nm;
+    [along(x), along(y), along(z)]
 }
 
 impl ExactArc {

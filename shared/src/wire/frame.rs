@@ -1,8 +1,8 @@
 //! Frames: `COBS(payload · CRC-32) · 00`. Bytes may be lost, changed or joined anywhere; whatever arrives,
 //! [`Accumulator`] finds the next whole frame after the next zero.
 use super::crc32;
+use super::writer::Writer;
 use cobs::{DecodeResult, DecoderState};
-use postcard::ser_flavors::Flavor;
 use serde::Serialize;
 
 /// Longest payload: the largest message is a batch of set-points.
@@ -22,34 +22,6 @@ const _: () =
 #[error("message does not fit into a frame")]
 pub struct TooLong;
 
-/// The place of a payload. Its calls are not inlined into each of the hundreds of places that make one: in an image they
-/// took 2 KB.
-struct Payload<'a> {
-    bytes: &'a mut [u8],
-    length: usize,
-}
-
-impl Flavor for Payload<'_> {
-    type Output = usize;
-
-    #[inline(never)]
-    fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
-        let place = self.bytes.get_mut(self.length).ok_or(postcard::Error::SerializeBufferFull)?;
-        *place = byte;
-        self.length += 1;
-        Ok(())
-    }
-
-    #[inline(never)]
-    fn try_extend(&mut self, bytes: &[u8]) -> postcard::Result<()> {
-        bytes.iter().try_for_each(|byte| self.try_push(*byte))
-    }
-
-    fn finalize(self) -> postcard::Result<usize> {
-        Ok(self.length)
-    }
-}
-
 /// Writes the frame of `message` to the start of `out` and returns it.
 ///
 /// # Errors
@@ -57,9 +29,9 @@ impl Flavor for Payload<'_> {
 pub fn encode<'a, M: Serialize>(message: &M, out: &'a mut [u8]) -> Result<&'a mut [u8], TooLong> {
     let (_, place) = out.split_first_mut().ok_or(TooLong)?;
     let most = place.len().min(MAX_PAYLOAD);
-    let payload = Payload { bytes: place.get_mut(..most).ok_or(TooLong)?, length: 0 };
-    let length = postcard::serialize_with_flavor(message, payload).map_err(|_| TooLong)?;
-    close(length, out)
+    let mut payload = Writer::new(place.get_mut(..most).ok_or(TooLong)?);
+    message.serialize(&mut payload).map_err(|_| TooLong)?;
+    close(payload.length().ok_or(TooLong)?, out)
 }
 
 /// Makes a frame of a payload that begins at the second byte of `out`: CRC, COBS in its place, zero.

@@ -1,6 +1,6 @@
 //! The messages. A change here is a change of [`PROTOCOL_VERSION`].
 use super::Refusal;
-use crate::path::ExactCircle;
+use crate::path::{ExactCircle, ExactSegment};
 use serde::de::{Error, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -98,6 +98,19 @@ pub enum Command {
         /// ms.
         after_ms: u16,
     },
+    /// Opens a program, at rest: a run whose segments follow. It lasts until [`Command::End`] and what was appended before
+    /// it; a stop, a fault or a dead link ends it at once.
+    Begin,
+    /// The next segment of the open program, from where the one before ends. Refused with
+    /// [`QueueFull`](super::MotionRefusal::QueueFull) while there is no room: the queue is the look-ahead.
+    Append {
+        /// The segment.
+        segment: ExactSegment,
+        /// How far the path may leave its joint with the segment before, nm; 0: exact stop.
+        tolerance_nm: u32,
+    },
+    /// The program has no more segments.
+    End,
 }
 
 /// Reads an array of bytes in a loop: serde's own way is a piece of code a byte, 700 bytes of an image.
@@ -272,6 +285,8 @@ pub struct Counters {
     pub uncorrected_segments: u32,
     /// Stops, by command or input.
     pub stops: u32,
+    /// Segments finished.
+    pub segments: u32,
     /// Runs during which the link died.
     pub link_losses: u32,
 }
@@ -296,6 +311,8 @@ pub struct Status {
     pub slots: [SlotState; 2],
     /// Probation of the table in use.
     pub probation: Probation,
+    /// Segments that wait.
+    pub queued: u8,
     /// Ticks since boot, wrapping.
     pub tick: u32,
     /// Deepest stack since boot, bytes; 0: not measured.

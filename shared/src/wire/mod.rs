@@ -21,6 +21,7 @@ pub mod crc;
 pub mod frame;
 pub mod message;
 pub mod refusal;
+mod writer;
 
 /// Paths are asked for in the engine's own numbers.
 pub use crate::path::{ExactArc, ExactCircle, ExactSegment, Quantity};

@@ -112,6 +112,9 @@ pub enum MotionRefusal {
     /// The queue of segments is full.
     #[error("no room in the queue of segments")]
     QueueFull,
+    /// Nothing to append to: none was opened, or it was stopped, or the link was dead.
+    #[error("no program is open, or it was stopped")]
+    NoProgram,
     /// The engine is in fault.
     #[error("the controller is in fault; reset it")]
     Fault,

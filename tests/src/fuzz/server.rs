@@ -1,8 +1,9 @@
 //! The server's state machine, with the engine behind it: a conversation of frames, raw bytes, time and resets.
 use super::bench::{Bench, Flash};
+use giotto_shared::path::Segment;
 use giotto_shared::wire::{
-    self, Accumulator, CHUNK, Chunk, Command, ExactCircle, FromController, MAX_FRAME, Reply, Request, Status,
-    crc32,
+    self, Accumulator, CHUNK, Chunk, Command, ExactCircle, ExactSegment, FromController, MAX_FRAME, Reply,
+    Request, Status, crc32,
 };
 
 /// Reads a conversation.
@@ -85,7 +86,7 @@ pub fn run(bytes: &[u8]) {
     let mut talk = Talk { bench: Bench::boot(Flash::new()), seq: 0 };
     talk.ask(Command::Hello);
     while let Some(step) = script.byte() {
-        match step % 12 {
+        match step % 14 {
             0 => drop(talk.send(script.some(usize::from(step) / 4))),
             1 => {
                 let length = script.byte().unwrap_or(0);
@@ -133,6 +134,23 @@ pub fn run(bytes: &[u8]) {
                 };
                 drop(talk.ask(Command::RunCircle(run)));
             }
+            12 => {
+                let mut coordinate = || (i32::from(script.byte().unwrap_or(9)) - 128) * 3_000_000;
+                let place = [coordinate(), coordinate(), 0];
+                let segment = match step / 14 {
+                    0..6 => ExactSegment::Line { to_nm: place, feed_m_s: 0.5 },
+                    6..8 => ExactSegment::Dwell { time_s: 0.01 },
+                    // From where it stands, if nothing is in the queue.
+                    _ => {
+                        let centre_m = place.map(|nm| f64::from(nm) * 1e-9);
+                        let (normal, sweep_rad) = ([0.0, 0.0, 1.0], f64::from(step) / 40.0);
+                        let arc = Segment::Arc { centre_m, normal, sweep_rad, rise_m: 0.01, feed_m_s: 0.3 };
+                        arc.exact(talk.status().raw_nm).unwrap_or(ExactSegment::Dwell { time_s: f32::NAN })
+                    }
+                };
+                drop(talk.ask(Command::Append { segment, tolerance_nm: u32::from(step) << 12 }));
+            }
+            13 => drop(talk.ask(if step > 100 { Command::Begin } else { Command::End })),
             10 if step > 200 => talk.bench.set_stop_input(step > 230),
             10 => drop(talk.ask(Command::Stop)),
             _ => {
@@ -151,11 +169,12 @@ pub fn run(bytes: &[u8]) {
     }
 }
 
-/// A flash and a run; a run, a stop and a reset.
+/// A flash and a run; a run, a stop and a reset; a program.
 pub fn seeds() -> Vec<Vec<u8>> {
     vec![
         vec![4, 0, 1, 1, 5, 6, 9, 128, 100, 60, 0, 3, 255, 3, 255, 10, 3, 255, 11],
         vec![9, 128, 30, 20, 7, 3, 200, 10, 3, 100, 8, 3, 1, 255, 3, 9],
+        vec![111, 12, 200, 90, 12, 100, 100, 3, 255, 250, 12, 1, 3, 255, 13, 3, 255, 3, 255],
         vec![4, 1, 1, 1, 5, 11, 4, 0, 1, 1, 5, 6, 4, 1, 1, 1, 5, 6, 7, 7, 11],
     ]
 }

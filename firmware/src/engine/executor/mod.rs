@@ -15,7 +15,7 @@
 //! | set-point of a stream ([`super::Stream`]) | 143 | 143 |
 //!
 //! These are arcs whose bounds the planner proved; all else (lines, helices, arcs at their bounds, stops in a ramp,
-//! engagement) runs in `curve` and `between` and takes longer: a helix 496 at most, 563 with the same eight terms; between
+//! engagement) runs in `curve` and `between` and takes longer: a helix 455 at most, 522 with the same eight terms; between
 //! two ticks of 8 kHz at 25 MHz are 3125.
 mod arc;
 mod between;

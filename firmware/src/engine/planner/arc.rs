@@ -43,11 +43,14 @@ impl Planner {
         if arc.turns > MAX_TURNS || (arc.turns == 0 && arc.fraction < MIN_FRACTION) {
             return Err(Refused::OutOfBounds(Quantity::Sweep));
         }
+        let turns = arc.turns as f32 + arc.fraction as f32 * TURNS_PER_UNIT;
+        // As whole nanometres the end may have wrapped: its last turn is looked at before.
+        let ([cx, cy, cz], [rx, ry, rz]) = (to_m(arc.centre_nm), rise.map(|rise| rise * turns));
+        self.check_reach([cx + rx, cy + ry, cz + rz], radius)?;
         if arc.gap_nm(self.position_nm).iter().any(|gap| gap.unsigned_abs() > MAX_GAP_NM) {
             return Err(Refused::OutOfBounds(Quantity::Gap));
         }
         let end = arc.end_nm(self.position_nm);
-        inside(&end, Quantity::Position)?;
         let slope = length(rise) / (TAU * radius);
         let ([ux, uy, _], [vx, vy, _]) = (u, v);
         let round = Round {
@@ -67,9 +70,8 @@ impl Planner {
         let feed = feed.min(libm::sqrtf(0.9 / (1.0 + MAX_GAIN) * limit * radius));
         // The feed is that in the plane: a steep helix is slower, so that feed and acceleration hold along its axis too.
         let feed = feed.min(self.machine.feed_m_s / slope.max(1e-9));
-        let angle = (arc.turns as f32 + arc.fraction as f32 * TURNS_PER_UNIT) * TAU;
         let timing = |stretch: f32| {
-            let (ramp_ticks, cruise_ticks) = self.profile(angle * radius, feed, stretch)?;
+            let (ramp_ticks, cruise_ticks) = self.profile(turns * TAU * radius, feed, stretch)?;
             way.share_out(ramp_ticks, cruise_ticks).ok_or(Refused::OutOfBounds(Quantity::Feed))
         };
         self.round(&round, limit, &timing, segment)?;

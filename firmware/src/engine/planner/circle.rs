@@ -11,15 +11,31 @@ use giotto_shared::angle::sincos;
 use giotto_shared::path::{ExactCircle, MAX_RADIUS_M, MAX_TURNS, Quantity};
 
 impl Planner {
-    /// The positioning move to where a circle starts (`None` if already there) and the circle, both written in place: they are
-    /// large.
-    #[inline(never)]
-    pub fn circle(
+    /// The positioning move to where a circle starts, unless the last segment ends there, and the circle: one after the other
+    /// in the same place, since they are large, and handed to `send`. Nothing is sent if either is refused.
+    pub fn circle_from_here(
         &mut self,
         run: &ExactCircle,
-        approach: &mut Option<Planned>,
-        circle: &mut Planned,
+        place: &mut Planned,
+        mut send: impl FnMut(&Planned),
     ) -> Result<(), Refused> {
+        let here = self.position_nm;
+        self.circle(run, place)?;
+        let start = place.start_nm;
+        if start != here {
+            // Planned again behind its approach, it is the same.
+            self.position_nm = here;
+            self.line_to(start, self.machine.positioning_m_s, place)?;
+            send(place);
+            self.circle(run, place)?;
+        }
+        send(place);
+        Ok(())
+    }
+
+    /// The circle, wherever the last segment ends.
+    #[inline(never)]
+    fn circle(&mut self, run: &ExactCircle, circle: &mut Planned) -> Result<(), Refused> {
         let arm = run.radius_half_nm;
         let radius_m = positive(arm as f32 * 0.5e-9, Quantity::Radius)?;
         let feed_m_s = positive(run.feed_m_s, Quantity::Feed)?;
@@ -66,13 +82,7 @@ impl Planner {
             let (c, s) = sincos((phase >> 32) as u32);
             circle.axes.map(|axis| axis.on_arc(c, s))
         };
-        let (start, end) = (at(circle.timing.start), at(circle.timing.end));
-        (circle.start_nm, circle.end_nm) = (start, end);
-        *approach = None;
-        if start != self.position_nm {
-            let line = approach.insert(Planned::default());
-            self.line_to(start, self.machine.positioning_m_s, line)?;
-        }
+        (circle.start_nm, circle.end_nm) = (at(circle.timing.start), at(circle.timing.end));
         self.position_nm = circle.end_nm;
         Ok(())
     }

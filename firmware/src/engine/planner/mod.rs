@@ -109,11 +109,6 @@ impl Planner {
         self.position_nm
     }
 
-    /// Forgets the last planned segments: plans on from an earlier end.
-    pub(crate) fn rewind(&mut self, position_nm: [i32; 3]) {
-        self.position_nm = position_nm;
-    }
-
     /// One segment from where the last one ends, written in place: it is large.
     #[inline(never)]
     pub fn segment(&mut self, segment: &ExactSegment, planned: &mut Planned) -> Result<(), Refused> {

@@ -51,9 +51,7 @@ impl Planner {
         segment: &mut Planned,
     ) -> Result<(), Refused> {
         let place_m = to_m(round.centre_nm);
-        if round.radius_m + length(place_m) > MAX_POSITION_M as f32 {
-            return Err(Refused::OutOfBounds(Quantity::Position));
-        }
+        self.check_reach(place_m, round.radius_m)?;
         let radius_m = Some(round.radius_m);
         let asked = Asked { place_m, radius_m, feed_m_s: round.feed_m_s, ccw: Some(round.ccw) };
         // Out of the numbers of the law at constant rate: not corrected, and counted so.
@@ -98,6 +96,12 @@ impl Planner {
         segment.rise.end_term_q1 = end_term(&timing);
         segment.fall = segment.rise.turned_round();
         Ok(())
+    }
+
+    /// Every point of a circle is one that the engine can hold.
+    pub(super) fn check_reach(&self, centre_m: [f32; 3], radius_m: f32) -> Result<(), Refused> {
+        let inside = radius_m + length(centre_m) <= MAX_POSITION_M as f32;
+        if inside { Ok(()) } else { Err(Refused::OutOfBounds(Quantity::Position)) }
     }
 
     fn around(&self, timing: &Timing) -> Motion {

@@ -54,6 +54,8 @@ impl Motion for Bench {
             dropped_segments: 0,
             uncorrected_segments: 0,
             stops: 0,
+            segments: 0,
+            queued: 0,
             fault: None,
             stop_input: false,
         }
@@ -74,6 +76,21 @@ impl Motion for Bench {
     fn run_circle(&mut self, _: &ExactCircle) -> Result<(), MotionRefusal> {
         self.state = MotionState::Running;
         self.runs += 1;
+        Ok(())
+    }
+
+    fn begin(&mut self) -> Result<(), MotionRefusal> {
+        self.state = MotionState::Running;
+        self.runs += 1;
+        Ok(())
+    }
+
+    fn append(&mut self, _: &ExactSegment, _: u32) -> Result<(), MotionRefusal> {
+        Ok(())
+    }
+
+    fn end(&mut self) -> Result<(), MotionRefusal> {
+        self.state = MotionState::Idle;
         Ok(())
     }
 

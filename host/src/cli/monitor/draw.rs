@@ -119,11 +119,11 @@ fn words(status: &Status) -> Vec<Line<'static>> {
         format!("programmed   {} mm", place(status.raw_nm)),
         format!("corrected    {} mm", place(status.corrected_nm)),
         format!("ticks        {}", status.tick),
-        format!("overruns     {}", counts.tick_overruns),
+        format!("overruns     {}; {} uncorrected", counts.tick_overruns, counts.uncorrected_segments),
         format!("clamps       offset {}, rate {}", counts.offset_clamps, counts.slew_clamps),
         format!(
-            "segments     {} dropped, {} uncorrected",
-            counts.dropped_segments, counts.uncorrected_segments
+            "segments     {} done, {} waiting, {} dropped",
+            counts.segments, status.queued, counts.dropped_segments
         ),
         format!("stops        {}, {} runs lost their host", counts.stops, counts.link_losses),
         format!("link         {} CRC errors, {} malformed", counts.crc_errors, counts.malformed_frames),
@@ -153,6 +153,7 @@ mod tests {
             active: Some(1),
             slots: [SlotState::Empty, SlotState::Invalid],
             probation: Probation::None,
+            queued: 2,
             tick: 4321,
             stack_bytes: 0,
             idle_permille: None,
@@ -190,6 +191,7 @@ mod tests {
             "motion       running, stop input active",
             "on, table in slot 1",
             "7 CRC errors",
+            "0 done, 2 waiting",
             "×500: up to 12.0 µm",
             "50.0120 0.0000",
             "q quit",

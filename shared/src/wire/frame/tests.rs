@@ -32,6 +32,18 @@ fn largest_messages_fit() {
     let command = Command::WriteChunk { offset: u16::MAX, data: data.clone() };
     framed(&Request { session: u16::MAX, seq: u16::MAX, command });
     framed(&Request { session: u16::MAX, seq: u16::MAX, command: Command::Provision { key: [255; 32] } });
+    let most_nm = [i32::MIN; 3];
+    let arc = ExactArc {
+        centre_nm: most_nm,
+        u_half_nm: most_nm,
+        v_half_nm: most_nm,
+        rise_nm: most_nm,
+        turns: u32::MAX,
+        fraction: u64::MAX,
+        feed_m_s: f32::MAX,
+    };
+    let command = Command::Append { segment: ExactSegment::Arc(arc), tolerance_nm: u32::MAX };
+    framed(&Request { session: u16::MAX, seq: u16::MAX, command });
     let reply = |reply| framed(&FromController::Reply { session: u16::MAX, seq: u16::MAX, reply });
     reply(Reply::Data { offset: u16::MAX, data });
     let name: heapless::String<16> = "1234567890123456".try_into().unwrap();
@@ -55,6 +67,7 @@ fn largest_messages_fit() {
         active: Some(1),
         slots: [slot; 2],
         probation: Probation::FirstRun,
+        queued: u8::MAX,
         tick: most,
         stack_bytes: most,
         idle_permille: Some(u16::MAX),
@@ -73,6 +86,7 @@ fn largest_messages_fit() {
             dropped_segments: most,
             uncorrected_segments: most,
             stops: most,
+            segments: most,
             link_losses: most,
         },
     }));
