@@ -45,11 +45,14 @@ impl Built {
         {
             return Err(ZoneError::Value(Some(index)));
         }
-        let profile = Profile::new(&zone.terms).map_err(|e| ZoneError::Term(index, e))?;
+        let profile = if zone.terms.is_empty() {
+            None
+        } else {
+            Some(Profile::new(&zone.terms).map_err(|e| ZoneError::Term(index, e))?)
+        };
         let reference_m = zone
             .place_m
             .map(|[[x0, y0, z0], [x1, y1, z1]]| [0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (z0 + z1)]);
-        let profile = (!zone.terms.is_empty()).then_some(profile);
         let third_s3 = cumulants.third_of_lag_and_average() / 6.0;
         Ok(Self { operator: Operator::new(&cumulants), third_s3, profile, reference_m })
     }

@@ -108,6 +108,7 @@ pub struct Server<F, M, B> {
 
 impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     /// Boots: the newest confirmed table that this image reads goes to the engine; if there is none, bypass.
+    #[inline(never)]
     pub fn boot(board: Board, flash: F, layout: Layout, motion: M, mut buffers: B) -> Self {
         let mut store = Store::open(flash, layout, &mut buffers.image);
         let key = store.key();

@@ -57,14 +57,10 @@ impl Planner {
             self.bound(segment, &bounds);
             segment.rise = law.rounded();
             if let Some(profile) = &zone.profile {
-                // Without a place there is no point that position errors could be counted from.
-                let mut profile = *profile;
-                if zone.reference_m.is_none() {
-                    profile.position = [[0.0; 2]; 2];
-                }
-                let seen = seen_from(start, zone.reference_m.unwrap_or_default());
+                // Without a place there is no point that errors of position could be counted from.
+                let seen = zone.reference_m.map(|reference| seen_from(start, reference));
                 let motion = self.motion(&timing, 1.0 / Way::LINE_TURNS);
-                segment.extra = terms::on_line(&profile, &motion, span, seen);
+                terms::on_line(profile, &motion, span, seen, &mut segment.extra);
                 segment.extended = true;
                 if !segment.extra.within_numbers() {
                     return Err(Refused::OutOfBounds(Quantity::Terms));

@@ -56,11 +56,12 @@ impl Planner {
         let asked = Asked { place_m, radius_m, feed_m_s: round.feed_m_s, ccw: Some(round.ccw) };
         // Out of the numbers of the law at constant rate: not corrected, and counted so.
         let endless = Motion { ramp_s: ENDLESS_S, ..self.around(&timing(1.0)?) };
-        let zone = self.zones.choose(&asked).filter(|zone| {
+        let zone = self.zones.choose(&asked);
+        let zone = zone.as_ref().filter(|zone| {
             let law = ArcLaw::new(zone, &endless);
             law.load() <= 1.0 && law.steady().abs() <= MAX_GAIN
         });
-        let (zone, bounds) = (zone.as_ref(), self.bounds(zone.is_some()));
+        let bounds = self.bounds(zone.is_some());
         let law = zone.map(|zone| ArcLaw::new(zone, &endless));
         let steady = demand(round, zone, &endless, &worst::on_arc(law.as_ref(), &endless));
         let curable = steady.correction(&bounds) <= 1.0;
@@ -122,7 +123,8 @@ fn correct(
         (axis.a, axis.b) = (share(axis.u), share(axis.v));
     }
     let Some(profile) = &zone.profile else { return Ok(()) };
-    let extra = terms::on_arc(profile, motion, arm(round.u), arm(round.v), round.seen(zone));
+    let extra = &mut segment.extra;
+    terms::on_arc(profile, motion, [arm(round.u), arm(round.v)], round.seen(zone), extra);
     if !extra.within_numbers() {
         return Err(Refused::OutOfBounds(Quantity::Terms));
     }
@@ -130,7 +132,7 @@ fn correct(
         let (a, b) = linear.steady();
         (axis.a, axis.b) = (axis.a.saturating_add(a), axis.b.saturating_add(b));
     }
-    (segment.extra, segment.extended) = (extra, true);
+    segment.extended = true;
     Ok(())
 }
 

@@ -22,9 +22,16 @@ fn by([a, b]: [f32; 2], [x, y]: [f32; 2]) -> f32 {
     a * x + b * y
 }
 
-/// For an arc with vectors u and v (m), its centre seen from the reference point (m).
-pub(super) fn on_arc(p: &Profile<f32>, m: &Motion, u: [f32; 3], v: [f32; 3], centre: [f32; 2]) -> Extra {
-    let mut extra = unsteady(p, m);
+/// For an arc with vectors u and v (m), its centre seen from the reference point (m). Written in place, as all of these:
+/// they are large.
+pub(super) fn on_arc(
+    p: &Profile<f32>,
+    m: &Motion,
+    [u, v]: [[f32; 3]; 2],
+    centre: [f32; 2],
+    extra: &mut Extra,
+) {
+    unsteady(p, m, extra);
     let ([ux, uy, uz], [vx, vy, vz]) = (u, v);
     let outward = -p.radius_offset_m / super::numbers::length(u);
     let change = m.rate * FIRST / m.ramp_s;
@@ -63,12 +70,18 @@ pub(super) fn on_arc(p: &Profile<f32>, m: &Motion, u: [f32; 3], v: [f32; 3], cen
         && opposite(p.acceleration_s2)
         && shares.iter().all(|share| share.abs() < 0.24)
         && extra.within_numbers();
-    extra
 }
 
-/// For a line with a span (m), its start seen from the reference point (m).
-pub(super) fn on_line(p: &Profile<f32>, m: &Motion, span: [f32; 3], start: [f32; 2]) -> Extra {
-    let mut extra = unsteady(p, m);
+/// For a line with a span (m), its start seen from the reference point (m); `None`: there is none, and errors of position
+/// are left out.
+pub(super) fn on_line(
+    p: &Profile<f32>,
+    m: &Motion,
+    span: [f32; 3],
+    start: Option<[f32; 2]>,
+    extra: &mut Extra,
+) {
+    unsteady(p, m, extra);
     let [sx, sy, _] = span;
     let along = [sx, sy];
     let change = m.rate * FIRST / m.ramp_s;
@@ -76,21 +89,23 @@ pub(super) fn on_line(p: &Profile<f32>, m: &Motion, span: [f32; 3], start: [f32;
         let a = [-by(place, along), -m.rate * by(velocity, along), 0.0, -change * by(second, along)];
         Linear { a: a.map(nm2), b: [0; 4] }
     };
-    let ([px, py], [dx, dy], [ax, ay]) = (p.position, p.velocity_s, p.acceleration_s2);
+    let position = start.map_or([[0.0; 2]; 2], |_| p.position);
+    let ([px, py], [dx, dy], [ax, ay]) = (position, p.velocity_s, p.acceleration_s2);
     extra.linear = [axis(px, dx, ax), axis(py, dy, ay), Linear::default()];
-    extra.constant_fine = [px, py].map(|row| fine(-by(row, start)));
+    extra.constant_fine = [px, py].map(|row| fine(-by(row, start.unwrap_or_default())));
     extra.ahead = along.map(|span| [nm2(span), 0]);
-    extra
 }
 
 /// The terms that are the same on every curve.
-fn unsteady(p: &Profile<f32>, m: &Motion) -> Extra {
+#[inline(never)]
+fn unsteady(p: &Profile<f32>, m: &Motion, extra: &mut Extra) {
     let ticks = m.take_up_ticks as f32;
     let share = 3.75 / ticks;
     // By the sense of X, then of Y.
     let ([bx, by], [lx, ly]) = (p.backlash_m, p.lateral_m);
     let sides = [[bx, -lx], [ly, by]];
-    let turning = Turning {
+    *extra = Extra::default();
+    extra.turning = Turning {
         ticks: m.take_up_ticks,
         dx: single_to_fixed(2.0 / ticks, 31),
         first_x: single_to_fixed(1.0 / ticks - 1.0, 31),
@@ -102,14 +117,12 @@ fn unsteady(p: &Profile<f32>, m: &Motion) -> Extra {
             if spike.peak_m == 0.0 { 0 } else { single_to_fixed(decay(m.tick_s / spike.decay_s), 32) }
         }),
     };
-    let mut extra = Extra { turning, ..Extra::default() };
     let cyclic = p.cyclic.iter().filter(|c| c.amplitude_m != 0.0);
     for (built, c) in extra.cyclic.iter_mut().zip(cyclic) {
         *built = periodic(c);
         extra.periodic = extra.periodic.wrapping_add(1);
     }
     extra.sided = sides != [[0.0; 2]; 2] || extra.turning.spike != [0; 2];
-    extra
 }
 
 /// A periodic error. Over a metre of a fine pitch single precision would lose its phase: this divides integers.
