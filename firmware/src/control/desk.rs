@@ -1,14 +1,15 @@
 //! The background's half: plans what the tick runs, and is the [`Motion`] of the server.
-use super::SEGMENTS;
+use super::job::{Job, Points};
 use super::ports::{Receiver, Sender};
 use super::shared::Shared;
-use crate::engine::{Planned, Planner, Refused, ZoneError};
+use super::{SEGMENTS, STREAM_PLACES};
+use crate::engine::{MAX_POSITION_M, Planned, Planner, Refused, ZoneError};
 use crate::server::{Motion, Snapshot, TimedSetPoint};
 use core::ops::{Deref, DerefMut};
 use core::sync::atomic::Ordering::Relaxed;
-use giotto_shared::path::{ExactCircle, ExactSegment};
+use giotto_shared::path::{ExactCircle, ExactSegment, Quantity};
 use giotto_shared::table::{self, Table, TableError};
-use giotto_shared::wire::{MotionRefusal, MotionState, Refusal};
+use giotto_shared::wire::{self, MotionRefusal, MotionState, Refusal};
 
 /// What the background owns.
 pub struct Desk<P, S, O, I> {
@@ -18,18 +19,59 @@ pub struct Desk<P, S, O, I> {
     set_points: I,
     /// Ticks that had passed when a run was accepted: until the tick has seen it, it counts as running.
     accepted_at: Option<u32>,
+    /// What is open is a stream.
+    stream: Option<Streamed>,
+}
+
+/// Set-points of a stream so far.
+#[derive(Clone, Copy)]
+struct Streamed {
+    /// The newest one, nm, and its distance from the one before.
+    place_nm: [i32; 3],
+    step_nm: [i32; 3],
+    /// Number of the next one.
+    next: u16,
+    /// So many have to wait before the tick begins.
+    ahead: u16,
+}
+
+/// Farthest coordinate of a set-point, nm.
+const MAX_POSITION_NM: u32 = (MAX_POSITION_M * 1e9) as u32;
+
+impl Streamed {
+    /// Reads set-points: for each axis the change of the step from one to the next, as postcard writes an i32. `None`: bytes
+    /// are left over, or a place is none.
+    #[inline(never)]
+    fn read(&mut self, mut bytes: &[u8], points: &mut Points) -> Option<()> {
+        points.first = self.next;
+        while !bytes.is_empty() {
+            for (place, step) in self.place_nm.iter_mut().zip(&mut self.step_nm) {
+                let (change, rest) = wire::take::<i32>(bytes)?;
+                *step = step.wrapping_add(change);
+                *place = place.wrapping_add(*step);
+                bytes = rest;
+                if place.unsigned_abs() > MAX_POSITION_NM {
+                    return None;
+                }
+            }
+            *points.place_nm.get_mut(usize::from(points.count))? = self.place_nm;
+            points.count = points.count.wrapping_add(1);
+            self.next = self.next.wrapping_add(1);
+        }
+        Some(())
+    }
 }
 
 impl<P, S, O, I> Desk<P, S, O, I>
 where
     P: DerefMut<Target = Planner>,
     S: Deref<Target = Shared>,
-    O: Sender<Planned>,
+    O: Sender<Job>,
     I: Receiver<TimedSetPoint>,
 {
     /// Plans for the tick at the other end of these queues.
     pub fn new(planner: P, shared: S, segments: O, set_points: I) -> Self {
-        Self { planner, shared, segments, set_points, accepted_at: None }
+        Self { planner, shared, segments, set_points, accepted_at: None, stream: None }
     }
 
     /// A run may begin; it is planned from where the machine stands.
@@ -48,15 +90,31 @@ where
         Ok(())
     }
 
-    /// A program is open.
-    fn program(&self) -> Result<(), MotionRefusal> {
-        let open = self.shared.program_open(self.shared.epoch());
+    /// Something is open: a program, or a stream.
+    fn open(&self, stream: bool) -> Result<(), MotionRefusal> {
+        let open = self.shared.program_open(self.shared.epoch()) && self.stream.is_some() == stream;
         if open { Ok(()) } else { Err(MotionRefusal::NoProgram) }
+    }
+
+    /// Before the work of planning.
+    fn room(&self) -> Result<(), MotionRefusal> {
+        if self.segments.waiting() < SEGMENTS { Ok(()) } else { Err(MotionRefusal::QueueFull) }
     }
 
     fn accepted(&mut self, sent: bool) -> Result<(), MotionRefusal> {
         self.accepted_at = Some(self.shared.snapshot().tick);
         if sent { Ok(()) } else { Err(MotionRefusal::QueueFull) }
+    }
+
+    /// Plans a segment where the queue will take it from.
+    fn plan(
+        &mut self,
+        plan: impl FnOnce(&mut Planner, &mut Planned) -> Result<bool, Refused>,
+    ) -> Result<(), MotionRefusal> {
+        let mut job = Job::blank();
+        let Some(planned) = job.planned() else { return Ok(()) };
+        let sent = !plan(&mut self.planner, planned).map_err(in_words)? || self.segments.send(&job);
+        self.accepted(sent)
     }
 }
 
@@ -85,7 +143,7 @@ impl<P, S, O, I> Motion for Desk<P, S, O, I>
 where
     P: DerefMut<Target = Planner>,
     S: Deref<Target = Shared>,
-    O: Sender<Planned>,
+    O: Sender<Job>,
     I: Receiver<TimedSetPoint>,
 {
     fn snapshot(&self) -> Snapshot {
@@ -120,36 +178,67 @@ where
     #[inline(never)]
     fn run_circle(&mut self, run: &ExactCircle) -> Result<(), MotionRefusal> {
         self.ready()?;
-        let Self { planner, segments, .. } = self;
         // At rest the queue is empty, and it has room for both.
-        let mut sent = true;
-        planner
-            .circle_from_here(run, &mut Planned::default(), |planned| sent &= segments.send(planned))
-            .map_err(in_words)?;
-        self.accepted(sent)
+        self.plan(|planner, planned| planner.approach(run, planned))?;
+        self.plan(|planner, planned| planner.circle(run, planned).map(|()| true))
     }
 
     fn begin(&mut self) -> Result<(), MotionRefusal> {
         self.ready()?;
+        self.stream = None;
         self.shared.set_program(true);
         Ok(())
     }
 
     #[inline(never)]
     fn append(&mut self, segment: &ExactSegment, _tolerance_nm: u32) -> Result<(), MotionRefusal> {
-        self.program()?;
-        // Before the work of planning.
-        if self.segments.waiting() >= SEGMENTS {
-            return Err(MotionRefusal::QueueFull);
+        self.open(false)?;
+        self.room()?;
+        self.plan(|planner, planned| planner.segment(segment, planned).map(|()| true))
+    }
+
+    #[inline(never)]
+    fn begin_stream(&mut self, feed_m_s: f32, ahead: u16) -> Result<(), MotionRefusal> {
+        self.ready()?;
+        let plan = self.planner.stream(feed_m_s, STREAM_PLACES).map_err(in_words)?;
+        self.plan(|planner, planned| {
+            planner.clear(planned);
+            Ok(true)
+        })?;
+        self.shared.go.store(false, Relaxed);
+        let sent = self.segments.send(&Job::Stream(plan));
+        let place_nm = self.planner.position_nm();
+        self.stream = Some(Streamed { place_nm, step_nm: [0; 3], next: 0, ahead });
+        self.shared.set_program(true);
+        self.accepted(sent)
+    }
+
+    #[inline(never)]
+    fn points(&mut self, bytes: &[u8]) -> Result<(), MotionRefusal> {
+        self.open(true)?;
+        self.room()?;
+        let Some(mut streamed) = self.stream else { return Err(MotionRefusal::NoProgram) };
+        let mut job = Job::Points(Points::NONE);
+        if let Job::Points(points) = &mut job {
+            streamed.read(bytes, points).ok_or(MotionRefusal::Path(Quantity::Position))?;
         }
-        let mut planned = Planned::default();
-        self.planner.segment(segment, &mut planned).map_err(in_words)?;
-        let sent = self.segments.send(&planned);
+        let sent = self.segments.send(&job);
+        self.stream = Some(streamed);
+        if streamed.next >= streamed.ahead || self.segments.waiting() >= SEGMENTS {
+            self.shared.go.store(true, Relaxed);
+        }
         self.accepted(sent)
     }
 
     fn end(&mut self) -> Result<(), MotionRefusal> {
-        self.program()?;
+        if self.open(true).is_ok() {
+            self.room()?;
+            let first = self.stream.map_or(0, |streamed| streamed.next);
+            self.segments.send(&Job::Points(Points { first, last: true, ..Points::NONE }));
+            self.shared.go.store(true, Relaxed);
+        } else {
+            self.open(false)?;
+        }
         self.shared.set_program(false);
         // Until the tick has seen it, what was appended last counts as running.
         self.accepted(true)

@@ -14,10 +14,11 @@ pub trait Receiver<T> {
     /// The oldest one.
     fn receive(&mut self) -> Option<T>;
 
-    /// Moves the oldest one, if there is one, to a place.
-    fn receive_into(&mut self, place: &mut T) -> bool {
-        self.receive().map(|thing| *place = thing).is_some()
-    }
+    /// Looks at the oldest one where it is: a large thing taken out would pass over the stack.
+    fn look<R>(&mut self, look: impl FnOnce(&T) -> R) -> Option<R>;
+
+    /// Forgets the oldest one.
+    fn discard(&mut self);
 
     /// Things that wait.
     fn waiting(&self) -> usize;
@@ -41,9 +42,14 @@ impl<T: Copy, const N: usize> Receiver<T> for heapless_spsc::spsc::Consumer<'_, 
     }
 
     #[inline]
-    fn receive_into(&mut self, place: &mut T) -> bool {
-        // Copied where it is: a value taken out would pass over the stack.
-        self.peek().map(|thing| *place = *thing).is_some_and(|()| self.dequeue().is_some())
+    fn look<R>(&mut self, look: impl FnOnce(&T) -> R) -> Option<R> {
+        self.peek().map(look)
+    }
+
+    #[inline]
+    fn discard(&mut self) {
+        // The value is not used, so that it is not copied.
+        self.dequeue();
     }
 
     #[inline]

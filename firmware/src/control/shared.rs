@@ -1,5 +1,5 @@
 //! Words that the tick writes and the background reads, and the other way round.
-use crate::engine::{Counters, Fault, Output};
+use crate::engine::{Counters, Fault, Output, StreamCounters};
 use crate::server::Snapshot;
 use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU8, AtomicU16, AtomicU32, Ordering::Relaxed};
 use core::sync::atomic::{Ordering, compiler_fence};
@@ -24,7 +24,12 @@ pub struct Shared {
     uncorrected: AtomicU32,
     stops: AtomicU32,
     segments: AtomicU32,
+    missing: AtomicU32,
+    late: AtomicU32,
+    rejected: AtomicU32,
     // Written by the background.
+    /// A stream that waits may begin.
+    pub(super) go: AtomicBool,
     /// Epoch of the program that is open, or [`NO_PROGRAM`]. A stop ends the epoch, and the program with it.
     pub(super) program: AtomicU16,
     pub(super) bypass: AtomicBool,
@@ -52,6 +57,7 @@ const FAULT: u8 = 3;
 const NO_FAULT: u8 = 0;
 const OVERRUN: u8 = 1;
 const DISCONTINUITY: u8 = 2;
+const STARVED: u8 = 3;
 
 impl Shared {
     /// At rest at the origin, bypassed.
@@ -71,6 +77,10 @@ impl Shared {
             uncorrected: AtomicU32::new(0),
             stops: AtomicU32::new(0),
             segments: AtomicU32::new(0),
+            missing: AtomicU32::new(0),
+            late: AtomicU32::new(0),
+            rejected: AtomicU32::new(0),
+            go: AtomicBool::new(false),
             program: AtomicU16::new(NO_PROGRAM),
             bypass: AtomicBool::new(true),
             hold: AtomicBool::new(false),
@@ -87,6 +97,7 @@ impl Shared {
     }
 
     /// Publishes a tick.
+    #[allow(clippy::too_many_arguments, reason = "the words of one tick")]
     pub(super) fn publish(
         &self,
         tick: u32,
@@ -95,6 +106,7 @@ impl Shared {
         fault: Option<Fault>,
         output: &Output,
         counters: &Counters,
+        stream: &StreamCounters,
     ) {
         let state = match state {
             MotionState::Idle => REST,
@@ -117,10 +129,14 @@ impl Shared {
         self.uncorrected.store(counters.uncorrected, Relaxed);
         self.stops.store(counters.stops, Relaxed);
         self.segments.store(counters.segments, Relaxed);
+        self.missing.store(stream.missing, Relaxed);
+        self.late.store(stream.late, Relaxed);
+        self.rejected.store(stream.rejected, Relaxed);
         let fault = match fault {
             None => NO_FAULT,
             Some(Fault::Overrun) => OVERRUN,
             Some(Fault::Discontinuity) => DISCONTINUITY,
+            Some(Fault::Starved) => STARVED,
         };
         self.fault.store(fault, Relaxed);
         compiler_fence(Ordering::Release);
@@ -180,11 +196,15 @@ impl Shared {
             uncorrected_segments: self.uncorrected.load(Relaxed),
             stops: self.stops.load(Relaxed),
             segments: self.segments.load(Relaxed),
+            missing_set_points: self.missing.load(Relaxed),
+            late_set_points: self.late.load(Relaxed),
+            rejected_set_points: self.rejected.load(Relaxed),
             queued: 0,
             fault: match self.fault.load(Relaxed) {
                 NO_FAULT => None,
                 OVERRUN => Some(FaultCause::Overrun),
-                _ => Some(FaultCause::Discontinuity),
+                DISCONTINUITY => Some(FaultCause::Discontinuity),
+                _ => Some(FaultCause::Starved),
             },
             stop_input: self.stop_input.load(Relaxed),
         }

@@ -1,6 +1,6 @@
 //! Tick and desk with the queues of a board between them: stop command, stop input, silent host, late ticks.
 use super::*;
-use crate::engine::{Config, Executor, Planned, Planner};
+use crate::engine::{Config, Executor, Planner};
 use crate::server::{Motion, Snapshot, TimedSetPoint};
 use core::f64::consts::PI;
 use giotto_shared::Direction;
@@ -10,9 +10,9 @@ use heapless_spsc::spsc::{Consumer, Producer, Queue};
 use std::boxed::Box;
 use std::vec::Vec;
 
-type BenchTick = Tick<&'static Shared, Consumer<'static, Planned, 4>, Producer<'static, TimedSetPoint, 65>>;
+type BenchTick = Tick<&'static Shared, Consumer<'static, Job, 4>, Producer<'static, TimedSetPoint, 65>>;
 type BenchDesk =
-    Desk<Box<Planner>, &'static Shared, Producer<'static, Planned, 4>, Consumer<'static, TimedSetPoint, 65>>;
+    Desk<Box<Planner>, &'static Shared, Producer<'static, Job, 4>, Consumer<'static, TimedSetPoint, 65>>;
 
 struct Bench {
     desk: BenchDesk,
@@ -27,7 +27,7 @@ fn bench() -> Bench {
     let config = Config::robot(1000);
     // Leaked: the ends of a board's queues live for ever, too.
     let shared: &'static Shared = Box::leak(Box::new(Shared::new()));
-    let segments: &'static mut Queue<Planned, 4> = Box::leak(Box::new(Queue::new()));
+    let segments: &'static mut Queue<Job, 4> = Box::leak(Box::new(Queue::new()));
     let points: &'static mut Queue<TimedSetPoint, 65> = Box::leak(Box::new(Queue::new()));
     let (segments_in, segments_out) = segments.split();
     let (points_in, points_out) = points.split();

@@ -1,7 +1,10 @@
-//! The interrupt's half: one tick of the executor, its wishes before and its report after.
+//! The interrupt's half: one tick of the executor or of a stream, its wishes before and its report after.
+use super::STREAM_PLACES;
+use super::job::Job;
+use super::jobs::Jobs;
 use super::ports::{Receiver, Sender};
 use super::shared::Shared;
-use crate::engine::{Executor, Inbox, Output, Planned};
+use crate::engine::{Counters, Executor, Fault, Output, Stream, StreamState};
 use crate::server::TimedSetPoint;
 use core::ops::Deref;
 use core::sync::atomic::Ordering::Relaxed;
@@ -10,8 +13,11 @@ use giotto_shared::wire::{MotionState, SetPoint};
 /// What the timer interrupt owns.
 pub struct Tick<S, I, O> {
     executor: Executor,
+    stream: Stream<STREAM_PLACES>,
+    /// The stream runs; the executor stands.
+    streaming: bool,
     shared: S,
-    segments: Segments<I>,
+    jobs: Jobs<I>,
     set_points: O,
     now: u32,
     bypass: bool,
@@ -21,36 +27,20 @@ pub struct Tick<S, I, O> {
     recording: bool,
 }
 
-/// The queue, as the executor wants it.
-struct Segments<I> {
-    queue: I,
-    /// What waits is thrown away.
-    closed: bool,
-    dropped: u32,
-}
-
-impl<I: Receiver<Planned>> Inbox for Segments<I> {
-    #[inline]
-    fn take(&mut self, place: &mut Planned) -> bool {
-        let taken = self.queue.receive_into(place);
-        let thrown_away = taken && self.closed;
-        self.dropped = self.dropped.wrapping_add(u32::from(thrown_away));
-        taken && !thrown_away
-    }
-}
-
 impl<S, I, O> Tick<S, I, O>
 where
     S: Deref<Target = Shared>,
-    I: Receiver<Planned>,
+    I: Receiver<Job>,
     O: Sender<TimedSetPoint>,
 {
     /// At rest at the origin, bypassed.
-    pub fn new(executor: Executor, shared: S, segments: I, set_points: O) -> Self {
+    pub fn new(executor: Executor, shared: S, jobs: I, set_points: O) -> Self {
         Self {
             executor,
+            stream: Stream::idle(),
+            streaming: false,
             shared,
-            segments: Segments { queue: segments, closed: false, dropped: 0 },
+            jobs: Jobs::new(jobs),
             set_points,
             now: 0,
             bypass: true,
@@ -60,19 +50,54 @@ where
         }
     }
 
-    /// Once a period. Takes the wishes of the background, lets the executor make one set-point and reports it;
+    /// Once a period. Takes the wishes of the background, lets the executor or the stream make one set-point and reports it;
     /// the executor states the timing contract. `late`: the last tick was not finished when this one was due.
     #[inline]
     pub fn tick(&mut self, late: bool) -> Output {
         self.wishes(late);
-        let output = self.executor.tick(&mut self.segments);
+        let output = if self.streaming { self.stream_tick() } else { self.executor.tick(&mut self.jobs) };
+        if let Some(plan) = self.jobs.begins() {
+            self.stream.start(&plan, self.executor.rest_nm(), 0, self.bypass);
+            self.streaming = true;
+        }
         self.now = self.now.wrapping_add(1);
         let state = self.state();
         self.record(&output, state);
-        let mut counters = *self.executor.counters();
-        counters.dropped = counters.dropped.wrapping_add(self.segments.dropped);
         let (epoch, fault) = (self.executor.epoch(), self.executor.fault());
-        self.shared.publish(self.now, state, epoch, fault, &output, &counters);
+        self.shared.publish(self.now, state, epoch, fault, &output, &self.counters(), self.stream.counters());
+        output
+    }
+
+    fn counters(&self) -> Counters {
+        let mut counters = *self.executor.counters();
+        let bounds = &self.stream.counters().bounds;
+        counters.dropped = counters.dropped.wrapping_add(self.jobs.dropped());
+        counters.offset_cuts = counters.offset_cuts.wrapping_add(bounds.offset_cuts);
+        counters.slew_cuts = counters.slew_cuts.wrapping_add(bounds.slew_cuts);
+        counters
+    }
+
+    /// One set-point of the stream from the queue, if it has come.
+    #[inline(never)]
+    fn stream_tick(&mut self) -> Output {
+        let mut last = false;
+        let mut sample = None;
+        if self.stream.takes() {
+            let late;
+            (sample, last, late) = self.jobs.point(self.stream.expected());
+            self.stream.count_late(late);
+        }
+        let output = self.stream.tick(sample);
+        if last {
+            self.stream.finish();
+        }
+        if self.stream.over() {
+            self.streaming = false;
+            self.executor.set_position(output.nominal_nm);
+            if self.stream.state() == StreamState::Fault {
+                self.executor.fail(Fault::Starved);
+            }
+        }
         output
     }
 
@@ -80,25 +105,40 @@ where
     fn wishes(&mut self, late: bool) {
         if late {
             self.executor.overrun();
+            self.stream.stop();
         }
         let active = self.shared.stop_input.load(Relaxed);
-        let pressed = active && !(self.stop_input && self.executor.idle());
+        let pressed = active && !(self.stop_input && self.at_rest());
         self.stop_input = active;
         if pressed || self.shared.stop.load(Relaxed) {
             self.shared.stop.store(false, Relaxed);
-            self.executor.stop();
+            // A stream that stops already is not stopped again.
+            if !self.streaming || self.stream.takes() {
+                self.executor.stop();
+                self.stream.stop();
+            }
         }
-        self.segments.closed = active || self.shared.hold.load(Relaxed);
+        let closed = active || self.shared.hold.load(Relaxed);
+        self.jobs.look_at(closed, self.shared.go.load(Relaxed), self.executor.epoch());
         let bypass = self.shared.bypass.load(Relaxed);
         if bypass != self.bypass {
             self.bypass = bypass;
             self.executor.set_bypass(bypass);
+            self.stream.set_bypass(bypass);
         }
+    }
+
+    /// Neither executor nor stream move anything.
+    fn at_rest(&self) -> bool {
+        self.executor.idle() && !self.streaming
     }
 
     #[inline]
     fn state(&self) -> MotionState {
-        let at_rest = self.executor.idle() && self.segments.queue.waiting() == 0;
+        if self.streaming {
+            return if self.stream.takes() { MotionState::Running } else { MotionState::Stopping };
+        }
+        let at_rest = self.executor.idle() && self.jobs.waiting() == 0;
         if !at_rest {
             if self.executor.stopping() { MotionState::Stopping } else { MotionState::Running }
         } else if self.executor.fault().is_some() {

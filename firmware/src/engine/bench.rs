@@ -11,6 +11,8 @@ use giotto_shared::table::{Limits, Table, Travel, Zone};
 use giotto_shared::term::Term;
 
 const TICK_S: f64 = 1e-3;
+/// As on the images.
+const PLACES: usize = crate::control::STREAM_PLACES;
 const CENTRE_M: [f64; 3] = [0.1, -0.2, 0.3];
 const RADIUS_M: f64 = 0.1;
 const FEED_M_S: f64 = 0.5;
@@ -98,7 +100,7 @@ impl Arc {
 
 /// A streamed circle.
 pub struct Streamed {
-    stream: Stream,
+    stream: Stream<PLACES>,
     sequence: u16,
 }
 
@@ -107,7 +109,7 @@ impl Streamed {
     pub fn new() -> Option<Self> {
         let mut planner = Planner::new(&Config::robot(1000), position(0));
         planner.set_table(Some(&table(false))).ok()?;
-        let plan = planner.stream(1.0).ok()?;
+        let plan = planner.stream(1.0, PLACES).ok()?;
         Some(Self { stream: Stream::new(&plan, position(0), 0, false), sequence: 0 })
     }
 

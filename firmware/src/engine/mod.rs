@@ -51,7 +51,7 @@ pub use giotto_shared::path::{
 };
 pub use planned::Planned;
 pub use planner::{Planner, Refused};
-pub use stream::{MAX_STRIDE, Stream, StreamCounters, StreamPlan, StreamSample, StreamState};
+pub use stream::{PLACES, Stream, StreamCounters, StreamPlan, StreamSample, StreamState};
 pub use zones::ZoneError;
 
 use giotto_shared::table::Table;
@@ -98,6 +98,8 @@ pub enum Fault {
     Overrun,
     /// A segment did not start where the machine stands.
     Discontinuity,
+    /// Set-points of a stream stayed away.
+    Starved,
 }
 
 /// Counts since start; they wrap.
@@ -165,11 +167,14 @@ impl Engine {
     pub fn run_circle(&mut self, run: &CircleRun) -> Result<(), Refused> {
         self.ready(2)?;
         let run = run.exact()?;
-        let Self { planner, queue, .. } = self;
-        planner.circle_from_here(&run, &mut Planned::default(), |planned| {
-            // Room for both was checked.
-            let _ = queue.enqueue(*planned);
-        })
+        let mut planned = Planned::default();
+        // Room for both was checked.
+        if self.planner.approach(&run, &mut planned)? {
+            let _ = self.queue.enqueue(planned);
+        }
+        self.planner.circle(&run, &mut planned)?;
+        let _ = self.queue.enqueue(planned);
+        Ok(())
     }
 
     /// Appends a segment; it runs with an exact stop at its ends.

@@ -10,6 +10,8 @@ pub(crate) enum Kind {
     /// Stands still for `Timing::cruise_ticks`.
     #[default]
     Dwell,
+    /// As a dwell of one tick, once the offset has moved to none.
+    Clear,
     /// p = base + u·share, v its unit direction.
     Line,
     /// p = base + u·cosφ + v·sinφ.

@@ -19,8 +19,8 @@ use core::sync::atomic::{Ordering, compiler_fence};
 use giotto_shared::fixed::{mulh, mulh_add, single_to_fixed};
 use giotto_shared::law::Operator;
 
-/// Longest distance of the places, samples; a power of two.
-pub const MAX_STRIDE: u32 = 32;
+/// Places of a [`Stream`] that is told nothing else.
+pub const PLACES: usize = 32;
 /// Ticks over which a set-point that comes after a gap is joined.
 const JOIN_TICKS: u32 = 32;
 
@@ -49,8 +49,10 @@ pub enum StreamState {
 }
 
 /// A stream in the form that the tick runs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct StreamPlan {
+    /// Streams planned before a stop carry an older one.
+    pub(crate) epoch: u8,
     /// Ticks between the places.
     stride: u32,
     /// Weights of the inner and outer second difference, Q28.
@@ -76,10 +78,13 @@ const CARE: u32 = u32::MAX;
 
 /// What a plan is made from.
 pub(crate) struct StreamNeeds {
+    pub(crate) epoch: u8,
     pub(crate) operator: Option<Operator<f32>>,
     pub(crate) rate_hz: f32,
     /// Distance of the places wanted, s.
     pub(crate) window_s: f32,
+    /// Longest distance of the places that the stream has memory for, ticks.
+    pub(crate) longest: u32,
     pub(crate) feed_m_s: f32,
     pub(crate) acceleration_m_s2: f32,
     pub(crate) hold_ticks: u32,
@@ -91,7 +96,7 @@ pub(crate) struct StreamNeeds {
 impl StreamPlan {
     /// `None` if the operator is too strong for so short a window.
     pub(crate) fn build(n: &StreamNeeds) -> Option<Self> {
-        let stride = ((n.window_s * n.rate_hz + 0.5) as u32).clamp(1, MAX_STRIDE);
+        let stride = ((n.window_s * n.rate_hz + 0.5) as u32).clamp(1, n.longest);
         let h = stride as f32 / n.rate_hz;
         let operator = n.operator.unwrap_or_default();
         // p(−h) − 2p + p(h) is s²h² + s⁴h⁴/12 + …, with 2h it is 4 s²h² + 16 s⁴h⁴/12 + …
@@ -108,6 +113,7 @@ impl StreamPlan {
         let brake_shift = u32::BITS - whole_above(ratio).saturating_sub(1).leading_zeros();
         let [offset_nm, slew_nm] = n.bounds_nm;
         Some(Self {
+            epoch: n.epoch,
             stride,
             inner: single_to_fixed(inner, WEIGHT_BITS),
             outer: single_to_fixed(outer, WEIGHT_BITS),
@@ -131,6 +137,11 @@ impl StreamPlan {
         let inner = p1.wrapping_add(p3).wrapping_sub(twice).wrapping_mul(SCALE);
         let outer = p0.wrapping_add(p4).wrapping_sub(twice).wrapping_mul(SCALE);
         mulh_add(mulh(outer, self.outer), inner, self.inner)
+    }
+
+    /// The epoch it was planned in.
+    pub(crate) const fn epoch(&self) -> u8 {
+        self.epoch
     }
 
     /// Ticks from a set-point in to the same one out.
@@ -168,10 +179,11 @@ struct Kept {
     axes: [[i32; 4]; 3],
 }
 
-/// The stream's tick. What each tick needs comes first: there one load reaches two words.
+/// The stream's tick, with memory for a stride of `N` ticks, a power of two. What each tick needs comes first: there one
+/// load reaches two words.
 #[repr(C)]
 #[derive(Clone, Debug)]
-pub struct Stream {
+pub struct Stream<const N: usize = PLACES> {
     plan: StreamPlan,
     guard: Guard,
     /// Place of the newest set-point in `kept`.
@@ -179,7 +191,7 @@ pub struct Stream {
     /// Number of the set-point that may be taken as it is, or [`CARE`].
     regular: u32,
     /// By the tick's place in a stride.
-    kept: [Kept; MAX_STRIDE as usize],
+    kept: [Kept; N],
     /// Velocity per tick and its change per tick where regular set-points ended; meant only while care is needed.
     velocity: [i32; 3],
     change: [i32; 3],
@@ -209,31 +221,78 @@ pub struct StreamCounters {
     pub bounds: Counters,
 }
 
-impl Stream {
-    /// At rest at a position; the first set-point expected is number `sequence`, there.
-    pub fn new(plan: &StreamPlan, position_nm: [i32; 3], sequence: u16, bypass: bool) -> Self {
-        let [x, y, z] = position_nm;
-        let engage = Engage::new(plan.engage_ticks, !bypass);
-        let mut guard = Guard::new(plan.offset_nm, plan.slew_nm);
-        guard.watch(bypass);
+impl<const N: usize> Stream<N> {
+    /// Bits of a place; no other `N` compiles.
+    const MASK: usize = {
+        assert!(N.is_power_of_two(), "places are found by masking");
+        N - 1
+    };
+
+    /// At rest at the origin, over before it began.
+    pub fn idle() -> Self {
         Self {
-            plan: *plan,
-            kept: [Kept { axes: [[x; 4], [y; 4], [z; 4]], offset: [0; 4] }; MAX_STRIDE as usize],
+            plan: StreamPlan::default(),
+            kept: [Kept { axes: [[0; 4]; 3], offset: [0; 4] }; N],
             place: 0,
-            regular: u32::from(sequence),
+            regular: CARE,
             velocity: [0; 3],
             change: [0; 3],
-            state: StreamState::Running,
-            sequence,
+            state: StreamState::Ended,
+            sequence: 0,
             missing: 0,
             settling: 0,
             bias_nm: [0; 3],
             joining: false,
             join: Clock::default(),
-            guard,
-            engage,
+            guard: Guard::new(0, 0),
+            engage: Engage::new(1, false),
             counters: StreamCounters::default(),
         }
+    }
+
+    /// At rest at a position; the first set-point expected is number `sequence`, there. The plan has to be made for as many
+    /// places as there are.
+    pub fn new(plan: &StreamPlan, position_nm: [i32; 3], sequence: u16, bypass: bool) -> Self {
+        let mut stream = Self::idle();
+        stream.start(plan, position_nm, sequence, bypass);
+        stream
+    }
+
+    /// As [`Stream::new`], in place; the counts go on.
+    #[inline(never)]
+    pub fn start(&mut self, plan: &StreamPlan, position_nm: [i32; 3], sequence: u16, bypass: bool) {
+        let [x, y, z] = position_nm;
+        self.plan = *plan;
+        for kept in &mut self.kept {
+            *kept = Kept { axes: [[x; 4], [y; 4], [z; 4]], offset: [0; 4] };
+        }
+        self.engage = Engage::new(plan.engage_ticks, !bypass);
+        self.guard = Guard::new(plan.offset_nm, plan.slew_nm);
+        self.guard.watch(bypass);
+        (self.place, self.regular, self.sequence) = (0, u32::from(sequence), sequence);
+        (self.velocity, self.change, self.bias_nm) = ([0; 3], [0; 3], [0; 3]);
+        (self.missing, self.settling, self.joining) = (0, 0, false);
+        self.state = StreamState::Running;
+    }
+
+    /// Number of the set-point that the next tick is for.
+    pub const fn expected(&self) -> u16 {
+        if self.regular == CARE { self.sequence } else { self.regular as u16 }
+    }
+
+    /// Set-points are taken.
+    pub const fn takes(&self) -> bool {
+        matches!(self.state, StreamState::Running | StreamState::Holding)
+    }
+
+    /// At rest for good: where it was led, with nothing of the correction left.
+    pub const fn over(&self) -> bool {
+        !self.takes() && self.settling == 0
+    }
+
+    /// Counts set-points that came after their ticks had passed.
+    pub fn count_late(&mut self, count: u32) {
+        self.counters.late = self.counters.late.wrapping_add(count);
     }
 
     /// What it does.
@@ -254,7 +313,11 @@ impl Stream {
 
     /// The sender has no more: comes to rest and ends.
     pub fn finish(&mut self) {
-        if matches!(self.state, StreamState::Running | StreamState::Holding) {
+        if self.takes() {
+            if self.regular != CARE {
+                self.sequence = self.regular as u16;
+                self.look_back();
+            }
             self.begin_rest(StreamState::Ended);
         }
     }
@@ -270,7 +333,7 @@ impl Stream {
         if let Some(StreamSample { sequence, position_nm: [x, y, z] }) = sample
             && u32::from(sequence) == self.regular
         {
-            let last = &self.kept[(self.place % MAX_STRIDE) as usize].axes;
+            let last = &self.kept[self.place as usize & Self::MASK].axes;
             let most = self.plan.step_nm;
             let near = |now: i32, last: i32| {
                 (now.wrapping_sub(last) as u32).wrapping_add(most) <= most.wrapping_mul(2)
@@ -303,7 +366,7 @@ impl Stream {
         let place = if next == self.plan.stride { 0 } else { next };
         self.place = place;
         compiler_fence(Ordering::AcqRel);
-        let Kept { axes: [kx, ky, kz], offset } = &mut self.kept[(place % MAX_STRIDE) as usize];
+        let Kept { axes: [kx, ky, kz], offset } = &mut self.kept[place as usize & Self::MASK];
         // One axis after the other and its result put away: all at once they do not fit into the registers.
         let wx = self.plan.axis(kx, x);
         offset[1] = wx;
@@ -316,7 +379,7 @@ impl Stream {
         compiler_fence(Ordering::AcqRel);
         // The set-points of two strides ago have moved up one place.
         let nominal = [kx[2], ky[2], kz[2]];
-        let [_, lx, ly, lz] = self.kept[(before % MAX_STRIDE) as usize].offset;
+        let [_, lx, ly, lz] = self.kept[before as usize & Self::MASK].offset;
         let weights = Guard::weigh(wz, lz, Guard::weigh(wy, ly, Guard::weigh(wx, lx, (0, 0))));
         if self.guard.easy(weights) {
             return Output::new(nominal, [wx, wy, wz], flag::MOVING);
@@ -325,7 +388,7 @@ impl Stream {
     }
 
     /// The newest set-point, nm.
-    fn last_nm(&self) -> [i32; 3] {
+    pub(crate) fn last_nm(&self) -> [i32; 3] {
         self.back(0)
     }
 
@@ -336,7 +399,7 @@ impl Stream {
             place = place.checked_sub(1).unwrap_or(self.plan.stride.wrapping_sub(1));
             strides += usize::from(place == self.place);
         }
-        let [x, y, z] = &self.kept[(place % MAX_STRIDE) as usize].axes;
+        let [x, y, z] = &self.kept[place as usize & Self::MASK].axes;
         [x[strides & 3], y[strides & 3], z[strides & 3]]
     }
 
@@ -352,13 +415,13 @@ impl Stream {
     /// As [`Self::filter`] when bounds or engagement may change what goes out.
     #[inline(never)]
     fn with_care(&mut self, last: [i32; 3]) -> Output {
-        let Kept { axes: [x, y, z], offset: [_, wx, wy, wz] } = self.kept[(self.place % MAX_STRIDE) as usize];
+        let Kept { axes: [x, y, z], offset: [_, wx, wy, wz] } = self.kept[self.place as usize & Self::MASK];
         let (nominal, wanted) = ([x[2], y[2], z[2]], [wx, wy, wz]);
         let wanted = self.engage.apply(wanted);
         self.guard.watch(!self.engage.full());
         let (offset, verdict) = self.guard.pass_after(last, wanted);
         let [ox, oy, oz] = offset;
-        self.kept[(self.place % MAX_STRIDE) as usize].offset = [0, ox, oy, oz];
+        self.kept[self.place as usize & Self::MASK].offset = [0, ox, oy, oz];
         let bounds = &mut self.counters.bounds;
         bounds.offset_cuts = bounds.offset_cuts.wrapping_add(u32::from(verdict.offset_cut));
         bounds.slew_cuts = bounds.slew_cuts.wrapping_add(u32::from(verdict.slew_cut));
@@ -451,7 +514,8 @@ impl Stream {
         self.bias_nm = [0; 3];
         self.state = then;
         // After ten time constants 5e-5 of the velocity are left; then the filter empties, the correction fades.
-        self.settling = (10u32 << self.plan.brake_shift).saturating_add(self.emptying());
+        let braking = if self.velocity == [0; 3] { 0 } else { 10u32 << self.plan.brake_shift };
+        self.settling = braking.saturating_add(self.emptying());
     }
 
     /// Velocity fades along the tangent.

@@ -32,7 +32,8 @@ pub(super) fn check_segment(segment: &ExactSegment) -> Result<(), MotionRefusal>
     }
 }
 
-fn check_feed(feed_m_s: f32) -> Result<(), MotionRefusal> {
+/// Checks a feed alone.
+pub(super) fn check_feed(feed_m_s: f32) -> Result<(), MotionRefusal> {
     within(Quantity::Feed, feed_m_s, bounds::FEED_MIN_M_S, bounds::FEED_MAX_M_S)
 }
 

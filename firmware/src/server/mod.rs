@@ -270,6 +270,8 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             Command::Begin => self.begin()?,
             Command::Append { segment, tolerance_nm } => self.append(&segment, tolerance_nm)?,
             Command::End => self.motion.end().map_err(Refusal::Motion)?,
+            Command::BeginStream { feed_m_s, ahead } => self.begin_stream(feed_m_s, ahead)?,
+            Command::Points { steps } => self.motion.points(&steps).map_err(Refusal::Motion)?,
             Command::Stop => self.motion.stop(),
             Command::Subscribe { every, on_link } => self.subscribe(every, on_link),
             Command::Reset => {
@@ -329,6 +331,16 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     fn begin(&mut self) -> Result<(), Refusal> {
         self.may_run()?;
         self.motion.begin().map_err(Refusal::Motion)?;
+        self.has_run();
+        Ok(())
+    }
+
+    #[inline(never)]
+    fn begin_stream(&mut self, feed_m_s: f32, ahead: u16) -> Result<(), Refusal> {
+        self.may_run()?;
+        bounds::check_feed(feed_m_s)
+            .and_then(|()| self.motion.begin_stream(feed_m_s, ahead))
+            .map_err(Refusal::Motion)?;
         self.has_run();
         Ok(())
     }
@@ -398,6 +410,9 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
                 uncorrected_segments: now.uncorrected_segments,
                 stops: now.stops,
                 segments: now.segments,
+                missing_set_points: now.missing_set_points,
+                late_set_points: now.late_set_points,
+                rejected_set_points: now.rejected_set_points,
                 link_losses: self.supervision.losses(),
             },
         }

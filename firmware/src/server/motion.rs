@@ -30,8 +30,14 @@ pub struct Snapshot {
     pub stops: u32,
     /// Segments finished.
     pub segments: u32,
-    /// Segments that wait.
+    /// Segments, or batches of set-points, that wait.
     pub queued: u8,
+    /// Ticks of a stream without a usable set-point.
+    pub missing_set_points: u32,
+    /// Set-points of a stream that came after their tick.
+    pub late_set_points: u32,
+    /// Set-points of a stream farther from the one before than the feed allows.
+    pub rejected_set_points: u32,
     /// Why nothing runs, if so.
     pub fault: Option<FaultCause>,
     /// The stop input is active.
@@ -83,10 +89,23 @@ pub trait Motion {
     /// it was.
     fn append(&mut self, segment: &ExactSegment, tolerance_nm: u32) -> Result<(), MotionRefusal>;
 
-    /// It has no more segments.
+    /// Opens a stream of set-points, at no more than a feed; the tick begins when so many wait.
     ///
     /// # Errors
-    /// [`MotionRefusal::NoProgram`].
+    /// Any [`MotionRefusal`]; nothing is open then.
+    fn begin_stream(&mut self, feed_m_s: f32, ahead: u16) -> Result<(), MotionRefusal>;
+
+    /// The next set-points of it: for each axis the change of the step from one to the next, in postcard's i32, nm.
+    ///
+    /// # Errors
+    /// [`MotionRefusal::QueueFull`]: to be tried again. [`MotionRefusal::NoProgram`], or places that are none; the stream stays as
+    /// it was.
+    fn points(&mut self, bytes: &[u8]) -> Result<(), MotionRefusal>;
+
+    /// The program has no more segments, the stream no more set-points.
+    ///
+    /// # Errors
+    /// [`MotionRefusal::NoProgram`]; for a stream also [`MotionRefusal::QueueFull`].
     fn end(&mut self) -> Result<(), MotionRefusal>;
 
     /// Stops within limits.

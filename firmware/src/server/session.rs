@@ -15,10 +15,10 @@ pub(super) struct NotUnderstood;
 /// Reads a request; `None` if not even its head can be read.
 #[inline(never)]
 pub(super) fn read(payload: &[u8]) -> Option<(Head, Result<Command, NotUnderstood>)> {
-    let (session, rest) = postcard::take_from_bytes::<u16>(payload).ok()?;
-    let (seq, rest) = postcard::take_from_bytes::<u16>(rest).ok()?;
-    let command = match postcard::take_from_bytes::<Command>(rest) {
-        Ok((command, [])) => Ok(command),
+    let (session, rest) = wire::take::<u16>(payload)?;
+    let (seq, rest) = wire::take::<u16>(rest)?;
+    let command = match wire::take::<Command>(rest) {
+        Some((command, [])) => Ok(command),
         _ => Err(NotUnderstood),
     };
     Some((Head { session, seq }, command))

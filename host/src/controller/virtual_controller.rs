@@ -4,8 +4,8 @@
 //! as the ticks can be computed. Behind a pty ([`serve`]) it is the clock's.
 use super::error::ControllerError;
 use super::link::Link;
-use giotto_firmware::control::{Desk, Receiver, SEGMENTS, SET_POINTS, Sender, Shared, Tick};
-use giotto_firmware::engine::{Config, Executor, Planned, Planner};
+use giotto_firmware::control::{Desk, Job, Receiver, SEGMENTS, SET_POINTS, Sender, Shared, Tick};
+use giotto_firmware::engine::{Config, Executor, Planner};
 use giotto_firmware::server::{Board, Buffers, Server, TimedSetPoint};
 use giotto_firmware::store::{Layout, ram::RamFlash};
 use std::collections::VecDeque;
@@ -66,13 +66,21 @@ impl<T> Receiver<T> for Queue<T> {
         self.with(VecDeque::pop_front)
     }
 
+    fn look<R>(&mut self, look: impl FnOnce(&T) -> R) -> Option<R> {
+        self.with(|things| things.front().map(look))
+    }
+
+    fn discard(&mut self) {
+        self.with(VecDeque::pop_front);
+    }
+
     fn waiting(&self) -> usize {
         self.with(|things| things.len())
     }
 }
 
-type VirtualTick = Tick<Arc<Shared>, Queue<Planned>, Queue<TimedSetPoint>>;
-type VirtualDesk = Desk<Box<Planner>, Arc<Shared>, Queue<Planned>, Queue<TimedSetPoint>>;
+type VirtualTick = Tick<Arc<Shared>, Queue<Job>, Queue<TimedSetPoint>>;
+type VirtualDesk = Desk<Box<Planner>, Arc<Shared>, Queue<Job>, Queue<TimedSetPoint>>;
 type VirtualServer = Server<Flash, VirtualDesk, Box<Buffers>>;
 
 /// The port of a virtual controller: bytes for it, bytes from it.

@@ -15,7 +15,7 @@
 //! The CRC is ISO-HDLC (the one of Ethernet and zip). The order of checks is magic, length, CRC, version,
 //! flags, schema, body, numbers: a flipped bit is called a flipped bit, not a newer version.
 use super::{Limits, MAX_TERMS, MAX_ZONES, Table, TableError, Zone};
-use crate::wire::{Crc32, crc32};
+use crate::wire::{Crc32, crc32, take};
 
 /// First four bytes of a table.
 pub const MAGIC: [u8; 4] = *b"GIOT";
@@ -173,19 +173,18 @@ type Head = (heapless::String<32>, Limits);
 /// Reads an image zone by zone. Postcard writes a struct as its fields in order and a vector as its length (LEB128)
 /// and its elements; the tests compare with the whole.
 fn read(bytes: &[u8], keep: &mut dyn FnMut(Zone) -> Result<(), TableError>) -> Result<Head, TableError> {
-    let malformed = |_| TableError::Malformed;
-    let (machine, rest) = postcard::take_from_bytes(body(bytes)?).map_err(malformed)?;
-    let (count, mut rest) = postcard::take_from_bytes::<u32>(rest).map_err(malformed)?;
+    let (machine, rest) = take(body(bytes)?).ok_or(TableError::Malformed)?;
+    let (count, mut rest) = take::<u32>(rest).ok_or(TableError::Malformed)?;
     if count == 0 {
         return Err(TableError::NoZones);
     }
     for index in 0..count {
-        let (zone, after) = postcard::take_from_bytes::<Zone>(rest).map_err(malformed)?;
+        let (zone, after) = take::<Zone>(rest).ok_or(TableError::Malformed)?;
         zone.validate(index as usize)?;
         keep(zone)?;
         rest = after;
     }
-    let (limits, rest) = postcard::take_from_bytes::<Limits>(rest).map_err(malformed)?;
+    let (limits, rest) = take::<Limits>(rest).ok_or(TableError::Malformed)?;
     if !rest.is_empty() {
         return Err(TableError::Malformed);
     }

@@ -109,8 +109,22 @@ pub enum Command {
         /// How far the path may leave its joint with the segment before, nm; 0: exact stop.
         tolerance_nm: u32,
     },
-    /// The program has no more segments.
+    /// The program has no more segments, the stream no more set-points.
     End,
+    /// Opens a stream of set-points, one a tick, from where the machine stands: a run as a program is.
+    BeginStream {
+        /// Largest feed, m/s: set-points farther apart are not taken.
+        feed_m_s: f32,
+        /// The machine begins to follow when so many set-points wait, or as many as the queue holds, or all.
+        ahead: u16,
+    },
+    /// The next set-points of the open stream. Refused with [`QueueFull`](super::MotionRefusal::QueueFull) while there is no
+    /// room.
+    Points {
+        /// For each set-point and axis (X, Y, Z) the change of the step that leads to it from the one before, nm, each as an
+        /// i32 of this encoding; the step before the first is 0, the place before it where the machine stands.
+        steps: Chunk,
+    },
 }
 
 /// Reads an array of bytes in a loop: serde's own way is a piece of code a byte, 700 bytes of an image.
@@ -256,6 +270,8 @@ pub enum FaultCause {
     Overrun,
     /// A segment did not start where the machine stood.
     Discontinuity,
+    /// Set-points of a stream stayed away.
+    Starved,
 }
 
 /// Everything that went wrong and was survived; all count from boot and wrap.
@@ -287,6 +303,12 @@ pub struct Counters {
     pub stops: u32,
     /// Segments finished.
     pub segments: u32,
+    /// Ticks of a stream without a usable set-point.
+    pub missing_set_points: u32,
+    /// Set-points of a stream that came after their tick.
+    pub late_set_points: u32,
+    /// Set-points of a stream farther from the one before than its feed allows.
+    pub rejected_set_points: u32,
     /// Runs during which the link died.
     pub link_losses: u32,
 }
@@ -311,7 +333,7 @@ pub struct Status {
     pub slots: [SlotState; 2],
     /// Probation of the table in use.
     pub probation: Probation,
-    /// Segments that wait.
+    /// Segments, or batches of set-points, that wait.
     pub queued: u8,
     /// Ticks since boot, wrapping.
     pub tick: u32,

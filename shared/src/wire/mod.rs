@@ -20,6 +20,7 @@
 pub mod crc;
 pub mod frame;
 pub mod message;
+mod reader;
 pub mod refusal;
 mod writer;
 
@@ -32,4 +33,5 @@ pub use message::{
     Pose, Probation, Reply, Request, SET_POINTS, SUPERVISE_MS, SetPoint, SetPoints, SlotState, Status,
     TableInfo,
 };
+pub use reader::take;
 pub use refusal::{FlashFault, MotionRefusal, Refusal};

@@ -113,7 +113,7 @@ pub enum MotionRefusal {
     #[error("no room in the queue of segments")]
     QueueFull,
     /// Nothing to append to: none was opened, or it was stopped, or the link was dead.
-    #[error("no program is open, or it was stopped")]
+    #[error("no program or stream of this kind is open, or it was stopped")]
     NoProgram,
     /// The engine is in fault.
     #[error("the controller is in fault; reset it")]

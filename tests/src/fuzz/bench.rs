@@ -1,6 +1,6 @@
 //! A whole controller on the host: server, store, planner and tick, as on a board.
-use giotto_firmware::control::{Desk, Receiver, SEGMENTS, SET_POINTS, Sender, Shared, Tick};
-use giotto_firmware::engine::{Config, Executor, Planned, Planner};
+use giotto_firmware::control::{Desk, Job, Receiver, SEGMENTS, SET_POINTS, Sender, Shared, Tick};
+use giotto_firmware::engine::{Config, Executor, Planner};
 use giotto_firmware::server::{Board, Buffers, Server, TimedSetPoint};
 use giotto_firmware::store::{Layout, ram::RamFlash};
 use giotto_shared::table::{self, MAX_IMAGE_BYTES, bounds};
@@ -49,13 +49,21 @@ impl<T> Receiver<T> for Queue<T> {
         self.0.borrow_mut().pop_front()
     }
 
+    fn look<R>(&mut self, look: impl FnOnce(&T) -> R) -> Option<R> {
+        self.0.borrow().front().map(look)
+    }
+
+    fn discard(&mut self) {
+        self.0.borrow_mut().pop_front();
+    }
+
     fn waiting(&self) -> usize {
         self.0.borrow().len()
     }
 }
 
-type BenchDesk = Desk<Box<Planner>, Rc<Shared>, Queue<Planned>, Queue<TimedSetPoint>>;
-type BenchTick = Tick<Rc<Shared>, Queue<Planned>, Queue<TimedSetPoint>>;
+type BenchDesk = Desk<Box<Planner>, Rc<Shared>, Queue<Job>, Queue<TimedSetPoint>>;
+type BenchTick = Tick<Rc<Shared>, Queue<Job>, Queue<TimedSetPoint>>;
 
 /// The controller.
 pub struct Bench {

@@ -30,8 +30,8 @@ use cortex_m_rt::exception;
 use critical_section::Mutex;
 use embedded_io::{Read, ReadReady, Write};
 use embedded_storage::nor_flash::NorFlash;
-use giotto_firmware::control::{self, Desk, Shared, Tick};
-use giotto_firmware::engine::{Config, Executor, Planned, Planner};
+use giotto_firmware::control::{self, Desk, Job, Shared, Tick};
+use giotto_firmware::engine::{Config, Executor, Planner};
 use giotto_firmware::server::{Board, Buffers, Server, TimedSetPoint};
 use giotto_firmware::store::Layout;
 use heapless_spsc::spsc::{Consumer, Producer, Queue};
@@ -48,11 +48,11 @@ const SEGMENTS: usize = control::SEGMENTS + 1;
 const SET_POINTS: usize = control::SET_POINTS + 1;
 
 type BoardTick =
-    Tick<&'static Shared, Consumer<'static, Planned, SEGMENTS>, Producer<'static, TimedSetPoint, SET_POINTS>>;
+    Tick<&'static Shared, Consumer<'static, Job, SEGMENTS>, Producer<'static, TimedSetPoint, SET_POINTS>>;
 type BoardDesk = Desk<
     &'static mut Planner,
     &'static Shared,
-    Producer<'static, Planned, SEGMENTS>,
+    Producer<'static, Job, SEGMENTS>,
     Consumer<'static, TimedSetPoint, SET_POINTS>,
 >;
 
@@ -84,7 +84,7 @@ pub fn buffers() -> Option<&'static mut Buffers> {
 #[inline(never)] // Its frame would stay below that of the loop that never returns.
 pub fn start(syst: &mut SYST, scb: &mut SCB, clock_hz: u32) -> Option<BoardDesk> {
     let config = Config::robot(TICK_HZ);
-    let segments = singleton!(: Queue<Planned, SEGMENTS> = Queue::new())?;
+    let segments = singleton!(: Queue<Job, SEGMENTS> = Queue::new())?;
     let set_points = singleton!(: Queue<TimedSetPoint, SET_POINTS> = Queue::new())?;
     let planner = singleton!(: Planner = Planner::new(&config, [0; 3]))?;
     let (segments_in, segments_out) = segments.split();

@@ -84,7 +84,9 @@ impl Executor {
         self.mode = Mode::Settle;
         self.clock = Clock::rising(self.segment.settle_step);
         self.target_nm = self.rest_offset_nm;
-        if self.segment.kind != Kind::Dwell {
+        if self.segment.kind == Kind::Clear {
+            self.target_nm = [0; 3];
+        } else if self.segment.kind != Kind::Dwell {
             let (c, s) = self.weights((self.segment.timing.start >> 32) as u32);
             if self.segment.extended {
                 let extra = &self.segment.extra;
@@ -120,7 +122,7 @@ impl Executor {
         self.left = timing.cruise_ticks;
         self.mode = match self.segment.kind {
             _ if self.segment.epoch != self.epoch => Mode::Rest,
-            Kind::Dwell => Mode::Dwell,
+            Kind::Dwell | Kind::Clear => Mode::Dwell,
             Kind::Arc if self.segment.proven && self.segment.extended => Mode::TermRise,
             Kind::Arc if self.segment.proven => Mode::ArcRise,
             Kind::Arc | Kind::Line | Kind::Helix => Mode::Rise,

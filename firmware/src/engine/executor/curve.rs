@@ -17,7 +17,7 @@ impl Executor {
         let [x, y, z] = &self.segment.axes;
         let mut wanted = match self.segment.kind {
             Kind::Arc | Kind::Helix => [x.steady(c, s), y.steady(c, s), z.steady(c, s)],
-            Kind::Line | Kind::Dwell => [0; 3],
+            Kind::Line | Kind::Dwell | Kind::Clear => [0; 3],
         };
         if self.segment.extended {
             if self.segment.kind == Kind::Line {
@@ -51,7 +51,7 @@ impl Executor {
         let [x, y, _] = &self.segment.axes;
         match self.segment.kind {
             Kind::Arc | Kind::Helix => [x.turned(c, s), y.turned(c, s)],
-            Kind::Line | Kind::Dwell => [0; 2],
+            Kind::Line | Kind::Dwell | Kind::Clear => [0; 2],
         }
     }
 
@@ -133,7 +133,7 @@ impl Executor {
     pub(super) fn place(&self, c: i32, s: i32, phase_q32: u32) -> [i32; 3] {
         let [x, y, z] = &self.segment.axes;
         match self.segment.kind {
-            Kind::Dwell => self.rest_nm,
+            Kind::Dwell | Kind::Clear => self.rest_nm,
             Kind::Line => {
                 let share = phase_q32 as i32;
                 [x.on_line(share), y.on_line(share), z.on_line(share)]

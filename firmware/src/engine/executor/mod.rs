@@ -213,6 +213,11 @@ impl Executor {
         self.stop();
     }
 
+    /// Something beside the executor went wrong: nothing more runs until [`Self::clear_fault`].
+    pub fn fail(&mut self, fault: Fault) {
+        self.fault = Some(fault);
+    }
+
     /// A stop was asked for and the machine still moves.
     pub fn stopping(&self) -> bool {
         self.halting && !self.idle()

@@ -11,31 +11,23 @@ use giotto_shared::angle::sincos;
 use giotto_shared::path::{ExactCircle, MAX_RADIUS_M, MAX_TURNS, Quantity};
 
 impl Planner {
-    /// The positioning move to where a circle starts, unless the last segment ends there, and the circle: one after the other
-    /// in the same place, since they are large, and handed to `send`. Nothing is sent if either is refused.
-    pub fn circle_from_here(
-        &mut self,
-        run: &ExactCircle,
-        place: &mut Planned,
-        mut send: impl FnMut(&Planned),
-    ) -> Result<(), Refused> {
+    /// The positioning move to where a circle starts; `false`: the last segment ends there. Refused if the circle would be:
+    /// planned behind it in the same place, since both are large, it is not.
+    pub fn approach(&mut self, run: &ExactCircle, planned: &mut Planned) -> Result<bool, Refused> {
         let here = self.position_nm;
-        self.circle(run, place)?;
-        let start = place.start_nm;
-        if start != here {
-            // Planned again behind its approach, it is the same.
-            self.position_nm = here;
-            self.line_to(start, self.machine.positioning_m_s, place)?;
-            send(place);
-            self.circle(run, place)?;
+        self.circle(run, planned)?;
+        let start = planned.start_nm;
+        self.position_nm = here;
+        if start == here {
+            return Ok(false);
         }
-        send(place);
-        Ok(())
+        self.line_to(start, self.machine.positioning_m_s, planned)?;
+        Ok(true)
     }
 
     /// The circle, wherever the last segment ends.
     #[inline(never)]
-    fn circle(&mut self, run: &ExactCircle, circle: &mut Planned) -> Result<(), Refused> {
+    pub fn circle(&mut self, run: &ExactCircle, circle: &mut Planned) -> Result<(), Refused> {
         let arm = run.radius_half_nm;
         let radius_m = positive(arm as f32 * 0.5e-9, Quantity::Radius)?;
         let feed_m_s = positive(run.feed_m_s, Quantity::Feed)?;

@@ -25,7 +25,7 @@ mod timing;
 mod worst;
 
 use super::config::{Config, whole_above};
-use super::planned::{Planned, Timing};
+use super::planned::{Kind, Planned, Timing};
 use super::ramp::clock_step;
 use super::stream::{StreamNeeds, StreamPlan};
 use super::zones::{Asked, ZoneError, Zones};
@@ -129,14 +129,24 @@ impl Planner {
         }
     }
 
-    /// A stream of set-points from where the last segment ends, at no more than a feed; its zone is chosen there.
-    pub fn stream(&self, feed_m_s: f32) -> Result<StreamPlan, Refused> {
+    /// Takes out, at rest, the offset that the last segment left there: before a stream, which begins with none.
+    pub fn clear(&self, planned: &mut Planned) {
+        self.dwell(1, planned);
+        planned.kind = Kind::Clear;
+    }
+
+    /// A stream of set-points from where the last segment ends, at no more than a feed, for a [`Stream`](super::Stream) with so
+    /// many places; its zone is chosen there.
+    #[inline(never)]
+    pub fn stream(&self, feed_m_s: f32, places: usize) -> Result<StreamPlan, Refused> {
         let feed_m_s = positive(feed_m_s, Quantity::Feed)?;
         self.check_feed(feed_m_s)?;
         let place_m = to_m(self.position_nm);
         let zone = self.zones.choose(&Asked { place_m, radius_m: None, feed_m_s, ccw: None });
         let bounds = self.bounds(zone.is_some());
         let needs = StreamNeeds {
+            epoch: self.epoch,
+            longest: places as u32,
             operator: zone.map(|z| z.operator),
             rate_hz: self.machine.rate_hz,
             window_s: self.machine.stream_window_s,

@@ -12,6 +12,8 @@ fn plan() -> StreamPlan {
     let fourth_s4 = KAPPA[0] * KAPPA[0] / 8.0 - KAPPA[1] / 24.0;
     let operator = Operator { second_s2: (-KAPPA[0] / 2.0) as f32, fourth_s4: fourth_s4 as f32 };
     StreamPlan::build(&StreamNeeds {
+        epoch: 0,
+        longest: PLACES as u32,
         operator: Some(operator),
         rate_hz: 1000.0,
         window_s: 0.015,
@@ -40,8 +42,8 @@ fn nominal_is_the_input_late_and_so_is_bypass_bit_for_bit() {
     let plan = plan();
     let latency = plan.latency() as i32;
     assert_eq!(latency, 2 * 15);
-    let mut active = Stream::new(&plan, ellipse(0), 0, false);
-    let mut bypass = Stream::new(&plan, ellipse(0), 0, true);
+    let mut active: Stream = Stream::new(&plan, ellipse(0), 0, false);
+    let mut bypass: Stream = Stream::new(&plan, ellipse(0), 0, true);
     let mut moved = 0;
     for n in 0..3000 {
         let (a, b) = (active.tick(Some(sample(n))), bypass.tick(Some(sample(n))));
@@ -55,7 +57,7 @@ fn nominal_is_the_input_late_and_so_is_bypass_bit_for_bit() {
 #[test]
 fn the_correction_is_the_operator() {
     let plan = plan();
-    let mut stream = Stream::new(&plan, ellipse(0), 0, false);
+    let mut stream: Stream = Stream::new(&plan, ellipse(0), 0, false);
     let mut worst = 0.0f64;
     for n in 0..4000 {
         let out = stream.tick(Some(sample(n)));
@@ -79,7 +81,7 @@ fn the_correction_is_the_operator() {
 #[test]
 fn noise_comes_out_as_often_as_stated() {
     let plan = plan();
-    let mut stream = Stream::new(&plan, [0; 3], 0, false);
+    let mut stream: Stream = Stream::new(&plan, [0; 3], 0, false);
     let (mut state, mut noise, mut offset) = (1u32, 0.0, 0.0);
     for n in 0..100_000u32 {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -110,7 +112,7 @@ fn largest_steps(out: &[Output]) -> (f64, f64) {
 fn a_short_gap_is_bridged_and_joined_without_a_jump() {
     let plan = plan();
     let run = |lost: &dyn Fn(i32) -> bool| {
-        let mut stream = Stream::new(&plan, ellipse(0), 0, false);
+        let mut stream: Stream = Stream::new(&plan, ellipse(0), 0, false);
         let out: Vec<Output> = (0..3000).map(|n| stream.tick((!lost(n)).then(|| sample(n)))).collect();
         (out, *stream.counters(), stream.state())
     };
@@ -128,7 +130,7 @@ fn a_short_gap_is_bridged_and_joined_without_a_jump() {
 #[test]
 fn late_doubled_and_wild_set_points_are_counted_and_do_no_harm() {
     let plan = plan();
-    let mut stream = Stream::new(&plan, ellipse(0), 0, false);
+    let mut stream: Stream = Stream::new(&plan, ellipse(0), 0, false);
     let mut out = Vec::new();
     for n in 0..3000 {
         let given = match n {
@@ -148,7 +150,7 @@ fn late_doubled_and_wild_set_points_are_counted_and_do_no_harm() {
 #[test]
 fn a_lost_stream_comes_to_rest_ramps_out_and_faults() {
     let plan = plan();
-    let mut stream = Stream::new(&plan, ellipse(0), 0, false);
+    let mut stream: Stream = Stream::new(&plan, ellipse(0), 0, false);
     let mut out = Vec::new();
     for n in 0..1500 {
         out.push(stream.tick(Some(sample(n))));
@@ -173,11 +175,35 @@ fn a_lost_stream_comes_to_rest_ramps_out_and_faults() {
 #[test]
 fn finishing_keeps_the_machine_where_it_was_going() {
     let plan = plan();
-    let mut stream = Stream::new(&plan, [5, 6, 7], 9, false);
+    let mut stream: Stream = Stream::new(&plan, [5, 6, 7], 9, false);
     for n in 0..50 {
         stream.tick(Some(StreamSample { sequence: 9 + n, position_nm: [5, 6, 7] }));
     }
     stream.finish();
     assert_eq!(stream.tick(None).corrected_nm, [5, 6, 7]);
     assert_eq!(stream.state(), StreamState::Ended);
+}
+
+/// In full motion, with half the memory that the others have.
+#[test]
+fn a_stop_slows_down_along_the_tangent_and_is_over_when_nothing_moves() {
+    let plan = plan();
+    let mut stream = Stream::<16>::new(&plan, ellipse(0), 0, false);
+    let mut out: Vec<Output> = (0..1500).map(|n| stream.tick(Some(sample(n)))).collect();
+    assert_eq!(stream.expected(), 1500);
+    stream.stop();
+    assert!(!stream.takes() && !stream.over());
+    while !stream.over() {
+        out.push(stream.tick(Some(sample(0))));
+        assert!(out.len() < 10_000);
+    }
+    let (v, a) = largest_steps(&out);
+    assert!(v < 0.4 && a < 6.0, "{v} {a}");
+    let end = *out.last().unwrap();
+    assert_eq!((end.nominal_nm, end.corrected_nm), (stream.last_nm(), stream.last_nm()));
+    // A second one, from there.
+    stream.start(&plan, end.nominal_nm, 7, false);
+    assert_eq!((stream.expected(), stream.takes()), (7, true));
+    assert_eq!(stream.tick(None).corrected_nm, end.nominal_nm);
+    assert_eq!(stream.counters().missing, 1);
 }

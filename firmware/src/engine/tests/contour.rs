@@ -8,7 +8,9 @@
 //! is seen on another machine, of two lags. The ramps here are gentle (0.5 m/s², 5 m/s³) for a machine whose answer
 //! is 23 ms wide; the circle is judged at constant feed, its ramps (as fast as `Config::robot` allows) are printed beside.
 use super::{run_out, std, table};
-use crate::engine::{CircleRun, Config, Engine, Output, Planner, Segment, Stream, StreamSample, flag};
+use crate::engine::{
+    CircleRun, Config, Engine, Output, PLACES, Planner, Segment, Stream, StreamSample, flag,
+};
 use core::f64::consts::PI;
 use giotto_shared::Direction;
 use giotto_shared::path::smoothstep;
@@ -242,8 +244,8 @@ fn streamed(curve: &dyn Fn(f64) -> [f64; 2], rate: f64) -> Vec<Output> {
     let mut planner = Planner::new(&config, nm(at(0)));
     let [k2, k4] = kappa(&LAG_S);
     planner.set_table(Some(&table(k2, k4))).unwrap();
-    let plan = planner.stream(1.0).unwrap();
-    let mut stream = Stream::new(&plan, nm(at(0)), 0, false);
+    let plan = planner.stream(1.0, PLACES).unwrap();
+    let mut stream: Stream = Stream::new(&plan, nm(at(0)), 0, false);
     let ticks = ((laps + start) / DT) as usize + 300;
     (0..ticks)
         .map(|n| stream.tick(Some(StreamSample { sequence: n as u16, position_nm: nm(at(n)) })))

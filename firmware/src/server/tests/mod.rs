@@ -56,6 +56,9 @@ impl Motion for Bench {
             stops: 0,
             segments: 0,
             queued: 0,
+            missing_set_points: 0,
+            late_set_points: 0,
+            rejected_set_points: 0,
             fault: None,
             stop_input: false,
         }
@@ -86,6 +89,14 @@ impl Motion for Bench {
     }
 
     fn append(&mut self, _: &ExactSegment, _: u32) -> Result<(), MotionRefusal> {
+        Ok(())
+    }
+
+    fn begin_stream(&mut self, _: f32, _: u16) -> Result<(), MotionRefusal> {
+        self.begin()
+    }
+
+    fn points(&mut self, _: &[u8]) -> Result<(), MotionRefusal> {
         Ok(())
     }
 

@@ -87,6 +87,9 @@ fn largest_messages_fit() {
             uncorrected_segments: most,
             stops: most,
             segments: most,
+            missing_set_points: most,
+            late_set_points: most,
+            rejected_set_points: most,
             link_losses: most,
         },
     }));

@@ -1,0 +1,109 @@
+//! The queue, as executor and stream want it.
+use super::job::Job;
+use super::ports::Receiver;
+use crate::engine::{Inbox, Planned, StreamPlan, StreamSample};
+
+/// The receiving end.
+pub(super) struct Jobs<I> {
+    queue: I,
+    /// What waits is thrown away.
+    closed: bool,
+    /// A stream that waits may begin.
+    go: bool,
+    epoch: u8,
+    dropped: u32,
+    /// To begin when the executor has made its tick.
+    begins: Option<StreamPlan>,
+}
+
+/// What is at the head of the queue.
+enum Head {
+    Segment,
+    Stream(StreamPlan),
+    Points,
+}
+
+impl<I> Jobs<I> {
+    pub(super) const fn new(queue: I) -> Self {
+        Self { queue, closed: false, go: false, epoch: 0, dropped: 0, begins: None }
+    }
+
+    /// What holds in this tick.
+    #[inline]
+    pub(super) fn look_at(&mut self, closed: bool, go: bool, epoch: u8) {
+        (self.closed, self.go, self.epoch) = (closed, go, epoch);
+    }
+
+    /// A stream that was at the head and may begin.
+    #[inline]
+    pub(super) fn begins(&mut self) -> Option<StreamPlan> {
+        self.begins.take()
+    }
+
+    /// Jobs thrown away.
+    pub(super) const fn dropped(&self) -> u32 {
+        self.dropped
+    }
+}
+
+impl<I: Receiver<Job>> Jobs<I> {
+    pub(super) fn waiting(&self) -> usize {
+        self.queue.waiting()
+    }
+
+    /// The set-point with this number, if it has come; whether it was the last one; how many came too late for theirs.
+    #[inline]
+    pub(super) fn point(&mut self, expected: u16) -> (Option<StreamSample>, bool, u32) {
+        let found = self.queue.look(|job| {
+            let Job::Points(points) = job else { return (None, true, false, 0) };
+            let (at, count) = (expected.wrapping_sub(points.first), u16::from(points.count));
+            let sample = points.place_nm.get(usize::from(at)).filter(|_| at < count);
+            let sample = sample.map(|&position_nm| StreamSample { sequence: expected, position_nm });
+            // A batch is done with its last set-point, or when all of them are too late.
+            let done = at.wrapping_add(1) >= count;
+            let late = if at < count { 0 } else { u32::from(count) };
+            (sample, done, done && points.last, late)
+        });
+        let Some((sample, done, last, late)) = found else { return (None, false, 0) };
+        if done {
+            self.queue.discard();
+        }
+        (sample, last, late)
+    }
+}
+
+impl<I: Receiver<Job>> Inbox for Jobs<I> {
+    #[inline]
+    fn take(&mut self, place: &mut Planned) -> bool {
+        let closed = self.closed;
+        let head = self.queue.look(|job| match job {
+            Job::Segment(planned) => {
+                if !closed {
+                    *place = *planned;
+                }
+                Head::Segment
+            }
+            Job::Stream(plan) => Head::Stream(*plan),
+            Job::Points(_) => Head::Points,
+        });
+        match head {
+            None => return false,
+            Some(Head::Segment) if !closed => {
+                self.queue.discard();
+                return true;
+            }
+            Some(Head::Stream(plan)) if !closed && plan.epoch() == self.epoch => {
+                if self.go {
+                    self.queue.discard();
+                    self.begins = Some(plan);
+                }
+                return false;
+            }
+            // Of a stream that is over, or of a program that was stopped.
+            Some(_) => {}
+        }
+        self.queue.discard();
+        self.dropped = self.dropped.wrapping_add(1);
+        false
+    }
+}
