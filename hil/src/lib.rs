@@ -10,4 +10,5 @@ pub mod programs;
 pub mod rate;
 pub mod scenarios;
 pub mod size;
+pub mod streams;
 pub mod ticks;

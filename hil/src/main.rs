@@ -3,12 +3,12 @@
 
 use clap::{Parser, Subcommand};
 use giotto::controller::ControllerError;
-use giotto::controller::{Board, OpenOptions, Port, open};
+use giotto::controller::{Board, OpenOptions, Pace, Port, open};
 use giotto_hil::faults;
 use giotto_hil::instructions::{self, CountError};
 use giotto_hil::scenarios::{self, Outcome};
 use giotto_hil::ticks::{self, Counts, TERMS};
-use giotto_hil::{link, rate, size};
+use giotto_hil::{link, rate, size, streams};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -102,7 +102,7 @@ fn main() -> ExitCode {
     let done = match Cli::parse().command {
         Command::Ticks { json } => run_ticks(json),
         Command::Run { port, baud, image, worn_flash, json } => {
-            run_scenarios(&port, &OpenOptions { image, baud }, worn_flash, json)
+            run_scenarios(&port, &OpenOptions { image, baud, pace: Pace::Fast }, worn_flash, json)
         }
         Command::Link { json } => run_link(json),
         Command::Instructions { record } => return run_instructions(record),
@@ -165,9 +165,15 @@ fn run_scenarios(
     as_json: bool,
 ) -> Result<ExitCode, ControllerError> {
     let Ok(port) = port.parse::<Port>();
-    let mut controller = open(&port, options, &mut |text: &str| eprintln!("{text}"))?;
+    let mut note = |text: &str| eprintln!("{text}");
+    let mut controller = open(&port, options, &mut note)?;
     let (mut failed, mut done) = (0, Vec::new());
-    for scenario in &scenarios::ALL {
+    let emulated = matches!(port, Port::Qemu | Port::QemuBoard(_));
+    for (at, scenario) in scenarios::ALL.iter().chain(&streams::ALL).enumerate() {
+        if at == scenarios::ALL.len() && emulated {
+            // In the emulator time would run away from whoever streams.
+            controller = open(&port, &OpenOptions { pace: Pace::Slow, ..options.clone() }, &mut note)?;
+        }
         let outcome = scenarios::run(scenario, &mut controller);
         let good = match outcome {
             Outcome::Passed => true,

@@ -1,6 +1,6 @@
 //! Scenarios of programs: segments sent ahead of the machine, and the contour that comes of them.
 use crate::contour::{self, Errors};
-use crate::scenarios::{Trouble, at_rest, ensure, refused_as};
+use crate::scenarios::{Trouble, at_rest, ensure, holds, refused_as};
 use giotto::controller::{Controller, ControllerError, ProgramError, Segment, Step};
 use giotto_shared::wire::{Command, MotionRefusal, Refusal};
 use std::f64::consts::PI;
@@ -123,14 +123,6 @@ fn contour_of(
     controller.run_program(&steps(&[start]), 100)?;
     let recording = controller.run_program(&steps(segments), 1)?;
     Ok(contour::errors(&recording, distance))
-}
-
-fn holds(name: &str, errors: Errors, bar: f64) -> Result<(), Trouble> {
-    let Errors { corrected, uncorrected } = errors;
-    let (corrected_um, uncorrected_um) = (corrected * 1e6, uncorrected * 1e6);
-    let words = format!("{name}: {corrected_um:.2} of {uncorrected_um:.1} µm left");
-    eprintln!("       {words}: {:.2} %", 100.0 * errors.left());
-    ensure(uncorrected > 20e-6 && errors.left() <= bar, || words.clone())
 }
 
 /// Line, arc, line; and a rounded rectangle: set-points from the controller, the machine behind them simulated.

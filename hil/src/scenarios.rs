@@ -1,6 +1,7 @@
 //! What every controller has to stand: the image under QEMU, the virtual one, or a real one on its port.
 //!
 //! The machine moves: on a real port the scenarios run circles of up to 100 mm about the origin.
+use crate::contour::Errors;
 use crate::programs;
 use crate::ticks::largest_table;
 use giotto::controller::flash::{Verdict, is_flash_fault};
@@ -89,6 +90,15 @@ pub(crate) fn refused_as(
         Err(ControllerError::Refused(refusal)) if wanted(&refusal) => Ok(()),
         other => Err(Trouble::Wrong(format!("not refused as it should be: {other:?}"))),
     }
+}
+
+/// What is left of a contour error is below a bar, and there was one; the figures on stderr.
+pub(crate) fn holds(name: &str, errors: Errors, bar: f64) -> Result<(), Trouble> {
+    let Errors { corrected, uncorrected } = errors;
+    let (corrected_um, uncorrected_um) = (corrected * 1e6, uncorrected * 1e6);
+    let words = format!("{name}: {corrected_um:.2} of {uncorrected_um:.1} µm left");
+    eprintln!("       {words}: {:.2} %", 100.0 * errors.left());
+    ensure(uncorrected > 20e-6 && errors.left() <= bar, || words.clone())
 }
 
 /// A table that flash did not take is not committed, and the controller still runs.

@@ -3,14 +3,21 @@
 #![allow(clippy::unwrap_used, reason = "helpers of a test fail as the test does")]
 use giotto::controller::emulator::{Emulator, Pace};
 use giotto::controller::{Board, Controller, OpenOptions, Port, circle, open};
-use giotto_hil::scenarios::{self, Outcome};
+use giotto_hil::scenarios::{self, Outcome, Scenario};
+use giotto_hil::streams;
 use giotto_shared::Direction;
 use giotto_shared::wire::{MotionState, Refusal};
 use std::io::Write;
 
 fn outcomes(port: &Port) -> Vec<(&'static str, Outcome)> {
-    let mut controller = open(port, &OpenOptions::default(), &mut |note| eprintln!("{note}")).unwrap();
-    scenarios::ALL.iter().map(|scenario| (scenario.0, scenarios::run(scenario, &mut controller))).collect()
+    let run = |pace, scenarios: &[Scenario]| {
+        let options = OpenOptions { pace, ..OpenOptions::default() };
+        let mut controller = open(port, &options, &mut |note| eprintln!("{note}")).unwrap();
+        scenarios.iter().map(|s| (s.0, scenarios::run(s, &mut controller))).collect::<Vec<_>>()
+    };
+    let all = run(Pace::Fast, &scenarios::ALL);
+    // In the emulator time would run away from whoever streams.
+    [all, run(Pace::Slow, &streams::ALL)].concat()
 }
 
 #[test]

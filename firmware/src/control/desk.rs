@@ -9,7 +9,7 @@ use core::ops::{Deref, DerefMut};
 use core::sync::atomic::Ordering::Relaxed;
 use giotto_shared::path::{ExactCircle, ExactSegment, Quantity};
 use giotto_shared::table::{self, Table, TableError};
-use giotto_shared::wire::{self, MotionRefusal, MotionState, Refusal};
+use giotto_shared::wire::{MotionRefusal, MotionState, Refusal, Steps};
 
 /// What the background owns.
 pub struct Desk<P, S, O, I> {
@@ -26,35 +26,28 @@ pub struct Desk<P, S, O, I> {
 /// Set-points of a stream so far.
 #[derive(Clone, Copy)]
 struct Streamed {
-    /// The newest one, nm, and its distance from the one before.
-    place_nm: [i32; 3],
-    step_nm: [i32; 3],
+    steps: Steps,
     /// Number of the next one.
     next: u16,
     /// So many have to wait before the tick begins.
     ahead: u16,
+    batches: u16,
 }
 
 /// Farthest coordinate of a set-point, nm.
 const MAX_POSITION_NM: u32 = (MAX_POSITION_M * 1e9) as u32;
 
 impl Streamed {
-    /// Reads set-points: for each axis the change of the step from one to the next, as postcard writes an i32. `None`: bytes
-    /// are left over, or a place is none.
-    #[inline(never)]
+    /// Reads set-points; `None`: bytes are left over, they are more than a batch, or a place is none.
     fn read(&mut self, mut bytes: &[u8], points: &mut Points) -> Option<()> {
         points.first = self.next;
         while !bytes.is_empty() {
-            for (place, step) in self.place_nm.iter_mut().zip(&mut self.step_nm) {
-                let (change, rest) = wire::take::<i32>(bytes)?;
-                *step = step.wrapping_add(change);
-                *place = place.wrapping_add(*step);
-                bytes = rest;
-                if place.unsigned_abs() > MAX_POSITION_NM {
-                    return None;
-                }
+            bytes = self.steps.read(bytes)?;
+            let place_nm = self.steps.place_nm;
+            if place_nm.iter().any(|nm| nm.unsigned_abs() > MAX_POSITION_NM) {
+                return None;
             }
-            *points.place_nm.get_mut(usize::from(points.count))? = self.place_nm;
+            *points.place_nm.get_mut(usize::from(points.count))? = place_nm;
             points.count = points.count.wrapping_add(1);
             self.next = self.next.wrapping_add(1);
         }
@@ -208,7 +201,7 @@ where
         self.shared.go.store(false, Relaxed);
         let sent = self.segments.send(&Job::Stream(plan));
         let place_nm = self.planner.position_nm();
-        self.stream = Some(Streamed { place_nm, step_nm: [0; 3], next: 0, ahead });
+        self.stream = Some(Streamed { steps: Steps::from(place_nm), next: 0, ahead, batches: 0 });
         self.shared.set_program(true);
         self.accepted(sent)
     }
@@ -223,13 +216,17 @@ where
             streamed.read(bytes, points).ok_or(MotionRefusal::Path(Quantity::Position))?;
         }
         let sent = self.segments.send(&job);
+        streamed.batches = streamed.batches.saturating_add(1);
         self.stream = Some(streamed);
-        if streamed.next >= streamed.ahead || self.segments.waiting() >= SEGMENTS {
+        // The queue is full of set-points alone.
+        let full = usize::from(streamed.batches) >= SEGMENTS && self.segments.waiting() >= SEGMENTS;
+        if streamed.next >= streamed.ahead || full {
             self.shared.go.store(true, Relaxed);
         }
         self.accepted(sent)
     }
 
+    #[inline(never)]
     fn end(&mut self) -> Result<(), MotionRefusal> {
         if self.open(true).is_ok() {
             self.room()?;

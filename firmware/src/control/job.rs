@@ -2,8 +2,8 @@
 //! that streams cost no memory of their own there.
 use crate::engine::{Planned, StreamPlan};
 
-/// Most set-points in one message, and so in a batch: three bytes each at least.
-pub const BATCH: usize = giotto_shared::wire::CHUNK / 3;
+/// Most set-points in a batch: those of a message, which have room where a segment has.
+pub const BATCH: usize = giotto_shared::wire::POINTS;
 
 /// A piece of work for the tick.
 #[derive(Clone, Copy, Debug)]

@@ -12,8 +12,8 @@ pub(super) struct Jobs<I> {
     go: bool,
     epoch: u8,
     dropped: u32,
-    /// To begin when the executor has made its tick.
-    begins: Option<StreamPlan>,
+    /// A stream whose set-points are waited for.
+    stream: Option<StreamPlan>,
 }
 
 /// What is at the head of the queue.
@@ -25,7 +25,7 @@ enum Head {
 
 impl<I> Jobs<I> {
     pub(super) const fn new(queue: I) -> Self {
-        Self { queue, closed: false, go: false, epoch: 0, dropped: 0, begins: None }
+        Self { queue, closed: false, go: false, epoch: 0, dropped: 0, stream: None }
     }
 
     /// What holds in this tick.
@@ -34,10 +34,15 @@ impl<I> Jobs<I> {
         (self.closed, self.go, self.epoch) = (closed, go, epoch);
     }
 
-    /// A stream that was at the head and may begin.
+    /// The stream that may begin now.
     #[inline]
     pub(super) fn begins(&mut self) -> Option<StreamPlan> {
-        self.begins.take()
+        let plan = self.stream?;
+        let over = self.closed || plan.epoch() != self.epoch;
+        if over || self.go {
+            self.stream = None;
+        }
+        (self.go && !over).then_some(plan)
     }
 
     /// Jobs thrown away.
@@ -92,13 +97,12 @@ impl<I: Receiver<Job>> Inbox for Jobs<I> {
                 self.queue.discard();
                 return true;
             }
-            Some(Head::Stream(plan)) if !closed && plan.epoch() == self.epoch => {
-                if self.go {
-                    self.queue.discard();
-                    self.begins = Some(plan);
-                }
+            Some(Head::Stream(plan)) if !closed => {
+                self.queue.discard();
+                self.stream = Some(plan);
                 return false;
             }
+            Some(Head::Points) if self.stream.is_some() => return false,
             // Of a stream that is over, or of a program that was stopped.
             Some(_) => {}
         }

@@ -28,7 +28,7 @@ pub const SEGMENTS: usize = 3;
 /// Places of the stream's differentiator: the next power of two above those of 15 ms at 1 kHz.
 pub const STREAM_PLACES: usize = 16;
 /// Set-points that wait for the link, at most.
-pub const SET_POINTS: usize = 64;
+pub const SET_POINTS: usize = 48;
 
 #[cfg(test)]
 mod tests;

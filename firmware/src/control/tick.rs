@@ -87,10 +87,11 @@ where
             (sample, last, late) = self.jobs.point(self.stream.expected());
             self.stream.count_late(late);
         }
-        let output = self.stream.tick(sample);
         if last {
+            // It comes behind the last set-point.
             self.stream.finish();
         }
+        let output = self.stream.tick(sample);
         if self.stream.over() {
             self.streaming = false;
             self.executor.set_position(output.nominal_nm);

@@ -80,8 +80,9 @@ impl Extra {
     /// Whether sides and constants are within the 8 mm of their numbers, with room for their sum.
     pub(crate) fn within_numbers(&self) -> bool {
         let t = &self.turning;
-        let small = |fine: &i32| fine.unsigned_abs() < 1 << 28;
-        self.constant_fine.iter().chain(t.side.iter().flatten()).chain(&t.spike).all(small)
+        let [[a, b], [c, d]] = t.side;
+        let ([e, f], [g, h]) = (self.constant_fine, t.spike);
+        [a, b, c, d, e, f, g, h].iter().all(|fine| fine.unsigned_abs() < 1 << 28)
     }
 
     /// Indicators of the sense of X and Y. Asked for before anything branches: a product whose factors come from

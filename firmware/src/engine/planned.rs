@@ -112,12 +112,12 @@ impl Law {
     /// The law of the same ramp run backwards in time: odd derivatives change their sign.
     pub(crate) const fn turned_round(self) -> Self {
         Self {
-            k5: -self.k5,
-            k6: -self.k6,
-            k7: -self.k7,
-            k8: -self.k8,
-            k9: -self.k9,
-            end_term_q1: -self.end_term_q1,
+            k5: self.k5.wrapping_neg(),
+            k6: self.k6.wrapping_neg(),
+            k7: self.k7.wrapping_neg(),
+            k8: self.k8.wrapping_neg(),
+            k9: self.k9.wrapping_neg(),
+            end_term_q1: self.end_term_q1.wrapping_neg(),
             ..self
         }
     }
@@ -159,9 +159,8 @@ pub(crate) fn turn(radial: i32, tangential: i32, c: i32, s: i32) -> (i32, i32) {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct Planned {
     pub(crate) axes: [Axis; 3],
-    /// The law in the rising and in the falling ramp.
+    /// The law in the rising ramp.
     pub(crate) rise: Law,
-    pub(crate) fall: Law,
     pub(crate) timing: Timing,
     pub(crate) kind: Kind,
     /// A zone of the table applies.

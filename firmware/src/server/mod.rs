@@ -205,7 +205,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             }
             Turn::New => {
                 let reply = match command {
-                    Ok(command) => self.execute(command).unwrap_or_else(Reply::Refused),
+                    Ok(command) => self.execute(&command).unwrap_or_else(Reply::Refused),
                     Err(session::NotUnderstood) => Reply::Refused(Refusal::NotUnderstood),
                 };
                 self.session.answered(head);
@@ -243,43 +243,43 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     }
 
     #[inline(never)]
-    fn execute(&mut self, command: Command) -> Result<Reply, Refusal> {
+    fn execute(&mut self, command: &Command) -> Result<Reply, Refusal> {
         match command {
             Command::Hello => {
                 self.supervision.set(SUPERVISE_MS);
                 return Ok(Reply::Identity(self.identity()));
             }
             Command::Status => return Ok(Reply::Status(self.status())),
-            Command::WriteBegin { length, crc } => self.upload.begin(length, crc)?,
+            Command::WriteBegin { length, crc } => self.upload.begin(*length, *crc)?,
             Command::WriteChunk { offset, data } => {
-                self.upload.chunk(offset, &data, &mut self.buffers.image)?
+                self.upload.chunk(*offset, data, &mut self.buffers.image)?
             }
             Command::WriteEnd => return self.program().map(|slot| Reply::Written { slot }),
-            Command::ReadBack { slot, offset, length } => return self.read_back(slot, offset, length),
+            Command::ReadBack { slot, offset, length } => return self.read_back(*slot, *offset, *length),
             Command::Commit => self.commit()?,
             Command::Confirm => self.confirm()?,
             Command::Rollback => self.roll_back()?,
             Command::Bypass { on } => {
-                if !on && self.active.is_none() {
+                if !*on && self.active.is_none() {
                     return Err(Refusal::NoTable);
                 }
-                self.bypass = on;
+                self.bypass = *on;
                 self.apply_bypass();
             }
-            Command::RunCircle(run) => self.run_circle(&run)?,
+            Command::RunCircle(run) => self.run_circle(run)?,
             Command::Begin => self.begin()?,
-            Command::Append { segment, tolerance_nm } => self.append(&segment, tolerance_nm)?,
+            Command::Append { segment, tolerance_nm } => self.append(segment, *tolerance_nm)?,
             Command::End => self.motion.end().map_err(Refusal::Motion)?,
-            Command::BeginStream { feed_m_s, ahead } => self.begin_stream(feed_m_s, ahead)?,
-            Command::Points { steps } => self.motion.points(&steps).map_err(Refusal::Motion)?,
+            Command::BeginStream { feed_m_s, ahead } => self.begin_stream(*feed_m_s, *ahead)?,
+            Command::Points { steps } => self.motion.points(steps).map_err(Refusal::Motion)?,
             Command::Stop => self.motion.stop(),
-            Command::Subscribe { every, on_link } => self.subscribe(every, on_link),
+            Command::Subscribe { every, on_link } => self.subscribe(*every, *on_link),
             Command::Reset => {
                 self.idle()?;
                 self.reset = true;
             }
-            Command::Supervise { after_ms } => self.supervision.set(after_ms),
-            Command::Provision { key } => self.provision(key)?,
+            Command::Supervise { after_ms } => self.supervision.set(*after_ms),
+            Command::Provision { key } => self.provision(*key)?,
         }
         Ok(Reply::Done)
     }
@@ -422,10 +422,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
 /// A name, cut to fit.
 fn cut(name: &str) -> heapless::String<16> {
     let mut out = heapless::String::new();
-    for character in name.chars() {
-        if out.push(character).is_err() {
-            break;
-        }
-    }
+    // Names are ASCII; one that could not be cut here would be left out.
+    let _ = out.push_str(name.get(..16).unwrap_or(name));
     out
 }

@@ -1,7 +1,6 @@
 //! `giotto demo`: the whole loop on a bundled campaign and a simulated machine.
 use super::failure::{Failure, cannot_write};
 use super::output::Output;
-use crate::controller::port::BAUD;
 use crate::controller::{Controller, OpenOptions, Port, open};
 use crate::demo::{
     DemoError, LEFT_M, Learned, Proof, REDUCTION_PERCENT, Size, bundled, learn, picture, prove,
@@ -49,7 +48,7 @@ impl Kind {
             Self::Sim => Port::Sim,
             Self::Qemu => Port::Qemu,
         };
-        Ok(open(&port, &OpenOptions { image, baud: BAUD }, &mut |note| out.note(note))?)
+        Ok(open(&port, &OpenOptions { image, ..OpenOptions::default() }, &mut |note| out.note(note))?)
     }
 }
 

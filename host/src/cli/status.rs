@@ -165,6 +165,13 @@ pub(super) fn words(controller: &Controller, status: &Status) -> Table {
             counts.dropped_set_points
         ),
     );
+    row(
+        "streams",
+        format!(
+            "{} set-points missing, {} late, {} beyond the feed",
+            counts.missing_set_points, counts.late_set_points, counts.rejected_set_points
+        ),
+    );
     if let Some(permille) = status.idle_permille {
         row("idle", format!("{:.1} % of the time", f64::from(permille) / 10.0));
     }

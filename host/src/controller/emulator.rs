@@ -27,6 +27,9 @@ pub enum Pace {
     Fast,
     /// By the clock on the wall.
     Clock,
+    /// Time counts instructions and skips over nothing, at a tenth of the clock or so: a host that has to keep up with it can.
+    /// The workspace's image is the one that never sleeps.
+    Slow,
 }
 
 /// An emulator that runs an image; dropped, it is ended.
@@ -78,6 +81,7 @@ impl Emulator {
                 let reason = "no such file".to_owned();
                 return Err(ControllerError::NoImage { path: path.to_owned(), reason });
             }
+            None if pace == Pace::Slow => image::ensure_with(board, &["awake"], note)?,
             None => image::ensure(board, note)?,
         };
         let folder = tempfile::Builder::new().prefix("giotto-qemu-").tempdir().map_err(|e| failed(&e))?;
@@ -97,10 +101,11 @@ impl Emulator {
         }
         // Time counts instructions, so that a busy host delays the controller but never makes a tick late.
         let sleep = match pace {
-            Pace::Fast => "off",
+            Pace::Fast | Pace::Slow => "off",
             Pace::Clock => "on",
         };
-        command.arg("-icount").arg(format!("shift={},sleep={sleep},align=off", board.instruction_shift()));
+        let shift = if pace == Pace::Slow { board.slow_shift() } else { board.instruction_shift() };
+        command.arg("-icount").arg(format!("shift={shift},sleep={sleep},align=off"));
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut process = command.spawn().map_err(|error| failed(&error))?;
         match find_pty(&mut process) {

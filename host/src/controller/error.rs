@@ -84,6 +84,12 @@ pub enum ControllerError {
     /// The table itself is wrong.
     #[error("{0}")]
     Table(#[from] TableError),
+    /// The controller ran out of set-points.
+    #[error("the controller ran out of set-points, {missing} ticks without one, and came to rest")]
+    Starved {
+        /// Ticks for which none had come.
+        missing: u32,
+    },
     /// Set-points were lost on the way.
     #[error("{lost} set-points of the run were lost on the way")]
     SetPointsLost {
@@ -132,6 +138,9 @@ impl ControllerError {
             Self::ReadBack { .. } => "the table in use is untouched; flash again, and replace worn flash",
             Self::Table(TableError::NewerVersion { .. }) => "use the giotto that wrote it, or a newer one",
             Self::Table(_) => "make the table anew with `giotto table MODEL.toml -o TABLE.bin`",
+            Self::Starved { .. } => {
+                "reset it (`giotto status` shows the fault) and stream over a faster port, from a less busy computer"
+            }
             Self::SetPointsLost { .. } => "run again; a shorter run or a faster port loses less",
             Self::NoEmulator { .. } => {
                 "apt-get install --no-install-recommends qemu-system-arm (or run .ci/setup), or use --port sim"

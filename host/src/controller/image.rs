@@ -68,6 +68,14 @@ impl Board {
         }
     }
 
+    /// The same where time has to go slowly: several times less than the board needs.
+    pub const fn slow_shift(self) -> u8 {
+        match self {
+            Self::Mps2An386 | Self::Ticks => 1,
+            Self::Stm32f405 => 0,
+        }
+    }
+
     /// QEMU's machine that the image runs on.
     pub const fn machine(self) -> &'static str {
         match self {

@@ -6,7 +6,7 @@
 //! | [`client`] | requests and replies over any [`link`](link::Link): status, slots, runs |
 //! | [`flash`] | a table onto a controller, and the proof that it is there |
 //! | [`recording`] | circles run, set-points received |
-//! | [`program`] | programs run, sent ahead of the machine |
+//! | [`program`], [`streaming`] | programs and set-points, sent ahead of the machine |
 //! | [`port`] | what `--port` may name, and opening it |
 //! | [`serial`] | a serial device |
 //! | [`virtual_controller`] | the firmware's library in this process, in simulated time, or behind a pty |
@@ -22,12 +22,14 @@ pub mod port;
 pub mod program;
 pub mod recording;
 pub mod serial;
+pub mod streaming;
 pub mod virtual_controller;
 
 #[cfg(test)]
 mod tests;
 
 pub use client::Controller;
+pub use emulator::Pace;
 pub use error::ControllerError;
 pub use giotto_shared::path::{CircleRun, Segment};
 pub use image::Board;

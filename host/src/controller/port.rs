@@ -47,11 +47,13 @@ pub struct OpenOptions {
     pub image: Option<PathBuf>,
     /// Baud rate of a serial device.
     pub baud: u32,
+    /// How fast time goes in the emulator.
+    pub pace: Pace,
 }
 
 impl Default for OpenOptions {
     fn default() -> Self {
-        Self { image: None, baud: BAUD }
+        Self { image: None, baud: BAUD, pace: Pace::Fast }
     }
 }
 
@@ -68,7 +70,7 @@ pub fn open(
         Port::Sim => Controller::connect(Box::new(VirtualLink::new()), "sim", 1),
         Port::Qemu | Port::QemuBoard(_) => {
             let board = if let Port::QemuBoard(board) = port { *board } else { Board::Mps2An386 };
-            let emulator = Emulator::start_board(board, options.image.as_deref(), Pace::Fast, note)?;
+            let emulator = Emulator::start_board(board, options.image.as_deref(), options.pace, note)?;
             let mut controller = Controller::connect(Box::new(emulator.into_link()?), "qemu", 1)?;
             // Its time does not wait for ours: a second of silence there may be a moment here.
             controller.supervise(None)?;

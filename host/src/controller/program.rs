@@ -7,7 +7,7 @@ use giotto_shared::wire::{Command, ExactSegment, MotionRefusal, Refusal};
 use std::time::Duration;
 
 /// From one attempt to append to a full queue to the next, unless set-points come before.
-const ROOM_AFTER: Duration = Duration::from_millis(20);
+pub(super) const ROOM_AFTER: Duration = Duration::from_millis(20);
 
 /// One piece of a program.
 #[derive(Clone, Copy, Debug, PartialEq)]

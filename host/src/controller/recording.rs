@@ -68,18 +68,18 @@ impl Controller {
     pub(super) fn end_recording(&mut self, every: u16) -> Result<Recording, ControllerError> {
         let every = every.max(1);
         let mut spoke_at = self.now();
+        let mut at_rest = false;
         while !self.set_points.last().is_some_and(|batch| batch.last) {
             let came = self.wait_for_set_points(KEEP_ALIVE)?;
             if came && self.now() < spoke_at + KEEP_ALIVE {
                 continue;
             }
-            spoke_at = self.now();
-            let running = matches!(self.status()?.motion, MotionState::Running | MotionState::Stopping);
-            // The last batch may have come while the status was asked for, or be on its way.
-            let over = self.set_points.last().is_some_and(|batch| batch.last);
-            if !running && !came && !over {
+            // Nothing came though it was at rest: the last one is not on its way.
+            if at_rest && !came {
                 return Err(ControllerError::SetPointsLost { lost: 1 });
             }
+            spoke_at = self.now();
+            at_rest = !matches!(self.status()?.motion, MotionState::Running | MotionState::Stopping);
         }
         self.command(Command::Subscribe { every: 0, on_link: true })?;
         self.recording(every)

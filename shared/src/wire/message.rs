@@ -9,8 +9,10 @@ pub const PROTOCOL_VERSION: u16 = 3;
 
 /// Most bytes of a table in one message.
 pub const CHUNK: usize = 128;
-/// Most set-points in one message.
+/// Most set-points in one message from the controller.
 pub const SET_POINTS: usize = 6;
+/// Most set-points of a stream in one message to it.
+pub const POINTS: usize = 40;
 
 /// A link that is silent for so long during a run counts as dead, unless the host asks otherwise, ms: four times the
 /// host's longest silence.

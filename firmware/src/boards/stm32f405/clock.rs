@@ -62,7 +62,9 @@ pub fn start() -> Clock {
     if crystal {
         Clock { core_hz: CORE_HZ, apb1_hz: CORE_HZ / 4, apb2_hz: CORE_HZ / 2, fell_back: false }
     } else {
-        Clock { core_hz: HSI_HZ, apb1_hz: HSI_HZ, apb2_hz: HSI_HZ, fell_back: true }
+        // The emulator's SysTick counts 168 MHz all the same.
+        let core_hz = if cfg!(feature = "awake") { CORE_HZ } else { HSI_HZ };
+        Clock { core_hz, apb1_hz: HSI_HZ, apb2_hz: HSI_HZ, fell_back: true }
     }
 }
 

@@ -41,7 +41,7 @@ impl Executor {
         self.phase = self.phase.wrapping_add(step);
         // The phase is put away before the law is begun: both at once do not fit into the registers.
         compiler_fence(Ordering::AcqRel);
-        let law = if FALLING { &self.segment.fall } else { &self.segment.rise };
+        let law = if FALLING { &self.fall } else { &self.segment.rise };
         let phase_q32 = ramp_phase(self.phase, step, law.end_term(&shape));
         let (radial, tangential) = law.gain(&shape);
         let (c, s) = sincos_with(self.sincos, phase_q32);

@@ -81,6 +81,7 @@ impl Executor {
         self.guard.watch(!self.engage.full());
         let uncorrected = u32::from(!self.segment.corrected);
         self.counters.uncorrected = self.counters.uncorrected.wrapping_add(uncorrected);
+        self.fall = self.segment.rise.turned_round();
         self.mode = Mode::Settle;
         self.clock = Clock::rising(self.segment.settle_step);
         self.target_nm = self.rest_offset_nm;

@@ -35,7 +35,7 @@ impl Executor {
     }
 
     /// Adds the profile terms that are not linear.
-    #[inline(always)]
+    #[inline(never)]
     fn with_terms(&mut self, c: i32, s: i32, nominal: [i32; 3], wanted: [i32; 3]) -> [i32; 3] {
         let (arm, extra) = (self.arm(c, s), &self.segment.extra);
         let ([nx, ny, _], [wx, wy, wz]) = (nominal, wanted);
@@ -83,7 +83,7 @@ impl Executor {
     fn ramp_at(&mut self, shape: &Shapes, falling: bool) -> Output {
         let step = scaled(self.segment.timing.step_q1, shape.s_q31);
         self.advance(step);
-        let law = if falling { &self.segment.fall } else { &self.segment.rise };
+        let law = if falling { &self.fall } else { &self.segment.rise };
         let phase_q32 = ramp_phase(self.phase, step, law.end_term(shape));
         let (c, s) = self.weights(phase_q32);
         let nominal = self.place(c, s, phase_q32);

@@ -24,7 +24,7 @@ mod phase;
 
 use crate::engine::engage::Engage;
 use crate::engine::guard::Guard;
-use crate::engine::planned::Planned;
+use crate::engine::planned::{Law, Planned};
 use crate::engine::ramp::{Clock, POLYNOMIAL};
 use crate::engine::sides::Sides;
 use crate::engine::{Counters, Fault, Output, flag};
@@ -103,6 +103,8 @@ pub struct Executor {
     phase: u64,
     clock: Clock,
     segment: Planned,
+    /// The law of the segment in its falling ramp.
+    fall: Law,
     ramp: [i32; 4],
     sincos: [i32; 2],
     guard: Guard,
@@ -140,6 +142,7 @@ impl Executor {
             phase: 0,
             clock: Clock::default(),
             segment: Planned::default(),
+            fall: Law::default(),
             ramp: POLYNOMIAL,
             sincos: SINCOS,
             // Bounds of 0 take the careful way, which also minds the engagement.

@@ -69,7 +69,6 @@ impl Planner {
         }
         segment.timing = timing;
         segment.rise.end_term_q1 = end_term(&timing);
-        segment.fall = segment.rise.turned_round();
         segment.end_nm = to;
         self.position_nm = to;
         Ok(())

@@ -95,7 +95,6 @@ impl Planner {
             segment.proven = within && (!segment.extended || segment.extra.fits);
         }
         segment.rise.end_term_q1 = end_term(&timing);
-        segment.fall = segment.rise.turned_round();
         Ok(())
     }
 

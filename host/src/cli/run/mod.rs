@@ -2,6 +2,8 @@
 mod circle;
 mod program;
 mod set_points;
+mod stream;
+mod stream_file;
 
 use super::{Failure, Output};
 
@@ -18,6 +20,8 @@ enum Path {
     Circle(circle::Args),
     /// An NC program: lines, arcs, helices, dwells, sent ahead of the machine.
     Program(program::Args),
+    /// Set-points from a file, one a tick, as another controller makes them.
+    Stream(stream::Args),
 }
 
 /// Runs the command.
@@ -25,5 +29,6 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     match args.path {
         Path::Circle(args) => circle::run(args, out),
         Path::Program(args) => program::run(args, out),
+        Path::Stream(args) => stream::run(args, out),
     }
 }
