@@ -2,7 +2,7 @@
 use crate::contour;
 use crate::scenarios::{Scenario, Trouble, ensure, holds};
 use giotto::controller::streaming::Streamed;
-use giotto::controller::{Controller, ControllerError, Segment, Step};
+use giotto::controller::{Controller, ControllerError};
 use giotto_shared::path::smoothstep;
 use giotto_shared::wire::{Command, FaultCause, MotionState};
 use std::f64::consts::TAU;
@@ -14,8 +14,9 @@ pub const ALL: [Scenario; 3] = [
     ("a stream that dries up comes to rest and faults until a reset", dries_up),
 ];
 
-/// Time in which a stream gains its speed, and loses it, s.
-const START_S: f64 = 0.8;
+/// Time in which a stream gains its speed, and loses it, s: 150 time constants of the machine behind it, as in the library's own
+/// test. What no circle shows of a machine, its third cumulant, streams leave uncorrected, and it acts while the feed changes.
+const START_S: f64 = 1.2;
 /// A host may be busy elsewhere: so often a stream is tried.
 const TRIES: usize = 3;
 
@@ -44,9 +45,8 @@ fn places(curve: Curve, rate: f64, tick_s: f64) -> Vec<[i32; 3]> {
 /// Streams a curve from rest at its start, again if the host was too busy to keep up.
 fn streamed(controller: &mut Controller, places_nm: &[[i32; 3]]) -> Result<Streamed, Trouble> {
     let start_nm = places_nm.first().copied().unwrap_or_default();
-    let start = Segment::Line { to_m: start_nm.map(|nm| f64::from(nm) * 1e-9), feed_m_s: 0.3 };
     for last in (0..TRIES).map(|attempt| attempt + 1 == TRIES) {
-        controller.run_program(&[Step { segment: start, tolerance_m: 0.0 }], 100)?;
+        controller.move_to(start_nm, 0.3)?;
         match controller.run_stream(places_nm, 0.5, 1) {
             Ok(streamed) if streamed.missing == 0 || last => return Ok(streamed),
             Err(ControllerError::Starved { .. }) if !last => controller.reset()?,

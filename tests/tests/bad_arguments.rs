@@ -11,7 +11,7 @@ const MODEL: &str = "format = 1\ncampaign = \"bench\"\nmachine = \"mill\"\n[serv
                      [valid]\nradius_mm = [50.0, 100.0]\nfeed_mm_s = [20.0, 200.0]\n";
 
 /// Commands that read a file, `{}` standing for it.
-const READERS: [&str; 16] = [
+const READERS: [&str; 17] = [
     "import {} --radius 100 --feed 100 --direction ccw -o new",
     "analyze {}",
     "fit {}",
@@ -26,6 +26,7 @@ const READERS: [&str; 16] = [
     "flash {} --port sim",
     "verify {} --port sim",
     "run program {} --port sim",
+    "run stream {} --port sim",
     "analyze campaign --ballbar {}",
     "diagnose campaign --model {}",
 ];
@@ -40,7 +41,7 @@ const FILES: [(&str, &[u8], &str); 5] = [
 ];
 
 /// Talks to a port.
-const TALKERS: [&str; 8] = [
+const TALKERS: [&str; 9] = [
     "status",
     "rollback",
     "bypass on",
@@ -49,6 +50,7 @@ const TALKERS: [&str; 8] = [
     "monitor",
     "run circle --radius 50 --feed 100 --direction ccw",
     "run program part.nc",
+    "run stream path.csv",
 ];
 
 fn run(folder: &Path, line: &str) -> (i32, String, String) {
@@ -59,6 +61,7 @@ fn lay_out(folder: &Path) {
     fs::write(folder.join("plan.toml"), PLAN).unwrap();
     fs::write(folder.join("model.toml"), MODEL).unwrap();
     fs::write(folder.join("part.nc"), "G0 X20 Y0\nG3 I-20 F1500\n").unwrap();
+    fs::write(folder.join("path.csv"), "time_s,x_mm,y_mm\n0,0,0\n0.001,0.01,0\n").unwrap();
     fs::create_dir(folder.join("folder")).unwrap();
     for (name, bytes, _) in FILES {
         fs::write(folder.join(name), bytes).unwrap();
@@ -134,6 +137,30 @@ fn a_port_that_is_not_there_is_no_answer() {
     refused(folder, "run program fast.nc --port sim", 4, "fast.nc:2:1: refused");
 }
 
+/// Rows that are no set-points, each with its place; and what only the controller can refuse.
+#[test]
+fn a_stream_that_is_none_is_refused_with_the_place_of_its_fault() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = temp.path();
+    lay_out(folder);
+    for (text, code, words) in [
+        ("time_s,x_mm\n0,0\n", 3, "rows.csv: lacks a column"),
+        ("time_s,x_mm,y_mm,w_mm\n0,0,0,0\n", 3, "rows.csv: has a column \"w_mm\""),
+        ("time_s,x_mm,x_mm\n0,0,0\n", 3, "rows.csv: has two columns x_mm"),
+        ("time_s,x_mm,y_mm\n0,0,0\n", 3, "rows.csv: has fewer than two rows"),
+        ("time_s,x_mm,y_mm\n0,0,0\n0.001,0\n", 3, "rows.csv:3:1: 2 fields, expected 3"),
+        ("time_s,x_mm,y_mm\n0,0,0\n0.001,0,one\n", 3, "rows.csv:3:9: \"one\", expected a number"),
+        ("time_s,x_mm,y_mm\n0,0,0\n0.001,0,nan\n", 3, "rows.csv:3:9: \"nan\""),
+        ("time_s,x_mm,y_mm\n0,0,0\n0.001,3000,0\n", 3, "rows.csv:3:7: 3000 mm"),
+        ("x_mm,y_mm,time_s\n0,0,0\n\n0,0,0.003\n", 3, "rows.csv:4:5: 0.003000 s after the first row"),
+        ("time_s,x_mm,y_mm\n0,0,0\n0.001,30,0\n0.002,0,0\n", 4, "rows.csv:3:1: to this row: refused"),
+        ("time_s,x_mm,y_mm\n0,0,0\n0.001,1.5,0\n", 4, "rows.csv:3:1: to this row: refused"),
+    ] {
+        fs::write(folder.join("rows.csv"), text).unwrap();
+        refused(folder, "run stream rows.csv --port sim", code, words);
+    }
+}
+
 #[test]
 fn what_cannot_be_written_is_said_with_its_path() {
     let temp = tempfile::tempdir().unwrap();
@@ -148,6 +175,7 @@ fn what_cannot_be_written_is_said_with_its_path() {
         "man -o empty",
         "run circle --radius 50 --feed 100 --direction ccw --port sim -o folder",
         "run program part.nc --port sim -o folder",
+        "run stream path.csv --port sim -o folder",
     ] {
         refused(folder, line, 3, line.rsplit(' ').next().unwrap());
     }
@@ -165,6 +193,7 @@ fn wrong_usage_is_two_and_json_keeps_stdout_clean() {
         "run square --port sim",
         "run program part.nc --port sim --tolerance-mm -1",
         "run program part.nc --port sim --rapid 0",
+        "run stream path.csv --port sim --every 0",
         "completions csh",
         "fit campaign --train-radius 77",
         "fit campaign --alpha 2",

@@ -3,11 +3,11 @@ use super::client::Controller;
 use super::error::ControllerError;
 use super::recording::Recording;
 use giotto_shared::path::Segment;
-use giotto_shared::wire::{Command, ExactSegment, MotionRefusal, Refusal};
+use giotto_shared::wire::{Command, ExactSegment, MotionRefusal, MotionState, Refusal, Status};
 use std::time::Duration;
 
 /// From one attempt to append to a full queue to the next, unless set-points come before.
-pub(super) const ROOM_AFTER: Duration = Duration::from_millis(20);
+const ROOM_AFTER: Duration = Duration::from_millis(20);
 
 /// One piece of a program.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,6 +75,31 @@ impl Controller {
         self.command(Command::Begin)?;
         self.append_all(&segments)?;
         Ok(segments.iter().fold(from_nm, |at, (segment, _)| segment.end_nm(at)))
+    }
+
+    /// Moves in a straight line to a place, nm, and returns when the machine stands there.
+    ///
+    /// # Errors
+    /// As [`Controller::run_program`].
+    pub fn move_to(&mut self, to_nm: [i32; 3], feed_m_s: f64) -> Result<(), ControllerError> {
+        if self.status()?.raw_nm == to_nm {
+            return Ok(());
+        }
+        let to_m = to_nm.map(|nm| f64::from(nm) * 1e-9);
+        let step = Step { segment: Segment::Line { to_m, feed_m_s }, tolerance_m: 0.0 };
+        self.send_program(&[step]).map_err(|error| error.error)?;
+        self.at_rest().map(drop)
+    }
+
+    /// Waits until nothing moves: how the controller stands then.
+    pub(super) fn at_rest(&mut self) -> Result<Status, ControllerError> {
+        loop {
+            let status = self.status()?;
+            if !matches!(status.motion, MotionState::Running | MotionState::Stopping) {
+                return Ok(status);
+            }
+            self.listen(ROOM_AFTER)?;
+        }
     }
 
     fn append_all(&mut self, segments: &[(ExactSegment, u32)]) -> Result<(), ProgramError> {

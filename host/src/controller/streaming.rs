@@ -1,9 +1,8 @@
 //! Set-points streamed to a controller: one a tick, sent ahead of it as long as its queue takes them.
 use super::client::Controller;
 use super::error::ControllerError;
-use super::program::ROOM_AFTER;
 use super::recording::Recording;
-use giotto_shared::wire::{Chunk, Command, FaultCause, MotionState, POINTS, Status, Steps};
+use giotto_shared::wire::{Chunk, Command, FaultCause, POINTS, Status, Steps};
 
 /// What came of a stream.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,13 +64,7 @@ impl Controller {
         let before = self.status()?;
         self.command(Command::BeginStream { feed_m_s: feed_m_s as f32, ahead: u16::MAX })?;
         self.send_points(before.raw_nm, places_nm)?;
-        loop {
-            self.listen(ROOM_AFTER)?;
-            let status = self.status()?;
-            if !matches!(status.motion, MotionState::Running | MotionState::Stopping) {
-                return Ok(status);
-            }
-        }
+        self.at_rest()
     }
 
     fn send_points(&mut self, from_nm: [i32; 3], places_nm: &[[i32; 3]]) -> Result<(), ControllerError> {

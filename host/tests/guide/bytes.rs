@@ -5,7 +5,7 @@ use giotto_shared::path::{CircleRun, Segment};
 use giotto_shared::table::{self, Limits, Table, Travel, Zone};
 use giotto_shared::term::Term;
 use giotto_shared::wire::{
-    self, Command, ExactSegment, FromController, MAX_FRAME, Reply, Request, SetPoint, SetPoints,
+    self, Command, ExactSegment, FromController, MAX_FRAME, Reply, Request, SetPoint, SetPoints, Steps,
 };
 use giotto_shared::{Axis, Direction};
 use serde::Serialize;
@@ -66,6 +66,13 @@ fn frames_are_those_of_the_page() {
         .exact([50_000_000, 0, 0])
         .unwrap();
     holds(page, "bytes arc", &frame(&request(6, Command::Append { segment: arc, tolerance_nm: 0 })));
+    let stream = Command::BeginStream { feed_m_s: 0.5, ahead: 60 };
+    holds(page, "bytes begin-stream", &frame(&request(7, stream)));
+    let (mut writer, mut steps) = (Steps::from([0; 3]), wire::Chunk::new());
+    for x_nm in [1000, 3000, 5000] {
+        assert!(writer.write([x_nm, 0, 0], &mut steps));
+    }
+    holds(page, "bytes points", &frame(&request(8, Command::Points { steps })));
     let point = SetPoint { raw_nm: [50_000_000, 0, 0], corrected_nm: [50_012_000, 0, 0] };
     let points = std::iter::once(point).collect();
     let batch = FromController::SetPoints(SetPoints { tick: 1000, every: 10, last: false, points });
@@ -107,11 +114,14 @@ fn the_numbers_of_requests_are_those_of_the_page() {
         ("Begin", Command::Begin),
         ("Append", Command::Append { segment: ExactSegment::Dwell { time_s: 1.0 }, tolerance_nm: 0 }),
         ("End", Command::End),
+        ("BeginStream", Command::BeginStream { feed_m_s: 1.0, ahead: 1 }),
+        ("Points", Command::Points { steps: wire::Chunk::new() }),
     ];
     let versions = [
         format!("protocol version {}.", wire::PROTOCOL_VERSION),
         format!("`Hello` sets {} ms", wire::SUPERVISE_MS),
         format!("The longest payload is {} bytes.", wire::MAX_PAYLOAD),
+        format!("in batches of at most {}.", wire::POINTS),
     ];
     for words in &versions {
         assert!(text.contains(words), "{words}");

@@ -4,7 +4,8 @@ use super::stream_file::{Row, read};
 use crate::cli::port::PortArgs;
 use crate::cli::source::length;
 use crate::cli::{Failure, Output};
-use crate::controller::{Controller, Pace, Segment, Step};
+use crate::controller::{ControllerError, Pace};
+use giotto_shared::wire::{MotionRefusal, Quantity, Refusal};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -34,8 +35,11 @@ pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
     let tick_s = 1.0 / f64::from(controller.identity().tick_hz);
     one_a_tick(&args.file, &rows, tick_s)?;
     let places_nm: Vec<[i32; 3]> = rows.iter().map(|row| row.place_nm).collect();
-    approach(&mut controller, places_nm[0], args.rapid)?;
-    let streamed = controller.run_stream(&places_nm, feed_m_s(&places_nm, tick_s), args.record.every)?;
+    controller.move_to(places_nm[0], args.rapid * 1e-3)?;
+    let (fastest, feed_m_s) = fastest(&places_nm, tick_s);
+    let streamed = controller
+        .run_stream(&places_nm, feed_m_s, args.record.every)
+        .map_err(|error| too_fast(error, &place(&args.file, &rows[fastest])))?;
     if streamed.missing + streamed.rejected > 0 {
         out.note(format_args!(
             "{} ticks without a set-point ({} came late, {} were farther than the feed): bridged",
@@ -50,12 +54,17 @@ pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
     args.record.report(&controller, &streamed.recording, &more, out)
 }
 
+/// Where a row's time stands.
+fn place(path: &Path, row: &Row) -> String {
+    format!("{}:{}:{}", path.display(), row.line, row.column)
+}
+
 fn one_a_tick(path: &Path, rows: &[Row], tick_s: f64) -> Result<(), Failure> {
     let start_s = rows[0].time_s;
     for (n, row) in rows.iter().enumerate() {
         let (is, due) = (row.time_s - start_s, n as f64 * tick_s);
         if (is - due).abs() > SLACK * tick_s {
-            let place = format!("{}:{}:1", path.display(), row.line);
+            let place = place(path, row);
             return Err(Failure::input(format_args!(
                 "{place}: {is:.6} s after the first row, expected {due:.6} s: one row a tick of {tick_s} s"
             ))
@@ -65,22 +74,24 @@ fn one_a_tick(path: &Path, rows: &[Row], tick_s: f64) -> Result<(), Failure> {
     Ok(())
 }
 
-/// To the first set-point, and at rest.
-fn approach(controller: &mut Controller, to_nm: [i32; 3], rapid_mm_s: f64) -> Result<(), Failure> {
-    if controller.status()?.raw_nm == to_nm {
-        return Ok(());
-    }
-    let to_m = to_nm.map(|nm| f64::from(nm) * 1e-9);
-    let segment = Segment::Line { to_m, feed_m_s: rapid_mm_s * 1e-3 };
-    controller.run_program(&[Step { segment, tolerance_m: 0.0 }], u16::MAX).map_err(|error| error.error)?;
-    Ok(())
+/// The row that is farthest from the one before, and the feed from there to it, m/s: at least what a controller can be told.
+fn fastest(places_nm: &[[i32; 3]], tick_s: f64) -> (usize, f64) {
+    let step_nm = |row: usize| {
+        let between = |i: usize| f64::from(places_nm[row][i]) - f64::from(places_nm[row - 1][i]);
+        (0..3).map(|i| between(i).powi(2)).sum::<f64>().sqrt()
+    };
+    let farthest = (1..places_nm.len()).rev().max_by(|&a, &b| step_nm(a).total_cmp(&step_nm(b))).unwrap_or(1);
+    (farthest, (step_nm(farthest) * 1e-9 / tick_s).max(1e-3))
 }
 
-/// The largest feed between rows, m/s, or as little as a controller can be told.
-fn feed_m_s(places_nm: &[[i32; 3]], tick_s: f64) -> f64 {
-    let step = |pair: &[[i32; 3]]| {
-        (0..3).map(|i| (f64::from(pair[1][i]) - f64::from(pair[0][i])).powi(2)).sum::<f64>().sqrt()
-    };
-    let largest_nm = places_nm.windows(2).map(step).fold(0.0, f64::max);
-    (largest_nm * 1e-9 / tick_s).max(1e-3)
+/// With the row, if the controller does not go so fast.
+fn too_fast(error: ControllerError, place: &str) -> Failure {
+    use MotionRefusal::{OutOfBounds, Path};
+    match &error {
+        ControllerError::Refused(Refusal::Motion(
+            OutOfBounds { quantity: Quantity::Feed, .. } | Path(Quantity::Feed),
+        )) => Failure::controller(format_args!("{place}: to this row: {error}"))
+            .help("nothing of it has moved; write the set-points closer to each other"),
+        _ => error.into(),
+    }
 }

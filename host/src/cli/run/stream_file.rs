@@ -3,10 +3,11 @@
 use crate::cli::Failure;
 use std::path::Path;
 
-/// One set-point and the line it stands in.
+/// One set-point, the line it stands in, and the column of its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Row {
     pub(super) line: usize,
+    pub(super) column: usize,
     pub(super) time_s: f64,
     pub(super) place_nm: [i32; 3],
 }
@@ -41,30 +42,30 @@ pub(super) fn read(path: &Path) -> Result<Vec<Row>, Failure> {
     let mut rows = Vec::new();
     for (index, text) in lines.filter(|(_, line)| !line.trim().is_empty()) {
         let fields: Vec<&str> = text.split(',').collect();
-        let place = |column: usize, what: String| {
-            let before: usize = fields.iter().take(column).map(|field| field.len() + 1).sum();
-            Failure::input(format_args!("{name}:{}:{}: {what}", index + 1, before + 1)).help(EXPECTED)
+        let column = |field: usize| 1 + fields.iter().take(field).map(|field| field.len() + 1).sum::<usize>();
+        let place = |field: usize, what: String| {
+            Failure::input(format_args!("{name}:{}:{}: {what}", index + 1, column(field))).help(EXPECTED)
         };
         if fields.len() != header.len() {
             let what = format!("{} fields, expected {} as in the header", fields.len(), header.len());
             return Err(place(0, what));
         }
-        let number = |column: usize| {
-            let field = fields[column].trim();
+        let number = |at: usize| {
+            let field = fields[at].trim();
             let value = field.parse::<f64>().ok().filter(|value| value.is_finite());
-            value.ok_or_else(|| place(column, format!("\"{field}\", expected a number")))
+            value.ok_or_else(|| place(at, format!("\"{field}\", expected a number")))
         };
-        let nm = |column: usize| {
-            let value = number(column)?;
+        let nm = |at: usize| {
+            let value = number(at)?;
             let inside = value.abs() <= 2100.0;
             if inside {
                 Ok((value * 1e6).round() as i32)
             } else {
-                Err(place(column, format!("{value} mm, possible are -2100 to 2100")))
+                Err(place(at, format!("{value} mm, possible are -2100 to 2100")))
             }
         };
         let place_nm = [nm(x)?, nm(y)?, z.map_or(Ok(0), nm)?];
-        rows.push(Row { line: index + 1, time_s: number(time)?, place_nm });
+        rows.push(Row { line: index + 1, column: column(time), time_s: number(time)?, place_nm });
     }
     if rows.len() < 2 {
         return Err(file("has fewer than two rows"));
