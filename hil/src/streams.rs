@@ -1,5 +1,6 @@
 //! Scenarios of streams: set-points sent one a tick, and the contour that comes of them.
 use crate::contour;
+use crate::programs::TRIES;
 use crate::scenarios::{Scenario, Trouble, ensure, holds};
 use giotto::controller::streaming::Streamed;
 use giotto::controller::{Controller, ControllerError};
@@ -17,8 +18,6 @@ pub const ALL: [Scenario; 3] = [
 /// Time in which a stream gains its speed, and loses it, s: 150 time constants of the machine behind it, as in the library's own
 /// test. What no circle shows of a machine, its third cumulant, streams leave uncorrected, and it acts while the feed changes.
 const START_S: f64 = 1.2;
-/// A host may be busy elsewhere: so often a stream is tried.
-const TRIES: usize = 3;
 
 type Curve = fn(f64) -> [f64; 2];
 
@@ -42,7 +41,7 @@ fn places(curve: Curve, rate: f64, tick_s: f64) -> Vec<[i32; 3]> {
     (0..=((turn_s + START_S) / tick_s).ceil() as usize).map(place).collect()
 }
 
-/// Streams a curve from rest at its start, again if the host was too busy to keep up.
+/// Streams a curve from rest at its start, again if the host was too busy to keep up with an emulator.
 fn streamed(controller: &mut Controller, places_nm: &[[i32; 3]]) -> Result<Streamed, Trouble> {
     let start_nm = places_nm.first().copied().unwrap_or_default();
     for last in (0..TRIES).map(|attempt| attempt + 1 == TRIES) {
@@ -50,6 +49,7 @@ fn streamed(controller: &mut Controller, places_nm: &[[i32; 3]]) -> Result<Strea
         match controller.run_stream(places_nm, 0.5, 1) {
             Ok(streamed) if streamed.missing == 0 || last => return Ok(streamed),
             Err(ControllerError::Starved { .. }) if !last => controller.reset()?,
+            Err(ControllerError::SetPointsLost { .. }) if !last => {}
             Err(error) => return Err(error.into()),
             Ok(_) => {}
         }
