@@ -48,7 +48,7 @@ impl CauseModel for Backlash {
         let play_m = shape.first().copied().unwrap_or(0.0);
         // For Y turn the circle by −90°: its reversals lie where those of X would.
         let (at, quarter) = if axis == Some(Axis::Y) { (1, std::f64::consts::FRAC_PI_2) } else { (0, 0.0) };
-        for ((out, psi), direction) in out.iter_mut().zip(&view.psi_rad).zip(&view.direction) {
+        for ((out, psi), direction) in out.iter_mut().zip(view.psi_rad.iter()).zip(view.direction.iter()) {
             let (_, side) = view.since_reversal(*psi, quarter);
             // cos u, u the angle since the reversal in the direction of travel, 0…π.
             let cos = side * direction[at];

@@ -69,7 +69,7 @@ impl CauseModel for CyclicError {
         let Some(pitch_m) = shape.first() else { return };
         let wave = std::f64::consts::TAU * view.radius_m / pitch_m;
         let at = usize::from(axis == Some(Axis::Y));
-        for (out, direction) in out.iter_mut().zip(&view.direction) {
+        for (out, direction) in out.iter_mut().zip(view.direction.iter()) {
             let along = direction[at];
             *out = 1e-6 * along * if column == 0 { (wave * along).sin() } else { (wave * along).cos() };
         }

@@ -68,7 +68,7 @@ impl CauseModel for ReversalSpike {
         let half_turn_s = view.half_turn_s();
         let at = usize::from(axis == Some(Axis::Y));
         let quarter = if at == 1 { std::f64::consts::FRAC_PI_2 } else { 0.0 };
-        for ((out, psi), direction) in out.iter_mut().zip(&view.psi_rad).zip(&view.direction) {
+        for ((out, psi), direction) in out.iter_mut().zip(view.psi_rad.iter()).zip(view.direction.iter()) {
             let (share, side) = view.since_reversal(*psi, quarter);
             // Against the new direction of travel, seen along the radius.
             let facing = side * direction[at];

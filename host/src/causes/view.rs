@@ -1,8 +1,9 @@
 //! What a signature may know of a run: where the machine was at each sample, not what was measured.
 use super::Effect;
 use giotto_shared::Axis;
+use std::sync::Arc;
 
-/// The motion of one run, sample by sample.
+/// The motion of one run, sample by sample. Samples are shared: a copy costs nothing.
 #[derive(Clone, Debug)]
 pub struct RunView {
     /// Programmed radius R, m.
@@ -20,11 +21,11 @@ pub struct RunView {
     /// Largest radius of the campaign, m.
     pub largest_radius_m: f64,
     /// Polar angle of the machine ψ = θ − d·φ(ω) at each sample, rad: the lag of the servo removed.
-    pub psi_rad: Vec<f64>,
+    pub psi_rad: Arc<[f64]>,
     /// cosψ and sinψ at each sample.
-    pub direction: Vec<[f64; 2]>,
+    pub direction: Arc<[[f64; 2]]>,
     /// Time since the first sample, s.
-    pub time_s: Vec<f64>,
+    pub time_s: Arc<[f64]>,
     /// Gain |G(jω)| of the baseline.
     pub gain: f64,
     /// Phase lag φ(ω) of the servo, rad, ≥ 0.
@@ -33,8 +34,14 @@ pub struct RunView {
 
 impl RunView {
     /// Sets the machine angle and what follows from it.
-    pub fn place(&mut self, psi_rad: Vec<f64>) {
-        self.direction = psi_rad.iter().map(|psi| [psi.cos(), psi.sin()]).collect();
+    pub fn place(&mut self, psi_rad: Arc<[f64]>) {
+        self.direction = psi_rad
+            .iter()
+            .map(|psi| {
+                let (sin, cos) = psi.sin_cos();
+                [cos, sin]
+            })
+            .collect();
         self.psi_rad = psi_rad;
     }
 

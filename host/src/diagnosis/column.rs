@@ -1,0 +1,112 @@
+//! What an explanation does to every run, or the data: the low orders of each run by their coordinates, and the samples of
+//! what lies outside them. Most explanations are a few waves a turn and have no such samples at all.
+use super::basis::{COLUMNS, Low};
+use super::survey::Prepared;
+use super::vector::{axpy, dot};
+use rayon::prelude::*;
+
+/// A column lies within the low orders below this share of its energy outside.
+const WITHIN: f64 = 1e-20;
+
+/// One vector over the samples of all runs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Column {
+    low: Vec<Low>,
+    /// All runs, one behind the other; empty: nothing.
+    outside: Vec<f64>,
+}
+
+impl Column {
+    /// Nothing, in so many runs.
+    pub fn zero(runs: usize) -> Self {
+        Self::within(vec![[0.0; COLUMNS]; runs])
+    }
+
+    /// Within the low orders.
+    pub const fn within(low: Vec<Low>) -> Self {
+        Self { low, outside: Vec::new() }
+    }
+
+    /// From the samples of each run, which `fill` writes; what a run hides does not count.
+    pub fn split(runs: &[Prepared], fill: impl Fn(&Prepared, &mut [f64]) + Sync) -> Self {
+        let mut outside = vec![0.0; runs.last().map_or(0, |run| run.place.end)];
+        let parts: Vec<(Low, [f64; 2])> = each(runs, &mut outside)
+            .into_par_iter()
+            .map(|(run, samples)| {
+                fill(run, samples);
+                run.mask(samples);
+                let whole = dot(samples, samples);
+                let low = run.basis.take_out(samples);
+                (low, [dot(samples, samples), whole])
+            })
+            .collect();
+        let energy = parts.iter().fold([0.0; 2], |sum, part| [sum[0] + part.1[0], sum[1] + part.1[1]]);
+        if energy[0] <= WITHIN * energy[1] {
+            outside = Vec::new();
+        }
+        Self { low: parts.into_iter().map(|part| part.0).collect(), outside }
+    }
+
+    /// Coordinates in the low orders, run by run.
+    pub fn low(&self) -> &[Low] {
+        &self.low
+    }
+
+    /// The same, to be changed.
+    pub fn low_mut(&mut self) -> &mut [Low] {
+        &mut self.low
+    }
+
+    /// Samples of one run outside the low orders; empty: nothing.
+    pub fn outside(&self, run: &Prepared) -> &[f64] {
+        self.outside.get(run.place.clone()).unwrap_or(&[])
+    }
+
+    /// Whether it lies within the low orders.
+    pub const fn is_low(&self) -> bool {
+        self.outside.is_empty()
+    }
+
+    /// Adds another column, so many times.
+    pub fn add(&mut self, amount: f64, other: &Self) {
+        for (low, other) in self.low.iter_mut().zip(&other.low) {
+            axpy(amount, other, low);
+        }
+        if self.outside.is_empty() && !other.outside.is_empty() {
+            self.outside = vec![0.0; other.outside.len()];
+        }
+        axpy(amount, &other.outside, &mut self.outside);
+    }
+
+    /// Its samples in one run.
+    pub fn samples(&self, run: &Prepared, index: usize) -> Vec<f64> {
+        let mut out = vec![0.0; run.deviation_m.len()];
+        axpy(1.0, self.outside(run), &mut out);
+        run.basis.add(&self.low[index], &mut out);
+        out
+    }
+
+    /// Its samples in every run.
+    pub fn all_samples(&self, runs: &[Prepared]) -> Vec<Vec<f64>> {
+        runs.par_iter().enumerate().map(|(index, run)| self.samples(run, index)).collect()
+    }
+
+    /// Product of what two columns have outside the low orders of one run.
+    pub fn product_outside(&self, other: &Self, place: &std::ops::Range<usize>) -> f64 {
+        match (self.outside.get(place.clone()), other.outside.get(place.clone())) {
+            (Some(a), Some(b)) => dot(a, b),
+            _ => 0.0,
+        }
+    }
+}
+
+/// Each run with its own part of a vector over all samples.
+fn each<'a>(runs: &'a [Prepared], mut samples: &'a mut [f64]) -> Vec<(&'a Prepared, &'a mut [f64])> {
+    runs.iter()
+        .map(|run| {
+            let (own, rest) = std::mem::take(&mut samples).split_at_mut(run.place.len());
+            samples = rest;
+            (run, own)
+        })
+        .collect()
+}
