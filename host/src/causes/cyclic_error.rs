@@ -5,6 +5,7 @@ use crate::simulation::machine::Cyclic;
 use crate::simulation::machine::Machine;
 use giotto_shared::Axis;
 use giotto_shared::term::Term;
+use wide::f64x4;
 
 /// See the module.
 pub struct CyclicError;
@@ -69,7 +70,14 @@ impl CauseModel for CyclicError {
         let Some(pitch_m) = shape.first() else { return };
         let wave = std::f64::consts::TAU * view.radius_m / pitch_m;
         let at = usize::from(axis == Some(Axis::Y));
-        for (out, direction) in out.iter_mut().zip(view.direction.iter()) {
+        let (parts, rest) = view.direction.as_chunks::<4>();
+        let (outs, out_rest) = out.as_chunks_mut::<4>();
+        for (out, part) in outs.iter_mut().zip(parts) {
+            let along = f64x4::from(part.map(|direction| direction[at]));
+            let (sin, cos) = (along * wave).sin_cos();
+            *out = (along * 1e-6 * if column == 0 { sin } else { cos }).to_array();
+        }
+        for (out, direction) in out_rest.iter_mut().zip(rest) {
             let along = direction[at];
             *out = 1e-6 * along * if column == 0 { (wave * along).sin() } else { (wave * along).cos() };
         }

@@ -11,6 +11,9 @@ pub use crate::causes::ORDERS;
 /// Columns: the mean, then cosine and sine of each order.
 pub const COLUMNS: usize = 1 + 2 * ORDERS;
 
+/// Of a column that keeps so much of its length the rest is orthogonal at once.
+const NEARLY_ALL: f64 = 0.9;
+
 /// Coordinates in the low orders of one run.
 pub type Low = [f64; COLUMNS];
 
@@ -29,7 +32,7 @@ pub struct Basis {
     reason = "columns, rows and orders are numbers here, not places in a list"
 )]
 impl Basis {
-    /// Gram–Schmidt (twice) on 1, cosθ, sinθ, …; a column that the earlier ones already span is left out as zero.
+    /// Gram–Schmidt (twice where it takes much) on 1, cosθ, sinθ, …; a column that the earlier ones already span is left out as zero.
     pub fn new(angle_rad: &[f64]) -> Self {
         Self::masked(angle_rad, &[])
     }
@@ -43,15 +46,21 @@ impl Basis {
             let (earlier, later) = columns.split_at_mut(k * samples);
             let column = &mut later[..samples];
             let length = dot(column, column).sqrt();
+            let mut left = length;
             for _ in 0..2 {
+                let before = left;
                 let mut along = [0.0; COLUMNS];
                 dots(rows(earlier, samples), column, &mut along[..k]);
                 axpys(along.iter().map(|a| -a).zip(rows(earlier, samples)), column);
                 for j in 0..k {
                     triangle[j][k] += along[j];
                 }
+                left = dot(column, column).sqrt();
+                // What has lost little has lost no digits.
+                if left > NEARLY_ALL * before {
+                    break;
+                }
             }
-            let left = dot(column, column).sqrt();
             if left > 1e-9 * length {
                 column.iter_mut().for_each(|c| *c /= left);
                 triangle[k][k] = left;

@@ -27,6 +27,8 @@ impl Law {
     }
 }
 
+/// Widths of a bump beyond which it is nothing.
+const FAR: f64 = 9.0;
 /// Of a pattern whose coefficient is 1, m.
 const SCALE: f64 = 1e-6;
 
@@ -135,9 +137,10 @@ impl Pattern {
         let Self::Bump { centre_rad, width_rad, .. } = *self else { return };
         let size = self.amplitude_m(run);
         for (out, psi) in out.iter_mut().zip(run.view.psi_rad.iter()) {
-            let turn = std::f64::consts::TAU;
-            let off = (psi - centre_rad + 0.5 * turn).rem_euclid(turn) - 0.5 * turn;
-            *out = size * (-0.5 * (off / width_rad).powi(2)).exp();
+            let turns = (psi - centre_rad) * (1.0 / std::f64::consts::TAU);
+            let off = std::f64::consts::TAU * (turns - turns.round()) / width_rad;
+            // Far out there is nothing left of it to the last bit.
+            *out = if off.abs() < FAR { size * (-0.5 * off * off).exp() } else { 0.0 };
         }
     }
 

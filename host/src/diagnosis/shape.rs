@@ -1,13 +1,13 @@
 //! Fitting what bends a signature: pitch, time constants, play.
 //!
-//! A coarse scan on a stratified part of the runs, then a simplex on all of them; each trial costs one column,
-//! not one refit of everything.
+//! A coarse scan on a stratified part of the runs, then along tangents to the nearest best, or by a simplex where there is no
+//! slope; each trial costs one column, not one refit of everything.
 use super::basis::{COLUMNS, Low};
 use super::column::Column;
 use super::explained::{Explained, residual};
 use super::item::Kind;
 use super::ledger::kept;
-use super::linear::Factor;
+use super::linear::{Factor, solve};
 use super::pitch;
 use super::products::Products;
 use super::search::columns_of;
@@ -22,6 +22,12 @@ use std::sync::Arc;
 const SCAN_RUNS: usize = 16;
 /// χ² within which a simplex has arrived.
 const CLOSE: f64 = 0.5;
+/// Most moves along tangents, the longest of them in steps, and the χ² for which one is worth while.
+const CLIMBS: usize = 6;
+const LONGEST: f64 = 8.0;
+const WORTH: f64 = 0.3;
+/// Standard deviation of a shape about where it is, in steps: what the runs cannot tell stays near.
+const PRIOR: f64 = 20.0;
 /// A scan is worth refining above this share of its price.
 const PROMISING: f64 = 0.6;
 
@@ -165,40 +171,116 @@ impl<'a> Fit<'a> {
             (0..start.len()).any(|which| matches!(model.bend(which, start[which], 1.0), Bend::Choice(_)));
         let mut polished = if choice {
             best_of(model.shapes(&self.views), &self.all).map_or(start, |(_, shape)| shape)
+        } else if (0..start.len())
+            .all(|which| matches!(model.bend(which, start[which], 1.0), Bend::Amount(_)))
+        {
+            self.climb(task, start)
         } else {
-            let first_step = if task.cause == Cause::CyclicError {
-                // A pitch lives on a narrow peak: neighbours fall out of step over the diameter.
-                0.1 * start[0] / (2.0 * self.views.iter().map(|view| view.radius_m).fold(1e-3, f64::max))
-            } else {
-                0.15
-            };
-            let near = simplex(&start, first_step, 40, |shape| score(shape, &self.sample));
-            if task.chosen {
-                simplex(&near, 0.2 * first_step, 20, |shape| score(shape, &self.all))
-            } else {
-                near
-            }
+            let near = simplex(&start, 0.15, 40, |shape| score(shape, &self.sample));
+            if task.chosen { simplex(&near, 0.03, 20, |shape| score(shape, &self.all)) } else { near }
         };
         model.tidy(&mut polished);
         polished
     }
 
+    /// Climbs from a shape to the nearest best one along its tangents, over the runs of the scan.
+    fn climb(&self, task: &Task, start: Vec<f64>) -> Vec<f64> {
+        let model = task.cause.model();
+        let travel_m = 2.0 * self.views.iter().map(|view| view.radius_m).fold(1e-3, f64::max);
+        let mut shape = start;
+        for _ in 0..CLIMBS {
+            let steps: Vec<f64> = (0..shape.len())
+                .map(|which| match model.bend(which, shape[which], travel_m) {
+                    Bend::Amount(step) => step,
+                    Bend::Choice(_) | Bend::Stiff => 0.0,
+                })
+                .collect();
+            let Some(climb) = self.slope(task, &shape, &steps) else { break };
+            if climb.promised < WORTH {
+                break;
+            }
+            let higher = [1.0, 0.4, 0.1].into_iter().find_map(|share| {
+                let mut moved = shape.clone();
+                for ((value, step), way) in moved.iter_mut().zip(&steps).zip(&climb.ways) {
+                    *value += share * way.clamp(-LONGEST, LONGEST) * step;
+                }
+                model.tidy(&mut moved);
+                (self.gain(&task.kind(&moved), &task.with, &self.sample) > climb.gain + 0.1 * WORTH)
+                    .then_some(moved)
+            });
+            match higher {
+                Some(moved) => shape = moved,
+                None => break,
+            }
+        }
+        shape
+    }
+
+    /// The gain of a shape and where its tangents lead; `None`: it is nothing beside the columns fitted along.
+    fn slope(&self, task: &Task, shape: &[f64], steps: &[f64]) -> Option<Climb> {
+        let here = task.kind(shape);
+        let moved = steps.iter().enumerate().map(|(which, step)| {
+            let mut moved = shape.to_vec();
+            moved[which] += step;
+            task.kind(&moved)
+        });
+        let kinds: Vec<Kind> = std::iter::once(here).chain(moved).collect();
+        let (products, known) = self.products(&kinds, &task.with, &self.sample);
+        let wide = (products.size() - known) / kinds.len();
+        let plain: Vec<usize> = (1..known + wide).collect();
+        let alone = solve(&products, &plain[..known - 1])?;
+        let fitted = solve(&products, &plain)?;
+        let amounts = &fitted.coefficients[known - 1..];
+        // A tangent is what its moved columns do beyond those here, at the amounts fitted here.
+        let size = known + wide + steps.len();
+        let parts = |column: usize| -> Vec<(usize, f64)> {
+            match column.checked_sub(known + wide) {
+                None => vec![(column, 1.0)],
+                Some(which) => (0..wide)
+                    .flat_map(|k| [(known + (which + 1) * wide + k, amounts[k]), (known + k, -amounts[k])])
+                    .collect(),
+            }
+        };
+        let parts: Vec<Vec<(usize, f64)>> = (0..size).map(parts).collect();
+        let mut along = Products::from_fn(size, |i, j| {
+            let pairs = parts[i].iter().flat_map(|a| parts[j].iter().map(move |b| (a, b)));
+            pairs.map(|((a, x), (b, y))| x * y * products.at(*a, *b)).sum()
+        });
+        for tangent in known + wide..size {
+            *along.at_mut(tangent, tangent) += PRIOR.powi(-2);
+        }
+        let all: Vec<usize> = (1..size).collect();
+        let climbed = solve(&along, &all)?;
+        Some(Climb {
+            gain: fitted.gain - alone.gain,
+            promised: climbed.gain - fitted.gain,
+            ways: climbed.coefficients[known + wide - 1..].to_vec(),
+        })
+    }
+
     /// What the explanation takes off χ² beside the columns `with`, over some runs.
     fn gain(&self, kind: &Kind, with: &[usize], over: &[usize]) -> f64 {
-        let base: Vec<usize> = std::iter::once(0).chain(with.iter().copied()).collect();
-        let (known, wide) = (base.len(), kind.columns());
-        let mut products = Products::zeros(known + wide);
-        for &run in over {
-            self.add_run(kind, &base, run, &mut products);
-        }
+        let (products, known) = self.products(std::slice::from_ref(kind), with, over);
         let (without, further): (Vec<usize>, Vec<usize>) =
-            ((1..known).collect(), (known..known + wide).collect());
+            ((1..known).collect(), (known..products.size()).collect());
         let gain = |mut factor: Factor<'_>| Some(factor.gain_with(&further)? - factor.gain());
         Factor::new(&products, &without).and_then(gain).unwrap_or(0.0)
     }
 
-    /// Adds the white products of one run: of the columns `base`, and of the explanation's own behind them.
-    fn add_run(&self, kind: &Kind, base: &[usize], run: usize, products: &mut Products) {
+    /// White products over some runs: of the data and the columns `with`, as many as the second number says, and of the
+    /// columns of the trials behind them.
+    fn products(&self, trials: &[Kind], with: &[usize], over: &[usize]) -> (Products, usize) {
+        let base: Vec<usize> = std::iter::once(0).chain(with.iter().copied()).collect();
+        let columns: Vec<(&Kind, usize)> =
+            trials.iter().flat_map(|kind| (0..kind.columns()).map(move |index| (kind, index))).collect();
+        let mut products = Products::zeros(base.len() + columns.len());
+        for &run in over {
+            self.add_run(&columns, &base, run, &mut products);
+        }
+        (products, base.len())
+    }
+
+    fn add_run(&self, columns: &[(&Kind, usize)], base: &[usize], run: usize, products: &mut Products) {
         let (ledger, prepared) = (&self.found.ledger, &self.runs[run]);
         let (white, discount) = (ledger.white_of(run), ledger.discounts(run));
         for (i, &a) in base.iter().enumerate() {
@@ -206,10 +288,10 @@ impl<'a> Fit<'a> {
                 *products.at_mut(i, j) += white.at(a, b);
             }
         }
-        let mut own: Vec<Part> = Vec::with_capacity(kind.columns());
-        for index in 0..kind.columns() {
+        let mut own: Vec<Part> = Vec::with_capacity(columns.len());
+        for (index, (kind, column)) in columns.iter().enumerate() {
             let at = base.len() + index;
-            let part = Part::new(kind, index, prepared);
+            let part = Part::new(kind, *column, prepared);
             for (i, &other) in base.iter().enumerate() {
                 let other = ledger.column(other);
                 // The samples still hold their low orders: what they are multiplied with here has none.
@@ -224,6 +306,15 @@ impl<'a> Fit<'a> {
             }
         }
     }
+}
+
+/// Where tangents lead.
+struct Climb {
+    gain: f64,
+    /// What the move would add to it.
+    promised: f64,
+    /// The move, in steps.
+    ways: Vec<f64>,
 }
 
 /// A trial in one run: coordinates in the low orders, and all its samples if it has more than these.
