@@ -26,7 +26,7 @@ mod view;
 mod words;
 
 pub use harmonics::{Harmonics, ORDERS};
-pub use view::RunView;
+pub use view::{RunView, Stroke};
 pub use words::Words;
 
 use crate::simulation::machine::Machine;
@@ -204,6 +204,13 @@ pub trait CauseModel: Sync {
         let waves = self.harmonics(axis, shape, view).unwrap_or_default();
         for (out, psi) in out.iter_mut().zip(view.psi_rad.iter()) {
             *out = waves.at(*psi);
+        }
+    }
+
+    /// All its columns in one go.
+    fn signatures(&self, axis: Option<Axis>, shape: &[f64], view: &RunView, out: &mut [Vec<f64>]) {
+        for (column, out) in out.iter_mut().enumerate() {
+            self.signature(axis, shape, column, view, out);
         }
     }
 

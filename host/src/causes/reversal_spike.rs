@@ -66,13 +66,9 @@ impl CauseModel for ReversalSpike {
         let &[decay_s, rise_s, presliding_m] = shape else { return };
         let pulse = Pulse::new(decay_s, rise_s, presliding_m, view);
         let steps_a_half_turn = view.half_turn_s() / pulse.step_s;
-        let at = usize::from(axis == Some(Axis::Y));
-        let quarter = if at == 1 { std::f64::consts::FRAC_PI_2 } else { 0.0 };
-        for ((out, psi), direction) in out.iter_mut().zip(view.psi_rad.iter()).zip(view.direction.iter()) {
-            let (share, side) = view.since_reversal(*psi, quarter);
+        for (out, stroke) in out.iter_mut().zip(view.strokes_of(axis)) {
             // Against the new direction of travel, seen along the radius.
-            let facing = side * direction[at];
-            *out = 1e-6 * facing * pulse.after(share * steps_a_half_turn);
+            *out = 1e-6 * stroke.facing * pulse.after(stroke.share * steps_a_half_turn);
         }
     }
 

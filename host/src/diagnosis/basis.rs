@@ -50,7 +50,7 @@ impl Basis {
             for _ in 0..2 {
                 let before = left;
                 let mut along = [0.0; COLUMNS];
-                dots(rows(earlier, samples), column, &mut along[..k]);
+                dots(earlier, column, &mut along[..k]);
                 axpys(along.iter().map(|a| -a).zip(rows(earlier, samples)), column);
                 for j in 0..k {
                     triangle[j][k] += along[j];
@@ -74,14 +74,14 @@ impl Basis {
     /// Coordinates of a vector of samples in the basis.
     pub fn coordinates(&self, samples: &[f64]) -> Low {
         let mut out = [0.0; COLUMNS];
-        dots(rows(&self.columns, self.samples), samples, &mut out);
+        dots(&self.columns, samples, &mut out);
         out
     }
 
     /// Coordinates along the two columns of the first order: the centre.
     pub fn centre(&self, samples: &[f64]) -> [f64; 2] {
         let mut out = [0.0; 2];
-        dots(rows(&self.columns, self.samples).skip(1), samples, &mut out);
+        dots(&self.columns[self.samples..], samples, &mut out);
         out
     }
 

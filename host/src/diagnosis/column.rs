@@ -12,6 +12,8 @@ const WITHIN: f64 = 1e-20;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
     low: Vec<Low>,
+    /// Coordinates beyond so many are 0 in every run.
+    reach: usize,
     /// All runs, one behind the other; empty: nothing.
     outside: Vec<f64>,
 }
@@ -23,8 +25,9 @@ impl Column {
     }
 
     /// Within the low orders.
-    pub const fn within(low: Vec<Low>) -> Self {
-        Self { low, outside: Vec::new() }
+    pub fn within(low: Vec<Low>) -> Self {
+        let reach = |low: &Low| low.iter().rposition(|x| *x != 0.0).map_or(0, |last| last + 1);
+        Self { reach: low.iter().map(reach).max().unwrap_or(0), low, outside: Vec::new() }
     }
 
     /// From the samples of each run, which `fill` writes; what a run hides does not count.
@@ -44,7 +47,7 @@ impl Column {
         if energy[0] <= WITHIN * energy[1] {
             outside = Vec::new();
         }
-        Self { low: parts.into_iter().map(|part| part.0).collect(), outside }
+        Self { low: parts.into_iter().map(|part| part.0).collect(), reach: COLUMNS, outside }
     }
 
     /// Coordinates in the low orders, run by run.
@@ -52,9 +55,13 @@ impl Column {
         &self.low
     }
 
-    /// The same, to be changed.
-    pub fn low_mut(&mut self) -> &mut [Low] {
-        &mut self.low
+    /// Multiplies the coordinates by factors of each run.
+    pub fn scale_low(&mut self, factors: impl Iterator<Item = Low>) {
+        for (low, factors) in self.low.iter_mut().zip(factors) {
+            for (low, factor) in low.iter_mut().zip(factors) {
+                *low *= factor;
+            }
+        }
     }
 
     /// Samples of one run outside the low orders; empty: nothing.
@@ -62,13 +69,14 @@ impl Column {
         self.outside.get(run.place.clone()).unwrap_or(&[])
     }
 
-    /// Whether it lies within the low orders.
-    pub const fn is_low(&self) -> bool {
-        self.outside.is_empty()
+    /// Coordinates beyond so many are 0 in every run.
+    pub const fn reach(&self) -> usize {
+        self.reach
     }
 
     /// Adds another column, so many times.
     pub fn add(&mut self, amount: f64, other: &Self) {
+        self.reach = self.reach.max(other.reach);
         for (low, other) in self.low.iter_mut().zip(&other.low) {
             axpy(amount, other, low);
         }

@@ -79,13 +79,26 @@ impl Kind {
     }
 
     /// One column at each sample of one run.
-    pub fn samples(&self, index: usize, run: &Prepared, out: &mut [f64]) {
+    fn samples(&self, index: usize, run: &Prepared, out: &mut [f64]) {
         match self {
             Self::Cause { cause, axis, shape } => {
                 cause.model().signature(*axis, shape, index, &run.view, out);
             }
             Self::Pattern(pattern) => pattern.samples(run, out),
         }
+    }
+
+    /// All columns at each sample of one run; 0 where it hides them.
+    pub fn all_samples(&self, run: &Prepared) -> Vec<Vec<f64>> {
+        let mut out = vec![vec![0.0; run.deviation_m.len()]; self.columns()];
+        match self {
+            Self::Cause { cause, axis, shape } => {
+                cause.model().signatures(*axis, shape, &run.view, &mut out);
+            }
+            Self::Pattern(pattern) => out.iter_mut().for_each(|out| pattern.samples(run, out)),
+        }
+        out.iter_mut().for_each(|out| run.mask(out));
+        out
     }
 
     /// What it has to take off χ², chosen from `shapes` starting shapes.

@@ -92,9 +92,15 @@ impl Ledger {
             for other in &self.columns {
                 let (a, b) = (&own.low()[run], &other.low()[run]);
                 let outside = own.product_outside(other, &self.places[run]);
+                let reach = own.reach().min(other.reach());
+                let [mut white, mut whole] = [0.0; 2];
+                for ((a, b), discount) in a.iter().zip(b).zip(discount).take(reach) {
+                    white += (1.0 - discount) * a * b;
+                    whole += a * b;
+                }
                 // The centre, order 1, is the operator's, not the machine's.
-                let plain = a[0] * b[0] + (3..COLUMNS).map(|k| a[k] * b[k]).sum::<f64>();
-                rows[0].push((kept(a, b, discount) + outside) / self.noise_m2);
+                let plain = whole - a[1] * b[1] - a[2] * b[2];
+                rows[0].push((white + outside) / self.noise_m2);
                 rows[1].push(plain + outside);
             }
             rows

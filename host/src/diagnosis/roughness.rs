@@ -71,14 +71,14 @@ fn find_on(
     spread: &Spread,
     known: Option<&Teeth>,
 ) -> Option<Teeth> {
-    let quarter = if axis == Axis::Y { std::f64::consts::FRAC_PI_2 } else { 0.0 };
     let (sums, counts) = runs
         .par_iter()
         .zip(residual)
         .map(|(run, left)| {
             let (mut sums, mut counts) = ([0.0; BINS], [0.0; BINS]);
+            let strokes = run.view.strokes_of(Some(axis));
             for i in 1..left.len().saturating_sub(1) {
-                let share = run.view.since_reversal(run.view.psi_rad[i], quarter).0;
+                let share = strokes[i].share;
                 let facing = run.view.direction[i][axis.index()].abs();
                 // A step at the reversal itself shows beside it, if the lag is off.
                 let beside = share.min(1.0 - share) * std::f64::consts::PI < BESIDE_RAD;

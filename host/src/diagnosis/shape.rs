@@ -271,16 +271,15 @@ impl<'a> Fit<'a> {
     /// columns of the trials behind them.
     fn products(&self, trials: &[Kind], with: &[usize], over: &[usize]) -> (Products, usize) {
         let base: Vec<usize> = std::iter::once(0).chain(with.iter().copied()).collect();
-        let columns: Vec<(&Kind, usize)> =
-            trials.iter().flat_map(|kind| (0..kind.columns()).map(move |index| (kind, index))).collect();
-        let mut products = Products::zeros(base.len() + columns.len());
+        let wide: usize = trials.iter().map(Kind::columns).sum();
+        let mut products = Products::zeros(base.len() + wide);
         for &run in over {
-            self.add_run(&columns, &base, run, &mut products);
+            self.add_run(trials, &base, run, &mut products);
         }
         (products, base.len())
     }
 
-    fn add_run(&self, columns: &[(&Kind, usize)], base: &[usize], run: usize, products: &mut Products) {
+    fn add_run(&self, trials: &[Kind], base: &[usize], run: usize, products: &mut Products) {
         let (ledger, prepared) = (&self.found.ledger, &self.runs[run]);
         let (white, discount) = (ledger.white_of(run), ledger.discounts(run));
         for (i, &a) in base.iter().enumerate() {
@@ -288,10 +287,9 @@ impl<'a> Fit<'a> {
                 *products.at_mut(i, j) += white.at(a, b);
             }
         }
-        let mut own: Vec<Part> = Vec::with_capacity(columns.len());
-        for (index, (kind, column)) in columns.iter().enumerate() {
+        let parts: Vec<Part> = trials.iter().flat_map(|kind| Part::all(kind, prepared)).collect();
+        for (index, part) in parts.iter().enumerate() {
             let at = base.len() + index;
-            let part = Part::new(kind, *column, prepared);
             for (i, &other) in base.iter().enumerate() {
                 let other = ledger.column(other);
                 // The samples still hold their low orders: what they are multiplied with here has none.
@@ -299,10 +297,8 @@ impl<'a> Fit<'a> {
                 let white = kept(&part.low, &other.low()[run], discount) + outside;
                 *products.at_mut(at, i) += white / ledger.noise_m2();
             }
-            own.push(part);
-            for (earlier, other) in own.iter().enumerate() {
-                let white = own[index].white(other, discount);
-                *products.at_mut(at, base.len() + earlier) += white / ledger.noise_m2();
+            for (earlier, other) in parts[..=index].iter().enumerate() {
+                *products.at_mut(at, base.len() + earlier) += part.white(other, discount) / ledger.noise_m2();
             }
         }
     }
@@ -324,14 +320,15 @@ struct Part {
 }
 
 impl Part {
-    fn new(kind: &Kind, index: usize, run: &Prepared) -> Self {
-        if let Some(low) = kind.low(index, run) {
-            return Self { low, samples: Vec::new() };
+    fn all(kind: &Kind, run: &Prepared) -> Vec<Self> {
+        let low: Option<Vec<Low>> = (0..kind.columns()).map(|index| kind.low(index, run)).collect();
+        match low {
+            Some(low) => low.into_iter().map(|low| Self { low, samples: Vec::new() }).collect(),
+            None => {
+                let all = kind.all_samples(run).into_iter();
+                all.map(|samples| Self { low: run.basis.coordinates(&samples), samples }).collect()
+            }
         }
-        let mut samples = vec![0.0; run.deviation_m.len()];
-        kind.samples(index, run, &mut samples);
-        run.mask(&mut samples);
-        Self { low: run.basis.coordinates(&samples), samples }
     }
 
     fn white(&self, other: &Self, discount: &Low) -> f64 {
@@ -349,12 +346,8 @@ fn whitened_residual(found: &Explained) -> Column {
     let left = residual(found);
     let mut whitened = Column::zero(found.runs.len());
     whitened.add(1.0 / noise_m2, &left);
-    for (run, low) in whitened.low_mut().iter_mut().enumerate() {
-        let discount = found.ledger.discounts(run);
-        for (low, discount) in low.iter_mut().zip(discount) {
-            *low *= 1.0 - discount;
-        }
-    }
+    let kept = |run: usize| found.ledger.discounts(run).map(|discount| 1.0 - discount);
+    whitened.scale_low((0..found.runs.len()).map(kept));
     whitened
 }
 

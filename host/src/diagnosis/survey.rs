@@ -222,6 +222,7 @@ impl Survey {
                         largest_radius_m: largest,
                         psi_rad: theta.as_slice().into(),
                         direction: Arc::default(),
+                        strokes: Default::default(),
                         time_s,
                         gain: 1.0,
                         lag_rad: 0.0,

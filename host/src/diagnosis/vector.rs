@@ -12,10 +12,17 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     Arch::new().dispatch(|| dot_here(a, b))
 }
 
-/// Scalar products of each row with the same vector.
-pub fn dots<'a>(rows: impl Iterator<Item = &'a [f64]>, b: &[f64], out: &mut [f64]) {
+/// Scalar products of the first rows of a matrix, one row behind the other, with the same vector: as many as `out` has
+/// places.
+pub fn dots(rows: &[f64], b: &[f64], out: &mut [f64]) {
     Arch::new().dispatch(|| {
-        for (row, out) in rows.zip(out) {
+        let fours = rows[..out.len() * b.len()].chunks_exact((FOUR * b.len()).max(1));
+        let rest = fours.remainder();
+        let (four_out, rest_out) = out.split_at_mut(out.len().min(FOUR * fours.len()));
+        for (rows, out) in fours.zip(four_out.chunks_exact_mut(FOUR)) {
+            out.copy_from_slice(&four_here(rows, b));
+        }
+        for (row, out) in rest.chunks_exact(b.len().max(1)).zip(rest_out) {
             *out = dot_here(row, b);
         }
     });
@@ -34,6 +41,32 @@ pub fn axpys<'a>(terms: impl Iterator<Item = (f64, &'a [f64])>, y: &mut [f64]) {
         }
     });
 }
+
+/// Rows that share what is read of the other vector.
+const FOUR: usize = 4;
+
+/// Four scalar products, of [`HALF`] sums each.
+#[inline(always)]
+fn four_here(rows: &[f64], b: &[f64]) -> [f64; FOUR] {
+    let n = b.len();
+    let row = |k: usize| rows[k * n..(k + 1) * n].as_chunks::<HALF>();
+    let ((r0, e0), (r1, e1), (r2, e2), (r3, e3)) = (row(0), row(1), row(2), row(3));
+    let (parts, rest) = b.as_chunks::<HALF>();
+    let mut sums = [[0.0; HALF]; FOUR];
+    for ((((b, r0), r1), r2), r3) in parts.iter().zip(r0).zip(r1).zip(r2).zip(r3) {
+        for lane in 0..HALF {
+            sums[0][lane] += r0[lane] * b[lane];
+            sums[1][lane] += r1[lane] * b[lane];
+            sums[2][lane] += r2[lane] * b[lane];
+            sums[3][lane] += r3[lane] * b[lane];
+        }
+    }
+    let ends = [e0, e1, e2, e3].map(|end| end.iter().zip(rest).map(|(a, b)| a * b).sum::<f64>());
+    std::array::from_fn(|k| sums[k].iter().sum::<f64>() + ends[k])
+}
+
+/// Sums side by side where four rows are.
+const HALF: usize = 8;
 
 /// Waves summed side by side.
 const TURNS: usize = 8;
@@ -100,8 +133,13 @@ mod tests {
         let plain = lanes.iter().sum::<f64>() + rest;
         assert_eq!(dot(&a, &b).to_bits(), plain.to_bits());
         let mut several = [0.0; 2];
-        dots([&a[..], &b[..]].into_iter(), &b, &mut several);
+        dots(&[&a[..], &b, &a, &a, &a].concat(), &b, &mut several);
         assert_eq!(several[0].to_bits(), plain.to_bits());
+        let rows = [&a[..], &b, &a, &b, &b].concat();
+        let mut five = [0.0; 5];
+        dots(&rows, &b, &mut five);
+        assert!((five[0] - plain).abs() < 1e-12 && five[0].to_bits() == five[2].to_bits());
+        assert_eq!(five[4].to_bits(), dot(&b, &b).to_bits());
         let (mut one, mut all) = (a.clone(), a.clone());
         axpy(0.3, &b, &mut one);
         axpys([(0.3, &b[..])].into_iter(), &mut all);

@@ -52,6 +52,7 @@ pub fn views(circles: &[Circle], response: &Response, elapsed: &[f64]) -> Vec<Ru
                 largest_radius_m: largest,
                 psi_rad: Arc::default(),
                 direction: Arc::default(),
+                strokes: Default::default(),
                 time_s: (0..VIEW).map(|i| angle(i) / omega).collect(),
                 gain: response.gain(omega),
                 lag_rad: (response.a_s2.max(0.0).sqrt() * omega).atan(),
