@@ -51,7 +51,7 @@ impl Basis {
                 let before = left;
                 let mut along = [0.0; COLUMNS];
                 dots(earlier, column, &mut along[..k]);
-                axpys(along.iter().map(|a| -a).zip(rows(earlier, samples)), column);
+                axpys(&along.map(|a| -a)[..k], earlier, column);
                 for j in 0..k {
                     triangle[j][k] += along[j];
                 }
@@ -87,7 +87,7 @@ impl Basis {
 
     /// Adds a vector of these coordinates to `samples`.
     pub fn add(&self, coordinates: &Low, samples: &mut [f64]) {
-        axpys(coordinates.iter().copied().zip(rows(&self.columns, self.samples)), samples);
+        axpys(coordinates, &self.columns, samples);
     }
 
     /// Takes the low orders out of `samples`; their coordinates.
@@ -133,10 +133,6 @@ impl Basis {
         }
         out
     }
-}
-
-fn rows(columns: &[f64], samples: usize) -> impl Iterator<Item = &[f64]> {
-    columns.chunks_exact(samples.max(1))
 }
 
 /// 1, cosθ, sinθ, cos2θ, …, one behind the other; 0 where hidden. By the addition theorem: eight steps of it lose less than

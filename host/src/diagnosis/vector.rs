@@ -2,119 +2,155 @@
 //!
 //! Which additions are made, and in which order, is fixed: [`LANES`] sums side by side, then their sum, every product
 //! rounded before it is added. So the bits are the same on every processor.
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 
 /// Sums that run side by side: additions of one sum wait for each other.
 const LANES: usize = 16;
+/// Sums side by side where four rows are multiplied at once.
+const HALF: usize = 8;
+/// Rows that share what is read of the other vector.
+const FOUR: usize = 4;
 
 /// Scalar product.
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    Arch::new().dispatch(|| dot_here(a, b))
+    Arch::new().dispatch(Dot(a, b))
 }
 
 /// Scalar products of the first rows of a matrix, one row behind the other, with the same vector: as many as `out` has
 /// places.
 pub fn dots(rows: &[f64], b: &[f64], out: &mut [f64]) {
-    Arch::new().dispatch(|| {
-        let fours = rows[..out.len() * b.len()].chunks_exact((FOUR * b.len()).max(1));
-        let rest = fours.remainder();
-        let (four_out, rest_out) = out.split_at_mut(out.len().min(FOUR * fours.len()));
-        for (rows, out) in fours.zip(four_out.chunks_exact_mut(FOUR)) {
-            out.copy_from_slice(&four_here(rows, b));
-        }
-        for (row, out) in rest.chunks_exact(b.len().max(1)).zip(rest_out) {
-            *out = dot_here(row, b);
-        }
-    });
+    Arch::new().dispatch(Dots(&rows[..out.len() * b.len()], b, out));
 }
 
 /// y += a·x.
 pub fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
-    Arch::new().dispatch(|| axpy_here(a, x, y));
+    Arch::new().dispatch(Axpys(&[a], x, y));
 }
 
-/// y += Σ aₖ·xₖ.
-pub fn axpys<'a>(terms: impl Iterator<Item = (f64, &'a [f64])>, y: &mut [f64]) {
-    Arch::new().dispatch(|| {
-        for (a, x) in terms {
-            axpy_here(a, x, y);
-        }
-    });
+/// y += Σ aₖ·xₖ over the first rows of a matrix, one row behind the other.
+pub fn axpys(a: &[f64], rows: &[f64], y: &mut [f64]) {
+    Arch::new().dispatch(Axpys(a, rows, y));
 }
-
-/// Rows that share what is read of the other vector.
-const FOUR: usize = 4;
-
-/// Four scalar products, of [`HALF`] sums each.
-#[inline(always)]
-fn four_here(rows: &[f64], b: &[f64]) -> [f64; FOUR] {
-    let n = b.len();
-    let row = |k: usize| rows[k * n..(k + 1) * n].as_chunks::<HALF>();
-    let ((r0, e0), (r1, e1), (r2, e2), (r3, e3)) = (row(0), row(1), row(2), row(3));
-    let (parts, rest) = b.as_chunks::<HALF>();
-    let mut sums = [[0.0; HALF]; FOUR];
-    for ((((b, r0), r1), r2), r3) in parts.iter().zip(r0).zip(r1).zip(r2).zip(r3) {
-        for lane in 0..HALF {
-            sums[0][lane] += r0[lane] * b[lane];
-            sums[1][lane] += r1[lane] * b[lane];
-            sums[2][lane] += r2[lane] * b[lane];
-            sums[3][lane] += r3[lane] * b[lane];
-        }
-    }
-    let ends = [e0, e1, e2, e3].map(|end| end.iter().zip(rest).map(|(a, b)| a * b).sum::<f64>());
-    std::array::from_fn(|k| sums[k].iter().sum::<f64>() + ends[k])
-}
-
-/// Sums side by side where four rows are.
-const HALF: usize = 8;
-
-/// Waves summed side by side.
-const TURNS: usize = 8;
 
 /// Σ xᵢ·e^{i·wave_rad·i}: real and imaginary part.
 pub fn wave_sum(x: &[f64], wave_rad: f64) -> [f64; 2] {
-    Arch::new().dispatch(|| {
-        let at = |i: usize| (wave_rad * i as f64).sin_cos();
-        let mut turn: [[f64; TURNS]; 2] =
-            [std::array::from_fn(|k| at(k).1), std::array::from_fn(|k| at(k).0)];
-        let (step_sin, step_cos) = at(TURNS);
-        let mut sums = [[0.0; TURNS]; 2];
-        let (parts, rest) = x.as_chunks::<TURNS>();
+    let at = |i: usize| (wave_rad * i as f64).sin_cos();
+    let first = std::array::from_fn(at).map(|(sin, cos)| [cos, sin]);
+    let (sin, cos) = at(HALF);
+    Arch::new().dispatch(WaveSum { x, first, step: [cos, sin] })
+}
+
+// What is dispatched has to be inlined into the function that may use all of the processor, or it is made for the least.
+
+struct Dot<'a>(&'a [f64], &'a [f64]);
+
+impl WithSimd for Dot<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> f64 {
+        let (a_lanes, a_rest) = self.0.as_chunks::<LANES>();
+        let (b_lanes, b_rest) = self.1.as_chunks::<LANES>();
+        let mut sums = [0.0; LANES];
+        for (a, b) in a_lanes.iter().zip(b_lanes) {
+            for lane in 0..LANES {
+                sums[lane] += a[lane] * b[lane];
+            }
+        }
+        total(&sums) + rest(a_rest, b_rest)
+    }
+}
+
+struct Dots<'a>(&'a [f64], &'a [f64], &'a mut [f64]);
+
+impl WithSimd for Dots<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self(rows, b, out) = self;
+        let n = b.len();
+        let (b_lanes, b_rest) = b.as_chunks::<HALF>();
+        let mut at = 0;
+        while at + FOUR <= out.len() {
+            let row = |k: usize| rows[(at + k) * n..(at + k + 1) * n].as_chunks::<HALF>();
+            let [(r0, e0), (r1, e1), (r2, e2), (r3, e3)] = [row(0), row(1), row(2), row(3)];
+            let [mut s0, mut s1, mut s2, mut s3] = [[0.0; HALF]; FOUR];
+            for ((((b, r0), r1), r2), r3) in b_lanes.iter().zip(r0).zip(r1).zip(r2).zip(r3) {
+                for lane in 0..HALF {
+                    s0[lane] += r0[lane] * b[lane];
+                    s1[lane] += r1[lane] * b[lane];
+                    s2[lane] += r2[lane] * b[lane];
+                    s3[lane] += r3[lane] * b[lane];
+                }
+            }
+            out[at] = total(&s0) + rest(e0, b_rest);
+            out[at + 1] = total(&s1) + rest(e1, b_rest);
+            out[at + 2] = total(&s2) + rest(e2, b_rest);
+            out[at + 3] = total(&s3) + rest(e3, b_rest);
+            at += FOUR;
+        }
+        for (at, out) in out.iter_mut().enumerate().skip(at) {
+            *out = Dot(&rows[at * n..(at + 1) * n], b).with_simd(simd);
+        }
+    }
+}
+
+struct Axpys<'a>(&'a [f64], &'a [f64], &'a mut [f64]);
+
+impl WithSimd for Axpys<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self(amounts, rows, y) = self;
+        for (a, x) in amounts.iter().zip(rows.chunks_exact(y.len().max(1))) {
+            for (y, x) in y.iter_mut().zip(x) {
+                *y += a * x;
+            }
+        }
+    }
+}
+
+struct WaveSum<'a> {
+    x: &'a [f64],
+    /// e^{i·wave·k} of the first samples, and of as many as there are.
+    first: [[f64; 2]; HALF],
+    step: [f64; 2],
+}
+
+impl WithSimd for WaveSum<'_> {
+    type Output = [f64; 2];
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> [f64; 2] {
+        let (mut re, mut im) = (self.first.map(|turn| turn[0]), self.first.map(|turn| turn[1]));
+        let [step_re, step_im] = self.step;
+        let [mut sum_re, mut sum_im] = [[0.0; HALF]; 2];
+        let (parts, rest) = self.x.as_chunks::<HALF>();
         for part in parts {
-            let [re, im] = &mut turn;
-            for k in 0..TURNS {
-                sums[0][k] += part[k] * re[k];
-                sums[1][k] += part[k] * im[k];
-                (re[k], im[k]) = (re[k] * step_cos - im[k] * step_sin, im[k] * step_cos + re[k] * step_sin);
+            for k in 0..HALF {
+                sum_re[k] += part[k] * re[k];
+                sum_im[k] += part[k] * im[k];
+                (re[k], im[k]) = (re[k] * step_re - im[k] * step_im, im[k] * step_re + re[k] * step_im);
             }
         }
         for (k, x) in rest.iter().enumerate() {
-            sums[0][k] += x * turn[0][k];
-            sums[1][k] += x * turn[1][k];
+            sum_re[k] += x * re[k];
+            sum_im[k] += x * im[k];
         }
-        sums.map(|sums| sums.iter().sum())
-    })
+        [total(&sum_re), total(&sum_im)]
+    }
 }
 
 #[inline(always)]
-fn dot_here(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; LANES];
-    let (a_lanes, a_rest) = a.as_chunks::<LANES>();
-    let (b_lanes, b_rest) = b.as_chunks::<LANES>();
-    for (a, b) in a_lanes.iter().zip(b_lanes) {
-        for lane in 0..LANES {
-            sums[lane] += a[lane] * b[lane];
-        }
-    }
-    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
-    sums.iter().sum::<f64>() + rest
+fn total(sums: &[f64]) -> f64 {
+    sums.iter().sum()
 }
 
 #[inline(always)]
-fn axpy_here(a: f64, x: &[f64], y: &mut [f64]) {
-    for (y, x) in y.iter_mut().zip(x) {
-        *y += a * x;
-    }
+fn rest(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]
@@ -142,7 +178,7 @@ mod tests {
         assert_eq!(five[4].to_bits(), dot(&b, &b).to_bits());
         let (mut one, mut all) = (a.clone(), a.clone());
         axpy(0.3, &b, &mut one);
-        axpys([(0.3, &b[..])].into_iter(), &mut all);
+        axpys(&[0.3], &b, &mut all);
         assert!(one.iter().zip(&a).zip(&b).all(|((y, a), b)| y.to_bits() == (a + 0.3 * b).to_bits()));
         assert_eq!(one, all);
     }
