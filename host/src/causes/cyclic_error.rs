@@ -77,7 +77,7 @@ impl CauseModel for CyclicError {
     }
 
     /// Sine and cosine together, four samples at a time.
-    fn signatures(&self, axis: Option<Axis>, shape: &[f64], view: &RunView, out: &mut [Vec<f64>]) {
+    fn signatures(&self, axis: Option<Axis>, shape: &[f64], view: &RunView, out: &mut [&mut [f64]]) {
         let (Some(pitch_m), [sines, cosines]) = (shape.first(), out) else { return };
         let wave = std::f64::consts::TAU * view.radius_m / pitch_m;
         let at = usize::from(axis == Some(Axis::Y));

@@ -208,7 +208,7 @@ pub trait CauseModel: Sync {
     }
 
     /// All its columns in one go.
-    fn signatures(&self, axis: Option<Axis>, shape: &[f64], view: &RunView, out: &mut [Vec<f64>]) {
+    fn signatures(&self, axis: Option<Axis>, shape: &[f64], view: &RunView, out: &mut [&mut [f64]]) {
         for (column, out) in out.iter_mut().enumerate() {
             self.signature(axis, shape, column, view, out);
         }

@@ -30,24 +30,32 @@ impl Column {
         Self { reach: low.iter().map(reach).max().unwrap_or(0), low, outside: Vec::new() }
     }
 
-    /// From the samples of each run, which `fill` writes; what a run hides does not count.
-    pub fn split(runs: &[Prepared], fill: impl Fn(&Prepared, &mut [f64]) + Sync) -> Self {
-        let mut outside = vec![0.0; runs.last().map_or(0, |run| run.place.end)];
-        let parts: Vec<(Low, [f64; 2])> = each(runs, &mut outside)
+    /// So many columns from the samples of each run, which `fill` writes; what a run hides does not count.
+    pub fn split(
+        runs: &[Prepared],
+        columns: usize,
+        fill: impl Fn(&Prepared, &mut [&mut [f64]]) + Sync,
+    ) -> Vec<Self> {
+        let mut outsides = vec![vec![0.0; runs.last().map_or(0, |run| run.place.end)]; columns];
+        let parts: Vec<Vec<(Low, [f64; 2])>> = each(runs, &mut outsides)
             .into_par_iter()
-            .map(|(run, samples)| {
-                fill(run, samples);
-                run.mask(samples);
-                let whole = dot(samples, samples);
-                let low = run.basis.take_out(samples);
-                (low, [dot(samples, samples), whole])
+            .map(|(run, mut columns)| {
+                fill(run, &mut columns);
+                let part = |samples: &mut &mut [f64]| {
+                    run.mask(samples);
+                    let whole = dot(samples, samples);
+                    let low = run.basis.take_out(samples);
+                    (low, [dot(samples, samples), whole])
+                };
+                columns.iter_mut().map(part).collect()
             })
             .collect();
-        let energy = parts.iter().fold([0.0; 2], |sum, part| [sum[0] + part.1[0], sum[1] + part.1[1]]);
-        if energy[0] <= WITHIN * energy[1] {
-            outside = Vec::new();
-        }
-        Self { low: parts.into_iter().map(|part| part.0).collect(), reach: COLUMNS, outside }
+        let column = |(at, outside): (usize, Vec<f64>)| {
+            let energy = |which: usize| parts.iter().map(|parts| parts[at].1[which]).sum::<f64>();
+            let outside = if energy(0) > WITHIN * energy(1) { outside } else { Vec::new() };
+            Self { low: parts.iter().map(|parts| parts[at].0).collect(), reach: COLUMNS, outside }
+        };
+        outsides.into_iter().enumerate().map(column).collect()
     }
 
     /// Coordinates in the low orders, run by run.
@@ -108,13 +116,17 @@ impl Column {
     }
 }
 
-/// Each run with its own part of a vector over all samples.
-fn each<'a>(runs: &'a [Prepared], mut samples: &'a mut [f64]) -> Vec<(&'a Prepared, &'a mut [f64])> {
-    runs.iter()
-        .map(|run| {
-            let (own, rest) = std::mem::take(&mut samples).split_at_mut(run.place.len());
-            samples = rest;
-            (run, own)
-        })
-        .collect()
+/// Each run with its own part of vectors over all samples.
+fn each<'a>(runs: &'a [Prepared], vectors: &'a mut [Vec<f64>]) -> Vec<(&'a Prepared, Vec<&'a mut [f64]>)> {
+    let mut left: Vec<&mut [f64]> = vectors.iter_mut().map(Vec::as_mut_slice).collect();
+    let mut take = |length: usize| -> Vec<&'a mut [f64]> {
+        left.iter_mut()
+            .map(|samples| {
+                let (own, rest) = std::mem::take(samples).split_at_mut(length);
+                *samples = rest;
+                own
+            })
+            .collect()
+    };
+    runs.iter().map(|run| (run, take(run.place.len()))).collect()
 }

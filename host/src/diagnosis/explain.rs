@@ -209,7 +209,7 @@ fn enter(found: &mut Explained, start: &Start, kinds: &[Kind]) {
     };
     found.nuisance.push(found.ledger.push(Column::within(runs.iter().map(own).collect())));
     let add = |found: &mut Explained, kind: Kind, shapes: usize| -> usize {
-        let columns = (0..kind.columns()).map(|i| found.ledger.push(kind.column(i, &runs))).collect();
+        let columns = kind.columns_over(&runs).into_iter().map(|column| found.ledger.push(column)).collect();
         found.items.push(Item { price: kind.price(shapes), columns, kind, fitted_beside: None });
         found.items.len() - 1
     };
@@ -220,7 +220,8 @@ fn enter(found: &mut Explained, start: &Start, kinds: &[Kind]) {
     // The data no longer hold what the response has taken in; its column still does.
     if start.own_fourth_order {
         let fourth = Kind::Cause { cause: Cause::HigherOrderDynamics, axis: None, shape: Vec::new() };
-        found.nuisance.push(found.ledger.push(fourth.column(0, &runs)));
+        let columns = fourth.columns_over(&runs);
+        found.nuisance.extend(columns.into_iter().map(|column| found.ledger.push(column)));
     } else if found.response.b_s4 != 0.0 {
         restore_fourth_order(found);
     }

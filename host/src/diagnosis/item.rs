@@ -58,11 +58,12 @@ impl Kind {
         }
     }
 
-    /// One column over all runs, m per unit; 0 where a run hides its samples.
-    pub fn column(&self, index: usize, runs: &[Prepared]) -> Column {
-        match runs.iter().map(|run| self.low(index, run)).collect::<Option<Vec<Low>>>() {
-            Some(low) => Column::within(low),
-            None => Column::split(runs, |run, out| self.samples(index, run, out)),
+    /// Its columns over all runs, m per unit; 0 where a run hides its samples.
+    pub fn columns_over(&self, runs: &[Prepared]) -> Vec<Column> {
+        let low = |index: usize| runs.iter().map(|run| self.low(index, run)).collect::<Option<Vec<Low>>>();
+        match (0..self.columns()).map(low).collect::<Option<Vec<_>>>() {
+            Some(low) => low.into_iter().map(Column::within).collect(),
+            None => Column::split(runs, self.columns(), |run, out| self.samples(run, out)),
         }
     }
 
@@ -78,27 +79,12 @@ impl Kind {
         }
     }
 
-    /// One column at each sample of one run.
-    fn samples(&self, index: usize, run: &Prepared, out: &mut [f64]) {
+    /// All columns at each sample of one run.
+    pub fn samples(&self, run: &Prepared, out: &mut [&mut [f64]]) {
         match self {
-            Self::Cause { cause, axis, shape } => {
-                cause.model().signature(*axis, shape, index, &run.view, out);
-            }
-            Self::Pattern(pattern) => pattern.samples(run, out),
-        }
-    }
-
-    /// All columns at each sample of one run; 0 where it hides them.
-    pub fn all_samples(&self, run: &Prepared) -> Vec<Vec<f64>> {
-        let mut out = vec![vec![0.0; run.deviation_m.len()]; self.columns()];
-        match self {
-            Self::Cause { cause, axis, shape } => {
-                cause.model().signatures(*axis, shape, &run.view, &mut out);
-            }
+            Self::Cause { cause, axis, shape } => cause.model().signatures(*axis, shape, &run.view, out),
             Self::Pattern(pattern) => out.iter_mut().for_each(|out| pattern.samples(run, out)),
         }
-        out.iter_mut().for_each(|out| run.mask(out));
-        out
     }
 
     /// What it has to take off χ², chosen from `shapes` starting shapes.

@@ -49,7 +49,7 @@ pub fn propose_patterns(found: &mut Explained) {
     }
     for pattern in new {
         let kind = Kind::Pattern(pattern);
-        let columns = (0..kind.columns()).map(|i| found.ledger.push(kind.column(i, &runs))).collect();
+        let columns = kind.columns_over(&runs).into_iter().map(|column| found.ledger.push(column)).collect();
         found.items.push(Item { price: kind.price(1), columns, kind, fitted_beside: None });
     }
 }

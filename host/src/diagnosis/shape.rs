@@ -109,8 +109,8 @@ impl Task {
             return;
         }
         let kind = self.kind(&shape);
-        for (index, &at) in found.items[self.item].columns.clone().iter().enumerate() {
-            found.ledger.replace(at, kind.column(index, &found.runs));
+        for (&at, column) in found.items[self.item].columns.iter().zip(kind.columns_over(&found.runs)) {
+            found.ledger.replace(at, column);
         }
         found.items[self.item].kind = kind;
     }
@@ -325,8 +325,14 @@ impl Part {
         match low {
             Some(low) => low.into_iter().map(|low| Self { low, samples: Vec::new() }).collect(),
             None => {
-                let all = kind.all_samples(run).into_iter();
-                all.map(|samples| Self { low: run.basis.coordinates(&samples), samples }).collect()
+                let mut all = vec![vec![0.0; run.deviation_m.len()]; kind.columns()];
+                let mut out: Vec<&mut [f64]> = all.iter_mut().map(Vec::as_mut_slice).collect();
+                kind.samples(run, &mut out);
+                let part = |mut samples: Vec<f64>| {
+                    run.mask(&mut samples);
+                    Self { low: run.basis.coordinates(&samples), samples }
+                };
+                all.into_iter().map(part).collect()
             }
         }
     }

@@ -156,6 +156,9 @@ pub fn believed_feed_m_s(run: &Run) -> f64 {
     }
 }
 
+/// What a campaign without start times is taken to last, s.
+const UNTIMED_S: f64 = 3600.0;
+
 /// A campaign read once: what no model of the machine changes.
 #[derive(Clone, Debug)]
 pub struct Survey {
@@ -267,16 +270,15 @@ impl Survey {
 
 /// What the baseline leaves of the runs, where it is seen.
 pub fn misfit(runs: &[Prepared]) -> Column {
-    Column::split(runs, |run, out| {
+    let left = |run: &Prepared, out: &mut [&mut [f64]]| {
         let shrink = run.view.radius_m * (run.view.gain - 1.0);
-        for (out, deviation) in out.iter_mut().zip(&run.deviation_m) {
+        for (out, deviation) in out.iter_mut().flat_map(|out| out.iter_mut()).zip(&run.deviation_m) {
             *out = deviation - shrink;
         }
-    })
+    };
+    let column = Column::split(runs, 1, left).pop();
+    column.unwrap_or_else(|| Column::zero(runs.len()))
 }
-
-/// What a campaign without start times is taken to last, s.
-const UNTIMED_S: f64 = 3600.0;
 
 /// Dead time that a servo may have on top of its own lag, s.
 const UNSEEN_S: f64 = 0.01;

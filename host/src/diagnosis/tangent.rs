@@ -118,9 +118,10 @@ fn lay(found: &mut Explained, weights: &[f64], whole: bool) -> Option<Tangents> 
 /// What the explanation `item` does as `moved` on `runs`, beyond what it does now, at its present amounts.
 fn difference(found: &Explained, item: usize, amounts: &[f64], moved: &Kind, runs: &[Prepared]) -> Column {
     let mut out = Column::zero(runs.len());
-    for (index, (&amount, &column)) in amounts.iter().zip(&found.items[item].columns).enumerate() {
-        out.add(amount, &moved.column(index, runs));
-        out.add(-amount, found.ledger.column(column));
+    let columns = found.items[item].columns.iter().zip(moved.columns_over(runs));
+    for (&amount, (&now, moved)) in amounts.iter().zip(columns) {
+        out.add(amount, &moved);
+        out.add(-amount, found.ledger.column(now));
     }
     out
 }
@@ -173,9 +174,9 @@ fn relay(found: &mut Explained, shapes: &[Shape]) {
     let mut items: Vec<usize> = shapes.iter().map(|shape| shape.item).collect();
     items.dedup();
     for item in items {
-        for (index, column) in found.items[item].columns.clone().into_iter().enumerate() {
-            let moved = found.items[item].kind.column(index, &found.runs);
-            found.ledger.replace(column, moved);
+        let item = &found.items[item];
+        for (&at, column) in item.columns.iter().zip(item.kind.columns_over(&found.runs)) {
+            found.ledger.replace(at, column);
         }
     }
 }
