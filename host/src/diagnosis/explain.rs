@@ -34,6 +34,9 @@ const SETTLED: [f64; 2] = [1e-3, 1e-2];
 /// Change of the lag that does not matter, s.
 const SETTLED_LAG_S: f64 = 2e-4;
 
+/// Change of a response's own lag that makes it another one, s: the longest move of a pass.
+const OTHER_LAG_S: f64 = 5e-3;
+
 /// Most tones of one machine.
 const TONES: usize = 2;
 
@@ -70,8 +73,10 @@ pub fn explain(campaign: &Campaign, start: &Start) -> Explained {
             break;
         }
         known = Some(kinds.len());
+        // A response of another kind has a lag of its own: what the old one lacked says nothing of it.
+        let other = (survey.lag(&refined).tau_s - survey.lag(&response).tau_s).abs() > OTHER_LAG_S;
+        more_lag_s = if other { 0.0 } else { more_lag_s + longer_s };
         response = refined;
-        more_lag_s += longer_s;
         let left = left.all_samples(&found.runs);
         (found, longer_s) = pass(&survey, start, (response, more_lag_s), &mut seen, &kinds, Some(&left));
     }

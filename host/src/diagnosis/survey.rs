@@ -243,13 +243,18 @@ impl Survey {
         self.runs.iter().map(|run| Arc::clone(&run.basis)).collect()
     }
 
-    /// The runs about a guess of the response, their lag `more_lag_s` longer than the set-up offset says.
-    pub fn prepare(&self, response: &Response, more_lag_s: f64) -> (Vec<Prepared>, Lag) {
-        let mut lag = if self.inferred {
+    /// Lag of the machine behind the command: by the turn of the set-up offset, or else that of the response's own chain.
+    pub fn lag(&self, response: &Response) -> Lag {
+        if self.inferred {
             self.measure_lag(response)
         } else {
             Lag { tau_s: 0.0, tau3_s3: 0.0, measured: true, se_s: 0.0 }
-        };
+        }
+    }
+
+    /// The runs about a guess of the response, their lag `more_lag_s` longer than the set-up offset says.
+    pub fn prepare(&self, response: &Response, more_lag_s: f64) -> (Vec<Prepared>, Lag) {
+        let mut lag = self.lag(response);
         lag.tau_s += more_lag_s;
         let place = |run: &Prepared| {
             let mut run = run.clone();

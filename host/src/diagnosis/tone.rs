@@ -166,9 +166,9 @@ fn refine(
         .into_iter()
         .flat_map(|axis| {
             let swung = swung(axis);
-            let sums: Vec<(f64, Option<Axis>, f64)> = (-48..=48)
+            let sums: Vec<(f64, Option<Axis>, f64)> = (-24..=24)
                 .into_par_iter()
-                .map(|i| start_hz + 0.5 * step_hz * f64::from(i))
+                .map(|i| start_hz + step_hz * f64::from(i))
                 .map(|hz| (sum_at(&swung, axis, hz), axis, hz))
                 .collect();
             sums
