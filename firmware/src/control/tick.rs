@@ -76,6 +76,27 @@ where
         output
     }
 
+    /// For who simulates long rests: lets so many ticks pass at once and says so, or does nothing. At rest, with no
+    /// segment, no wish and no set-point waiting, a tick only counts the time, provided that the last two ticks
+    /// had the same output and that the correction is wholly engaged or disengaged, which is the caller's to know.
+    pub fn rest(&mut self, count: u32) -> bool {
+        let shared = &self.shared;
+        let wishes = shared.stop.load(Relaxed)
+            || shared.stop_input.load(Relaxed) != self.stop_input
+            || shared.bypass.load(Relaxed) != self.bypass;
+        let rests = self.executor.idle() && self.segments.queue.waiting() == 0 && !self.recording && !wishes;
+        if rests {
+            self.now = self.now.wrapping_add(count);
+            self.shared.pass(self.now);
+        }
+        rests
+    }
+
+    /// Whether the correction is disengaged, or on its way to be.
+    pub const fn bypassed(&self) -> bool {
+        self.bypass
+    }
+
     #[inline]
     fn wishes(&mut self, late: bool) {
         if late {

@@ -4,6 +4,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`client`] | requests and replies over any [`link`](link::Link): status, slots, runs |
+//! | `series` | requests of which several are on their way at once |
 //! | [`flash`] | a table onto a controller, and the proof that it is there |
 //! | [`recording`] | circles run, set-points received |
 //! | [`port`] | what `--port` may name, and opening it |
@@ -20,6 +21,7 @@ pub mod link;
 pub mod port;
 pub mod recording;
 pub mod serial;
+mod series;
 pub mod virtual_controller;
 
 #[cfg(test)]

@@ -11,6 +11,10 @@ pub const CHUNK: usize = 128;
 /// Most set-points in one message.
 pub const SET_POINTS: usize = 6;
 
+/// Bytes of requests that a host may have on their way: a controller keeps as many, and one more frame, until it has
+/// time for them.
+pub const IN_FLIGHT: usize = 768;
+
 /// A link that is silent for so long during a run counts as dead, unless the host asks otherwise, ms: four times the
 /// host's longest silence.
 pub const SUPERVISE_MS: u16 = 1000;

@@ -1,8 +1,7 @@
 //! The server's state machine, with the engine behind it: a conversation of frames, raw bytes, time and resets.
-use super::bench::{Bench, Flash};
+use super::bench::{Bench, Flash, message_in};
 use giotto_shared::wire::{
-    self, Accumulator, CHUNK, CRC, Chunk, CircleRun, Command, FromController, MAX_FRAME, Reply, Request,
-    Status,
+    self, CHUNK, CRC, Chunk, CircleRun, Command, FromController, MAX_FRAME, Reply, Request, Status,
 };
 
 /// Reads a conversation.
@@ -25,21 +24,37 @@ impl<'a> Script<'a> {
 struct Talk {
     bench: Bench,
     seq: u16,
+    /// Everything the controller has said, if that is wanted.
+    transcript: Option<Vec<u8>>,
 }
 
 impl Talk {
+    fn new(thorough: bool) -> Self {
+        let transcript = None;
+        let mut talk = Self { bench: Bench::boot(Flash::new()), seq: 0, transcript };
+        talk.bench.thorough = thorough;
+        talk
+    }
+
+    /// Takes the power away and opens the session again.
+    fn reset(self) -> Self {
+        let mut talk = Self { bench: self.bench.reset(), seq: 0, ..self };
+        talk.ask(Command::Hello);
+        talk
+    }
+
     /// The reply in what came back.
     fn send(&mut self, bytes: &[u8]) -> Option<Reply> {
         let mut last = None;
         for &byte in bytes {
             if let Some(frame) = self.bench.receive(byte) {
-                let mut accumulator = Accumulator::new();
-                let payload = frame.iter().find_map(|&byte| accumulator.push(byte).map(<[u8]>::to_vec));
-                let payload = payload.expect("a reply is a whole frame");
-                last = match postcard::from_bytes(&payload).expect("a reply can be read") {
+                last = match message_in(frame) {
                     FromController::Reply { reply, .. } => Some(reply),
                     FromController::SetPoints(_) => None,
                 };
+                if let Some(transcript) = &mut self.transcript {
+                    transcript.extend_from_slice(frame);
+                }
             }
         }
         last
@@ -58,14 +73,13 @@ impl Talk {
         self.seq = self.seq.wrapping_add(1);
         let mut frame = [0; MAX_FRAME];
         let request = Request { session: 1, seq: self.seq, command };
-        let frame = wire::encode(&request, &mut frame).expect("a request fits").to_vec();
-        self.send(&frame)
+        self.send(wire::encode(&request, &mut frame).expect("a request fits"))
     }
 
-    fn status(&mut self) -> Status {
+    fn status(&mut self) -> Option<Status> {
         match self.ask(Command::Status) {
-            Some(Reply::Status(status)) => status,
-            other => panic!("no status: {other:?}"),
+            Some(Reply::Status(status)) => Some(status),
+            _ => None,
         }
     }
 
@@ -79,13 +93,22 @@ impl Talk {
     }
 }
 
+/// Ticks of a wait: as many lengths of a few ticks as of a thousand, up to two thousand.
+fn wait(byte: u8) -> usize {
+    let (doublings, part) = (usize::from(byte) / 23, usize::from(byte) % 23);
+    ((23 + part) << doublings) / 23
+}
+
 /// Holds the conversation and looks at the state after each step.
 pub fn run(bytes: &[u8]) {
+    hold(Talk::new(false), bytes);
+}
+
+fn hold(mut talk: Talk, bytes: &[u8]) -> Talk {
     let mut script = Script(bytes);
-    let mut talk = Talk { bench: Bench::boot(Flash::new()), seq: 0 };
     talk.ask(Command::Hello);
     while let Some(step) = script.byte() {
-        match step % 12 {
+        match step % 13 {
             0 => drop(talk.send(script.some(usize::from(step) / 4))),
             1 => {
                 let length = script.byte().unwrap_or(0);
@@ -99,10 +122,11 @@ pub fn run(bytes: &[u8]) {
                 payload.extend(script.some(usize::from(length) % 64));
                 drop(talk.payload(&payload));
             }
-            3 => talk.bench.ticks(usize::from(script.byte().unwrap_or(1)) * 8, step > 250),
+            3 => talk.bench.ticks(wait(script.byte().unwrap_or(1)), step > 240),
             4 => {
                 let seeds = super::table::tables();
-                let mut image = seeds[usize::from(script.byte().unwrap_or(0)) % seeds.len()].clone();
+                let which = usize::from(script.byte().unwrap_or(0)) % seeds.len();
+                let mut image = seeds[which].clone();
                 if let (Some(at), Some(value)) = (script.byte(), script.byte()) {
                     // Half the time as it is.
                     if at & 1 == 0 {
@@ -135,27 +159,53 @@ pub fn run(bytes: &[u8]) {
             }
             10 if step > 200 => talk.bench.set_stop_input(step > 230),
             10 => drop(talk.ask(Command::Stop)),
-            _ => {
-                talk = Talk { bench: talk.bench.reset(), seq: 0 };
-            }
+            11 => drop(talk.ask(Command::Hello)),
+            _ => talk = talk.reset(),
         }
-        // A hello opens the session again if a stranger has it, or a reset was asked for.
         talk.seq = talk.seq.wrapping_add(1);
-        talk.ask(Command::Hello);
-        if !matches!(talk.ask(Command::Status), Some(Reply::Status(_))) {
-            talk = Talk { bench: talk.bench.reset(), seq: 0 };
+        let mut status = talk.status();
+        // A stranger may have the session: a hello opens it again, or else a reset does.
+        if status.is_none() {
             talk.ask(Command::Hello);
+            status = talk.status();
         }
-        let status = talk.status();
-        talk.bench.check(&status);
+        if status.is_none() {
+            talk = talk.reset();
+            status = talk.status();
+        }
+        talk.bench.check(&status.expect("a controller that was reset says how it is"));
     }
+    talk
 }
 
 /// A flash and a run; a run, a stop and a reset.
 pub fn seeds() -> Vec<Vec<u8>> {
     vec![
-        vec![4, 0, 1, 1, 5, 6, 9, 128, 100, 60, 0, 3, 255, 3, 255, 10, 3, 255, 11],
+        vec![4, 0, 1, 1, 5, 6, 9, 128, 100, 60, 0, 3, 255, 3, 255, 10, 3, 255, 12],
         vec![9, 128, 30, 20, 7, 3, 200, 10, 3, 100, 8, 3, 1, 255, 3, 9],
-        vec![4, 1, 1, 1, 5, 11, 4, 0, 1, 1, 5, 6, 4, 1, 1, 1, 5, 6, 7, 7, 11],
+        vec![4, 1, 1, 1, 5, 12, 4, 0, 1, 1, 5, 6, 4, 1, 1, 1, 5, 6, 7, 7, 12],
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fuzz::TARGETS;
+    use crate::noise::Noise;
+
+    /// A rest that passes at once is one whose ticks are all made: every byte that the controller says is the same.
+    #[test]
+    fn rests_that_are_skipped_change_nothing() {
+        let server = TARGETS.iter().find(|target| target.name == "server").unwrap();
+        let noise = Noise::new(server);
+        for seed in 0..3000 {
+            let bytes = noise.bytes(seed);
+            let transcript = |thorough| {
+                let mut talk = Talk::new(thorough);
+                talk.transcript = Some(Vec::new());
+                hold(talk, &bytes).transcript
+            };
+            assert!(transcript(true) == transcript(false), "seed {seed}: {bytes:02x?}");
+        }
+    }
 }
