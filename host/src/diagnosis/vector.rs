@@ -1,6 +1,6 @@
 //! Vectors of samples, as wide as the processor has them.
 //!
-//! Which additions are made, and in which order, is fixed: [`LANES`] sums side by side, then their sum, every product
+//! Which additions are made, and in which order, is fixed: `LANES` sums side by side, then their sum, every product
 //! rounded before it is added. So the bits are the same on every processor.
 use pulp::{Arch, Simd, WithSimd};
 
