@@ -168,6 +168,16 @@ class Runs:
         out._strokes, out._bins = {}, None
         return out
 
+    def take(self, rows):
+        """Some of the runs."""
+        out = copy.copy(self)
+        for name, value in vars(self).items():
+            if isinstance(value, np.ndarray):
+                setattr(out, name, value[rows])
+        out.count, out.direction = len(rows), tuple(along[rows] for along in self.direction)
+        out._strokes, out._bins = {}, None
+        return out
+
     def hide(self, hidden):
         """Hides samples from every product."""
         self.hidden = hidden
@@ -175,15 +185,14 @@ class Runs:
         self._orthonormal(self._waves())
         self.deviation = self.deviation * ~hidden
 
-    def stroke(self, axis, rows=slice(None)):
-        """Share of the half turn since the axis last reversed, and its direction cosine, positive where it has just turned."""
+    def stroke(self, axis):
+        """Share of the half turn since an axis last reversed; its direction cosine, positive where it has just turned."""
         if axis not in self._strokes:
             halves = self.sign[:, None] * (self.psi - axis * np.pi / 2) / np.pi
             share = halves - np.floor(halves)
             across = np.abs(self.direction[axis])
             self._strokes[axis] = share, np.where(share < 0.5, across, -across)
-        share, facing = self._strokes[axis]
-        return share[rows], facing[rows]
+        return self._strokes[axis]
 
     def coordinates(self, samples):
         """Coordinates of samples in the low orders."""
@@ -202,10 +211,8 @@ class Runs:
         """Coordinates of columns (columns × runs × samples) and what they have outside; what is hidden does not count."""
         if self.hidden is not None:
             samples = samples * ~self.hidden
-        by_run = samples.swapaxes(0, 1)
-        low = by_run @ self.basis.swapaxes(1, 2)
-        outside = samples - (low @ self.basis).swapaxes(0, 1)
-        return low.swapaxes(0, 1), outside
+        low = samples.swapaxes(0, 1) @ self.basis.swapaxes(1, 2)
+        return low.swapaxes(0, 1), samples - (low @ self.basis).swapaxes(0, 1)
 
     def misfit(self):
         """What the baseline leaves."""
@@ -314,7 +321,7 @@ def measure_spread(runs, left_m):
     # Waves of the machine angle, as the signatures are.
     waves = packed(runs.harmonics_of(runs.coordinates(left_m)) * runs.ahead.conj())[seen]
     total = pure_error(runs, waves, seen)
-    total = np.array([total[0], 0, *(0.5 * (total[2 * k - 1] + total[2 * k]) for k in range(2, ORDERS + 1))])
+    total = np.array([total[0], 0, *(0.5 * (total[3::2] + total[4::2]))])
     within = noise_m2 * np.mean(1 / np.maximum(runs.visible[seen], 1)) if seen.any() else 0.0
     scatter = np.maximum(total - within * np.where(np.arange(ORDERS + 1) == 0, 1, 2), 0)
     scatter[1] = 0

@@ -3,30 +3,21 @@
 Basis of low orders, noise and scatter between runs, lag from the turning set-up offset, all causes and patterns as columns,
 a search by evidence with pruning, shapes by scan, climb and simplex, tangents, proposals, tones and teeth, refinement of the
 response until it settles; intervals, probabilities, look-alikes and misfit; folds by radius and by speed with a time-domain
-simulation of each circle left out, and a bootstrap over runs. Left out are words, JSON and what plots draw, a model given
-as start, and recordings whose angle was measured or whose runs differ in length.
+simulation of each circle left out, and a bootstrap over runs. Left out are words, JSON and what plots draw, and what this
+campaign is not: a model given as start, angles that were measured, runs of unequal length.
 """
+import ctypes
 import time
+from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
-from circles import PLACES, Column, Response, Runs, fit_lag, measure_lag, measure_spread, packed, unpacked
-from ledger import Found, columns_of, prune, select
+from circles import PLACES, Response, Runs, fit_lag, measure_lag, measure_spread
+from ledger import SMALLEST_OF_EXPLAINED, SMALLEST_OF_NOISE, Found, prune, select
 from machine import measure_gain
 from ripples import find_teeth, find_tone
 from shapes import finish, improve, polish
-from signatures import (
-    BUMPS,
-    CAUSES,
-    LAWS,
-    LAWS_OF_BUMPS,
-    Kind,
-    columns_over,
-    harmonic_patterns,
-    law_of,
-    size_patterns,
-    starting_shapes,
-)
-from ledger import SMALLEST_OF_EXPLAINED, SMALLEST_OF_NOISE
+from signatures import BUMPS, CAUSES, HARMONICS, LAWS, LAWS_OF_BUMPS, SIZES, Kind, columns_over, law_of, starting_shapes
 from verdict import findings, misfit
 
 PASSES, ROUNDS, TONES = 6, 6, 2
@@ -146,13 +137,13 @@ def one_pass(survey, response, more_lag_s, seen, kinds, left_m):
 def enter(found, kinds):
     """Enters the columns of the model itself, of what was chosen before, and of everything that may compete."""
     runs = found.runs
-    own, higher = columns_over([Kind("own"), Kind("higher_order_dynamics")], runs)[0]
+    own, higher = columns_over([Kind("own"), Kind("higher_order_dynamics")], runs)
     if found.response.b_s4 != 0:
         # The response holds a fourth-order part that the search may still reject: it is given back to the data, to first
         # order exactly as its column would take it.
         ledger = found.ledger
-        ledger.replace([0], ledger.low[:1] - 0.5 * found.response.b_s4 * higher, ledger.outside[:1].copy())
-    found.nuisance = found.ledger.push(own)
+        ledger.replace([[0]], [(ledger.low[:1] - 0.5 * found.response.b_s4 * higher[0], ledger.outside[:1].copy())])
+    found.nuisance = found.ledger.push([own])[0]
     entered = [(kind, len(starting_shapes(kind.name, runs)) if kind.listed else 1) for kind in kinds]
     known = {(kind.name, kind.axis) for kind in kinds if kind.listed}
     for name, (axes, _) in CAUSES.items():
@@ -160,61 +151,62 @@ def enter(found, kinds):
         for axis in axes:
             if shapes and (name, axis) not in known:
                 entered.append((Kind(name, axis, shapes[0]), len(shapes)))
-    entered += [(kind, 1) for kind in size_patterns() if kind not in kinds]
+    entered += [(kind, 1) for kind in SIZES if kind not in kinds]
     every = [kind for kind, _ in entered]
-    found.add(every, [kind.price(shapes) for kind, shapes in entered], *columns_over(every, runs))
+    found.add(every, [kind.price(shapes) for kind, shapes in entered], columns_over(every, runs))
     found.chosen = list(range(len(kinds)))
 
 
 def propose(found):
     """Looks at what is left of the harmonics and of the places, and lets the best patterns compete."""
-    runs, noise_m2 = found.runs, found.spread.noise_m2
-    sizes = {law: law_of(runs, law) for law in LAWS}
-    rows = np.array([sizes[law] * (runs.sign if odd else 1) for law in LAWS for odd in (False, True)])
     left = found.residual()
-    names, gains, energies = [], [], []
-    patterns = harmonic_patterns()
+    laws = {law: law_of(found.runs, law) for law in LAWS}
+    sizes = np.array([laws[law] * (found.runs.sign if odd else 1) for law in LAWS for odd in (False, True)])
     # Of what is left, and also beside each chosen cause as if it were not there: a pattern may describe its data better.
     amount = dict(zip(found.columns, found.solution.coefficients))
     lows = [left.low]
-    for item in found.chosen:
-        if found.items[item].kind.listed:
-            columns = found.items[item].columns
-            lows.append(left.low + np.tensordot([amount[column] for column in columns], found.ledger.low[columns], 1))
-    variance = found.spread.order_m2 + 2 * noise_m2 / runs.samples
-    own = (rows**2).sum(axis=1)
-    at = [(2 * LAWS.index(law) + odd, order) for order, law, odd, _ in patterns]
-    row, order = np.array(at).T
-    machine = np.array([pattern[3] for pattern in patterns])
-    for low in lows:
-        by_clock = runs.harmonics_of(low)
-        pulls = [rows @ waves for waves in (by_clock * runs.ahead.conj(), by_clock)]
-        pull = np.abs(np.where(machine, pulls[0][row, order], pulls[1][row, order])) ** 2
-        gains.append(pull / (own[row] * variance[order]))
-        energies.append(0.5 * runs.samples * pull / own[row])
-        names += [("harmonic", pattern) for pattern in patterns]
-    bumps = bump_weights(*np.array(BUMPS).T)
-    square = (bumps**2).sum(axis=1)
-    row = [2 * LAWS.index(law) + odd for law, odd in LAWS_OF_BUMPS]
-    variance = noise_m2 * PLACES / runs.samples
-    pulls = (rows[row] @ runs.place_means(left)) @ bumps.T
-    gain = (pulls**2 / np.multiply.outer(own[row], square) / variance).T.ravel()
-    gains.append(gain)
-    # What takes χ² off white samples takes noise²·χ² of energy.
-    energies.append(gain * noise_m2)
-    names += [("bump", (law, odd, centre, width)) for centre, width in BUMPS for law, odd in LAWS_OF_BUMPS]
-    gains, energies = np.concatenate(gains), np.concatenate(energies)
-    prices = np.where(np.arange(len(gains)) < len(lows) * len(patterns), Kind("harmonic").price(), Kind("bump").price())
-    smallest = 0.3 * SMALLEST_OF_NOISE * np.sqrt(noise_m2)
-    promising = np.flatnonzero((gains > prices) & (np.sqrt(energies / found.samples) > smallest))
-    known, new = {item.kind for item in found.items}, []
-    for at in promising[np.argsort(-gains[promising], kind="stable")]:
-        kind = Kind(names[at][0], None, names[at][1])
+    for item in (found.items[item] for item in found.chosen):
+        if item.kind.listed:
+            lows.append(left.low + np.tensordot([amount[c] for c in item.columns], found.ledger.low[item.columns], 1))
+    offers = [*(harmonics_offered(found, low, sizes) for low in lows), bumps_offered(found, left, sizes)]
+    # What each would take off χ² and of the energy, m²; what is dear or small is no offer.
+    gains, energies = (np.concatenate([offer[k] for offer in offers]) for k in range(2))
+    kinds = [HARMONICS] * len(lows) + [BUMPS]
+    prices = np.repeat([of[0].price() for of in kinds], [len(of) for of in kinds])
+    smallest_m = 0.3 * SMALLEST_OF_NOISE * np.sqrt(found.spread.noise_m2)
+    promising = np.flatnonzero((gains > prices) & (np.sqrt(energies / found.samples) > smallest_m))
+    kinds, known, new = sum(kinds, []), {item.kind for item in found.items}, []
+    for kind in (kinds[at] for at in promising[np.argsort(-gains[promising], kind="stable")]):
         if len(new) < PROMISING and kind not in known:
             known.add(kind)
             new.append(kind)
     if new:
-        found.add(new, [kind.price() for kind in new], *columns_over(new, runs))
+        found.add(new, [kind.price() for kind in new], columns_over(new, found.runs))
+
+
+def row_of(law, odd):
+    return 2 * LAWS.index(law) + odd
+
+
+def harmonics_offered(found, low, sizes):
+    runs = found.runs
+    shapes = [kind.shape for kind in HARMONICS]
+    rows, orders, machine = np.array([(row_of(law, odd), order, machine) for order, law, odd, machine in shapes]).T
+    by_clock = runs.harmonics_of(low)
+    pulls = np.stack([sizes @ by_clock, sizes @ (by_clock * runs.ahead.conj())])
+    power, own = np.abs(pulls[machine, rows, orders]) ** 2, (sizes**2).sum(axis=1)[rows]
+    variance = found.spread.order_m2 + 2 * found.spread.noise_m2 / runs.samples
+    return power / (own * variance[orders]), 0.5 * runs.samples * power / own
+
+
+def bumps_offered(found, left, sizes):
+    rows = [row_of(law, odd) for law, odd in LAWS_OF_BUMPS]
+    weights = bump_weights(*np.array([kind.shape[2:] for kind in BUMPS[:: len(rows)]]).T)
+    pulls = (sizes[rows] @ found.runs.place_means(left)) @ weights.T
+    own = np.multiply.outer((sizes[rows] ** 2).sum(axis=1), (weights**2).sum(axis=1))
+    gain = pulls**2 / own * (found.runs.samples / (found.spread.noise_m2 * PLACES))
+    # What takes χ² off white samples takes noise²·χ² of energy.
+    return gain.T.ravel(), found.spread.noise_m2 * gain.T.ravel()
 
 
 def bump_weights(centre_rad, width_rad):
@@ -261,6 +253,7 @@ def diagnose(survey, seed=1):
     return stated, gain, misfit(found), found
 
 
+# In the order of giotto's list.
 NAMES = [
     *("higher_order_dynamics", "radius_offset", "scale_error", "scale_mismatch", "squareness", "servo_mismatch"),
     *("bandwidth_mismatch", "backlash", "lateral_play", "reversal_spike", "cyclic_error", "straightness", "vibration"),
@@ -268,14 +261,28 @@ NAMES = [
 ]
 
 
+@contextmanager
+def one_blas_thread():
+    """Products here are small: a second thread would be woken for each, spin in between, and save nothing."""
+    libraries = [ctypes.CDLL(str(path)) for path in Path(np.__file__).parents[1].glob("numpy.libs/*openblas64*")]
+    before = [library.scipy_openblas_get_num_threads64_() for library in libraries]
+    for library in libraries:
+        library.scipy_openblas_set_num_threads64_(1)
+    try:
+        yield
+    finally:
+        for library, threads in zip(libraries, before):
+            library.scipy_openblas_set_num_threads64_(threads)
+
+
 def run(data):
     from_file = lambda name: np.fromfile(data[name])
     runs = [from_file(name) for name in ("radius", "feed", "sign", "started")]
-    count = len(runs[0])
-    samples = [from_file(name).reshape(count, -1) for name in ("time", "theta", "deviation")]
-    start = time.perf_counter()
-    stated, gain, _, _ = diagnose(Runs(*runs, *samples))
-    seconds = time.perf_counter() - start
+    samples = [from_file(name).reshape(len(runs[0]), -1) for name in ("time", "theta", "deviation")]
+    with one_blas_thread():
+        start = time.perf_counter()
+        stated, gain, _, _ = diagnose(Runs(*runs, *samples))
+        seconds = time.perf_counter() - start
     value = [gain.percent, *gain.ci95_percent, *gain.folds]
     for finding in stated:
         axis = -1 if finding.axis is None else finding.axis

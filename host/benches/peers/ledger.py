@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from circles import COLUMNS, ORDER_OF, Column
 
-# Scaled pivot below which columns are not independent.
-DEPENDENT = 1e-9
-# Most members of a set.
-MOST = 14
+# Scaled pivot below which columns are not independent; most members of a set.
+DEPENDENT, MOST = 1e-9, 14
+# More than the causes, the patterns and what six rounds may propose need, all of them and those with samples of their own.
+MOST_COLUMNS, MOST_SAMPLED = 192, 64
 # Root mean square below which an explanation is of no interest: share of the noise, and of all that is explained (causes,
 # patterns).
 SMALLEST_OF_NOISE, SMALLEST_OF_EXPLAINED = 0.12, (0.045, 0.07)
@@ -30,7 +30,8 @@ class Item:
 
 
 class Ledger:
-    """Products of columns; column 0 is the data."""
+    """Products of columns; column 0 is the data. A block is the columns of one explanation: their low coordinates
+    (columns × runs × 17), and what they have outside (columns × runs × samples) or nothing."""
 
     def __init__(self, runs, spread, data):
         self.kept, self.noise_m2 = spread.kept(runs.visible), spread.noise_m2
@@ -38,46 +39,40 @@ class Ledger:
         weights = np.stack((self.kept / self.noise_m2, np.broadcast_to(ORDER_OF != 1, self.kept.shape)))
         self.weights = weights[:, :, None]
         self.size = self.slots = 0
-        count, samples = data.outside.shape
-        self.low = np.empty((128, count, COLUMNS))
-        self.outside = np.empty((32, count, samples))
-        self.slot = np.full(128, -1)
-        self.products, self.sums = np.zeros((2, count, 128, 128)), np.zeros((2, 128, 128))
-        self.push(data.low[None], data.outside[None])
+        self.low = np.empty((MOST_COLUMNS, runs.count, COLUMNS))
+        self.outside = np.empty((MOST_SAMPLED, runs.count, runs.samples))
+        # Where the outside of a column is kept; −1: it has none.
+        self.slot = np.full(MOST_COLUMNS, -1)
+        self.products = np.zeros((2, runs.count, MOST_COLUMNS, MOST_COLUMNS))
+        self.sums = np.zeros((2, MOST_COLUMNS, MOST_COLUMNS))
+        self.push([(data.low[None], data.outside[None])])
 
-    def push(self, low, outside=None):
-        """Adds columns (columns × runs × …) and gives their numbers."""
-        at = np.arange(self.size, self.size + len(low))
-        if at[-1] >= len(self.low):
-            more = len(self.low)
-            self.low = np.concatenate((self.low, np.empty_like(self.low)))
-            self.slot = np.concatenate((self.slot, np.full(more, -1)))
-            self.products = np.pad(self.products, ((0, 0), (0, 0), (0, more), (0, more)))
-            self.sums = np.pad(self.sums, ((0, 0), (0, more), (0, more)))
-        self.slot[at] = -1
-        if outside is not None:
-            slots = np.arange(self.slots, self.slots + len(outside))
-            if slots[-1] >= len(self.outside):
-                self.outside = np.concatenate((self.outside, np.empty_like(self.outside)))
-            self.slot[at] = slots
-            self.slots += len(outside)
-        self.size += len(low)
-        self.replace(at, low, outside)
-        return list(at)
+    def push(self, blocks):
+        """Adds blocks and gives the numbers of their columns."""
+        numbers = []
+        for low, outside in blocks:
+            numbers.append(list(range(self.size, self.size + len(low))))
+            self.size += len(low)
+            held = 0 if outside is None else len(low)
+            self.slot[numbers[-1]] = np.arange(self.slots, self.slots + held) if held else -1
+            self.slots += held
+        self.replace(numbers, blocks)
+        return numbers
 
-    def replace(self, at, low, outside=None):
-        """Writes columns and their products with all columns."""
-        at = np.asarray(at)
-        self.low[at] = low
-        own, every = low.swapaxes(0, 1), self.low[: self.size].swapaxes(0, 1)
-        rows = (own * self.weights) @ every.swapaxes(1, 2)
-        if outside is not None:
-            self.outside[self.slot[at]] = outside
+    def replace(self, numbers, blocks):
+        """Writes blocks and their products with all columns."""
+        at = np.concatenate(numbers)
+        self.low[at] = low = np.concatenate([low for low, _ in blocks])
+        every = self.low[: self.size].transpose(1, 2, 0)
+        rows = (low.swapaxes(0, 1) * self.weights) @ every
+        outside = [outside for _, outside in blocks if outside is not None]
+        if outside:
+            own, held = np.flatnonzero(self.slot[at] >= 0), np.flatnonzero(self.slot[: self.size] >= 0)
+            outside = np.concatenate(outside)
+            self.outside[self.slot[at[own]]] = outside
             beyond = outside.swapaxes(0, 1) @ self.outside[: self.slots].transpose(1, 2, 0)
-            held = np.flatnonzero(self.slot[: self.size] >= 0)
             beyond = beyond[:, :, self.slot[held]]
-            rows[0][:, :, held] += beyond / self.noise_m2
-            rows[1][:, :, held] += beyond
+            rows[:, :, own[:, None], held] += np.stack((beyond / self.noise_m2, beyond))
         self.products[:, :, at, : self.size] = rows
         self.products[:, :, : self.size, at] = rows.swapaxes(2, 3)
         rows = rows.sum(axis=1)
@@ -86,8 +81,7 @@ class Ledger:
 
     def truncate(self, size):
         """Takes out all columns from number `size` on."""
-        self.slots = 1 + max(self.slot[:size], default=-1)
-        self.size = size
+        self.size, self.slots = size, 1 + self.slot[:size].max()
 
     def white(self, weights=None):
         """Evidence products, summed over runs with weights."""
@@ -102,8 +96,8 @@ class Ledger:
         return np.tensordot(weights, self.products[metric, :, : self.size, : self.size], 1)
 
     def combine(self, columns, amounts):
-        """Low coordinates and outside (or nothing) of a sum of columns, so many times each."""
-        columns, amounts = np.asarray(columns, int), np.asarray(amounts)
+        """A sum of columns, so many times each: low coordinates, and outside or nothing."""
+        columns, amounts = np.array(columns, int), np.array(amounts)
         low = np.tensordot(amounts, self.low[columns], 1)
         held = self.slot[columns] >= 0
         outside = np.tensordot(amounts[held], self.outside[self.slot[columns[held]]], 1) if held.any() else None
@@ -118,7 +112,7 @@ class Solution:
 
 
 def factor_of(products, columns):
-    """Inverse of the Cholesky factor of the scaled normal matrix, and the scale; nothing where columns are not independent."""
+    """Inverse Cholesky factor of the scaled normal matrix, and the scale; nothing where columns are not independent."""
     gram = products[columns][:, columns]
     own = gram.diagonal()
     if not (own > 0).all():
@@ -142,16 +136,6 @@ def solve(products, columns):
     return Solution(forward @ unscaled, unscaled.T @ unscaled, forward @ forward)
 
 
-def gain_of(products, columns):
-    """What columns take off the sum of squares; nothing where they are not independent."""
-    factor = factor_of(products, columns)
-    if factor is None:
-        return None
-    inverse, scale = factor
-    forward = inverse @ (products[columns, 0] / scale)
-    return forward @ forward
-
-
 def columns_of(nuisance, items, chosen):
     return [*nuisance, *(column for item in chosen for column in items[item].columns)]
 
@@ -172,7 +156,7 @@ class Field:
         size = len(products)
         own = products.diagonal()
         self.gram = np.eye(size + 2)
-        # A column that is nothing in these runs spoils no other: it becomes one that is taken out already.
+        # A column that is nothing in these runs gains nothing.
         scale = np.where(own > 0, 1 / np.sqrt(np.where(own > 0, own, 1)), 0)
         self.gram[:size, :size] = products * scale[:, None] * scale
         self.right = np.append(products[0] * scale, [0, 0])
@@ -215,8 +199,9 @@ class Field:
 
     def pairs(self, bases, one, other):
         """Evidence of each base with each pair of items."""
-        # The second blank, so that two blanks are independent.
-        columns = np.stack((self.first[one], self.second[one], self.first[other], self.second[other] + self.single[other]))
+        # Of two blanks the other one, so that they are independent.
+        blank = self.second[other] + self.single[other]
+        columns = np.stack((self.first[one], self.second[one], self.first[other], blank))
         every, at = np.unique(columns, return_inverse=True)
         at = at.reshape(columns.shape)
         rows = bases.rows[:, :, every]
@@ -241,7 +226,7 @@ def select(products, nuisance, items, start, barred=()):
     # A start that these runs cannot tell apart is no start.
     if factor_of(products, columns_of(nuisance, items, chosen)) is None:
         chosen = []
-        if factor_of(products, list(nuisance)) is None:
+        if factor_of(products, nuisance) is None:
             return chosen, -np.inf
     field = Field(products, items)
     for _ in range(4 * MOST):
@@ -289,7 +274,7 @@ def energies(products, nuisance, items, chosen):
         # What leaving out some columns costs, by their coefficients and covariance.
         left_out = solution.coefficients[own]
         each[k] = left_out @ np.linalg.solve(solution.covariance[own, own], left_out)
-    return each, max(solution.gain - gain_of(products, list(nuisance)), 0)
+    return each, max(solution.gain - solve(products, nuisance).gain, 0)
 
 
 def prune(found, products, samples, share_of_runs, chosen, barred):
@@ -321,18 +306,9 @@ class Found:
         self.solution = self.tangents = None
         self.samples = runs.count * runs.samples
 
-    def add(self, kinds, prices, lows, outsides):
-        """Enters explanations; their places among the items."""
-        first = len(self.items)
-        order = [k for k, out in enumerate(outsides) if out is None], [k for k, out in enumerate(outsides) if out is not None]
-        columns = {}
-        for group, parts in zip(order, (lambda k: None, lambda k: outsides[k])):
-            if group:
-                outside = None if parts(group[0]) is None else np.concatenate([parts(k) for k in group])
-                numbers = iter(self.ledger.push(np.concatenate([lows[k] for k in group]), outside))
-                columns |= {k: [next(numbers) for _ in lows[k]] for k in group}
-        self.items += [Item(kind, columns[k], price) for k, (kind, price) in enumerate(zip(kinds, prices))]
-        return range(first, len(self.items))
+    def add(self, kinds, prices, blocks):
+        """Enters explanations."""
+        self.items += map(Item, kinds, self.ledger.push(blocks), prices)
 
     @property
     def columns(self):

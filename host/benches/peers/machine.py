@@ -7,14 +7,13 @@ import copy
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.signal import lfilter
-
 from circles import Response, fit_lag
 from ledger import columns_of, prune, select, solve
+from scipy.signal import lfilter
 
 RUN_IN_TIME_CONSTANTS, RUN_IN_TURNS = 32.0, 0.75
-# Pieces of a step in which friction turns its sign.
-PIECES = 8
+# Pieces of a step in which friction turns its sign; travel back after which a reversal counts, m.
+PIECES, REVERSAL_TRAVEL_M = 8, 1e-8
 RESAMPLES = 1000
 # Derivatives of a cubic in Hermite form at its start, from position and velocity (in steps) at both ends.
 CUBIC = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [-6, -4, 6, -2], [12, 6, -12, 6]])
@@ -225,15 +224,18 @@ def circles(machines, runs, rows):
     for row in np.flatnonzero(moving):
         p, v = (values[row, first[row] : first[row] + n + 1] for values in (position, velocity))
         drive[row], speed[row] = hermite(p[:-1], v[:-1], p[1:], v[1:], h[row], share[row])
-    error = np.zeros_like(drive)
+    error, sign = np.zeros_like(drive), np.sign(speed)
     if remembers.any():
         at = np.flatnonzero(remembers)
-        memory = Memory(position[at], velocity[at], h[at], share[at], first[at], n)
-        error[at] = memory.play(backlash_m[at], drive[at])
+        memory = Memory(position[at], velocity[at], h[at], share[at], first[at], drive[at])
+        error[at] = memory.play(backlash_m[at])
+        turn_m, late_turn = memory.reversal()
+        sign[at] *= late_turn
         rubbing = [k for k, row in enumerate(at) if friction[row] is not None]
         if rubbing:
-            error[at[rubbing]] += memory.friction(rubbing, [friction[at[k]] for k in rubbing], drive, speed, at)
-    sign = np.sign(speed)
+            rough, own = at[rubbing], [friction[at[k]] for k in rubbing]
+            behind_m = sign[rough] * teeth(own, speed[rough], drive[rough] - turn_m[rubbing])
+            error[rough] -= memory.pulses(rubbing, own) + behind_m
     (x, y), (ex, ey), (vx, vy), (sx, sy) = (np.split(values, 2) for values in (drive, error, speed, sign))
     time_s = runs.started[rows][:, None] + turn_s[:, None] / n * np.arange(n)
     slope, settling = of("thermal_per_s")[:, None], of("thermal_settling_s")[:, None]
@@ -324,9 +326,9 @@ class Motion:
 class Memory:
     """What axes remember of their way, through their turning points."""
 
-    def __init__(self, position, velocity, h, share, first, n):
-        self.position, self.velocity, self.h, self.share, self.first, self.n = position, velocity, h, share, first, n
-        self.window = first[:, None] + np.arange(n)
+    def __init__(self, position, velocity, h, share, first, drive):
+        self.position, self.velocity, self.h, self.share, self.first = position, velocity, h, share, first
+        self.drive, self.window = drive, first[:, None] + np.arange(drive.shape[1])
         # The extreme within a step, or its beginning; the share of the step at which it lies.
         self.extreme = position[:, :-1].copy()
         self.turn = np.full(self.extreme.shape, np.inf)
@@ -340,8 +342,10 @@ class Memory:
         s = np.where((s >= 0) & (s <= 1), s, other)
         self.turn[row, k] = s
         self.extreme[row, k] = p0 + s * (m0 + s * (a + s * b))
+        # Whether the samples lie behind a turning point of their step.
+        self.turned = np.take_along_axis(self.turn, self.window, axis=1) <= share
 
-    def play(self, backlash_m, drive):
+    def play(self, backlash_m):
         """What backlash adds at the samples."""
         gap = 0.5 * np.abs(backlash_m)
         loads = np.empty((self.extreme.shape[1], len(gap)))
@@ -354,44 +358,57 @@ class Memory:
             np.minimum(np.maximum(load, end_low, out=load), end_high, out=load)
         load = np.take_along_axis(loads.T, self.window, axis=1)
         extreme = np.take_along_axis(self.extreme, self.window, axis=1)
-        turned = np.take_along_axis(self.turn, self.window, axis=1) <= self.share
         gap = gap[:, None]
-        load = np.where(turned, np.clip(load, extreme - gap, extreme + gap), load)
-        load = np.clip(load, drive - gap, drive + gap)
-        return (load - drive) * np.where(backlash_m < 0, -1, 1)[:, None]
+        load = np.where(self.turned, np.clip(load, extreme - gap, extreme + gap), load)
+        load = np.clip(load, self.drive - gap, self.drive + gap)
+        return (load - self.drive) * np.where(backlash_m < 0, -1, 1)[:, None]
 
-    def friction(self, rows, friction, drive, speed, at):
-        """What friction adds at the samples: the pulses after reversals, and teeth while the axis is slow."""
-        of = lambda name: np.array([getattr(one, name) for one in friction])
-        drive, speed = drive[at[rows]], speed[at[rows]]
-        rub = Rub(of("presliding_m"), of("decay_s"), of("rise_s"), self.position[rows, 0])
+    def reversal(self):
+        """Where the axis last reversed before each sample, and −1 where it turns but has not come back far enough to count."""
+        turns = np.isfinite(self.turn)
+        number = np.cumsum(turns, axis=1)
+        places = np.zeros((len(turns), number.max() + 2))
+        places[:, 0] = self.position[:, 0]
+        row, k = np.nonzero(turns)
+        places[row, number[row, k]] = self.extreme[row, k]
+        last = np.take_along_axis(number, self.window - 1, axis=1) + self.turned
+        place = np.take_along_axis(places, last, axis=1)
+        close = np.abs(self.drive - place) <= REVERSAL_TRAVEL_M
+        before = np.take_along_axis(places, np.maximum(last - 1, 0), axis=1)
+        return np.where(close, before, place), np.where(close, -1, 1)
+
+    def pulses(self, rows, friction):
+        """What friction takes away at the samples after reversals."""
+        peak_m, decay_s, rise_s, presliding_m = (
+            np.array([getattr(one, name) for one in friction]) for name in ("peak_m", "decay_s", "rise_s", "presliding_m")
+        )
+        rub = Rub(presliding_m, decay_s, rise_s, self.position[rows, 0])
         position, velocity, turn = self.position[rows].T, self.velocity[rows].T, self.turn[rows].T
-        share, h = self.share[rows, 0], self.h[rows]
-        first, answers = self.first[rows], np.empty_like(drive)
-        columns = np.arange(len(rows))
+        share, h, first = self.share[rows, 0], self.h[rows], self.first[rows]
+        answers, columns = np.empty_like(self.drive[rows]), np.arange(len(rows))
         for k in range(len(turn)):
             cubic = position[k], velocity[k], position[k + 1], velocity[k + 1]
             rub.follow(cubic, h, np.zeros_like(share), share, turn[k])
             sample = k - first
-            inside = (sample >= 0) & (sample < self.n)
+            inside = (sample >= 0) & (sample < answers.shape[1])
             answers[columns[inside], sample[inside]] = (rub.answers[0] - rub.answers[1])[inside]
             rub.follow(cubic, h, share, np.ones_like(share), turn[k])
-        rise_s, decay_s = np.minimum(of("rise_s"), 0.95 * of("decay_s")), of("decay_s")
-        sudden = of("rise_s") <= 0
-        rise_s = np.where(sudden, 0.5 * decay_s, rise_s)
+        # Peak of e^{−t/decay} − e^{−t/rise}; 1 where it rises at once.
+        sudden = rise_s <= 0
+        rise_s = np.where(sudden, 0.5, np.minimum(rise_s / decay_s, 0.95)) * decay_s
         peak_s = np.log(decay_s / rise_s) * decay_s * rise_s / (decay_s - rise_s)
         highest = np.where(sudden, 1, np.exp(-peak_s / decay_s) - np.exp(-peak_s / rise_s))
-        pulse = answers * (0.5 * of("peak_m") / highest)[:, None]
-        # The last reversal before each sample.
-        turned = np.isfinite(self.turn[rows])
-        last = np.maximum.accumulate(np.where(turned, np.arange(turned.shape[1]), 0), axis=1)
-        window = self.window[rows]
-        before = np.take_along_axis(last, window - 1, axis=1)
-        here = np.take_along_axis(self.turn[rows], window, axis=1) <= self.share[rows]
-        turn_m = np.take_along_axis(self.extreme[rows], np.where(here, window, before), axis=1)
-        slow = np.exp(-((speed / of("stick_speed_m_s")[:, None]) ** 2))
-        travel = np.abs(drive - turn_m) / of("stick_travel_m")[:, None]
-        return -pulse - np.sign(speed) * of("stick_slip_m")[:, None] * slow * (travel - np.floor(travel))
+        return answers * (0.5 * peak_m / highest)[:, None]
+
+
+def teeth(friction, speed, since_m):
+    """How far axes fall behind while they are slow, so far from their last reversal."""
+    height_m, travel_m, speed_m_s = (
+        np.array([getattr(one, name) for one in friction])[:, None]
+        for name in ("stick_slip_m", "stick_travel_m", "stick_speed_m_s")
+    )
+    travel = np.abs(since_m) / travel_m
+    return height_m * np.exp(-((speed / speed_m_s) ** 2)) * (travel - np.floor(travel))
 
 
 class Rub:

@@ -27,12 +27,12 @@ BINS, FINENESS = 12.0, 4.0
 
 
 class Beside:
-    """What trial columns take off χ² beside some columns of the ledger, over some runs."""
+    """What trial columns take off χ² beside some columns of the ledger, over all runs or those of a part."""
 
-    def __init__(self, found, columns, rows=slice(None)):
+    def __init__(self, found, columns, part=None):
         ledger, base = found.ledger, np.array([0, *columns])
-        self.runs, self.rows, self.noise_m2 = found.runs, rows, ledger.noise_m2
-        self.kept, self.basis = ledger.kept[rows], found.runs.basis[rows].swapaxes(1, 2)
+        rows, self.runs = part or (slice(None), found.runs)
+        self.kept, self.basis, self.noise_m2 = ledger.kept[rows], self.runs.basis.swapaxes(1, 2), ledger.noise_m2
         self.low = (ledger.low[base][:, rows] * self.kept).reshape(len(base), -1)
         self.held = np.flatnonzero(ledger.slot[base] >= 0)
         self.outside = ledger.outside[ledger.slot[base[self.held]]][:, rows].reshape(len(self.held), -1)
@@ -46,13 +46,13 @@ class Beside:
         """White products of trial columns with the base and with each other."""
         known = [waves(Kind(name, axis, shape), self.runs) for shape in shapes]
         if known[0] is not None:
-            low = self.runs.low_of(np.concatenate(known))[:, self.rows]
+            low = self.runs.low_of(np.concatenate(known))
             flat = low.reshape(len(low), -1)
             cross, own = flat @ self.low.T, (low * self.kept).reshape(len(low), -1) @ flat.T
             return cross / self.noise_m2, own / self.noise_m2
-        trial = samples(name, axis, shapes, self.runs, self.rows)
+        trial = samples(name, axis, shapes, self.runs)
         if self.runs.hidden is not None:
-            trial *= ~self.runs.hidden[self.rows]
+            trial *= ~self.runs.hidden
         low = (trial.swapaxes(0, 1) @ self.basis).swapaxes(0, 1)
         # The samples still hold their low orders: what they are multiplied with outside has none.
         trial, flat = trial.reshape(len(low), -1), low.reshape(len(low), -1)
@@ -132,27 +132,24 @@ class Task:
         task.item.fitted_beside = task.columns
         return task
 
-    def best(self, found, scan, whitened):
-        """The best shape; the one it has if there is none that promises anything."""
-        name, axis, runs = self.name, self.axis, found.runs
-        start = self.shape
+    def best(self, found, part, pulls):
+        """The best shape; the one it has if there is none that promises anything. `part`: what to scan on."""
+        name, axis, runs, start = self.name, self.axis, found.runs, self.shape
+        shapes = starting_shapes(name, runs)
         if not self.chosen:
             # A scan of a part of the runs sees that part of the gain.
             share = runs.count / min(SCAN_RUNS, runs.count)
             if name == "cyclic_error":
-                gain, start = scan_pitches(found, whitened(), axis)
+                gain, start = scan_pitches(found, pulls, axis)
             else:
-                shapes = starting_shapes(name, runs)
-                gains = scan(self.columns).gains(name, axis, shapes)
+                gains = part.gains(name, axis, shapes)
                 gain, start = share * gains.max(), shapes[np.argmax(gains)]
             if gain <= PROMISING * self.item.price:
                 return self.shape
         if name == "servo_mismatch":
-            shapes = starting_shapes(name, runs)
             return shapes[np.argmax(Beside(found, self.columns).gains(name, axis, shapes))]
         if name in SMOOTH:
-            return tidy(name, self._climb(found, scan(self.columns), start))
-        part = scan(self.columns)
+            return tidy(name, self._climb(found, part, start))
         shape = simplex(start, 0.15, 40, lambda trials: part.gains(name, axis, trials))
         if self.chosen:
             whole = Beside(found, self.columns)
@@ -178,49 +175,37 @@ class Task:
         return shape
 
 
-
 def settle(found, tasks, shapes):
     """Takes the shapes over."""
-    changed = [(task, shape) for task, shape in zip(tasks, shapes) if shape != task.shape]
-    for task, shape in changed:
-        task.item.kind = Kind(task.name, task.axis, shape)
-    relay(found, [task.item for task, _ in changed])
+    changed = [(task.item, shape) for task, shape in zip(tasks, shapes) if shape != task.shape]
+    for item, shape in changed:
+        item.kind = item.kind._replace(shape=shape)
+    relay(found, [item for item, _ in changed])
 
 
 def relay(found, items):
     """Brings the columns of items up to date."""
-    every = list(zip(items, *columns_over([item.kind for item in items], found.runs)))
-    for beyond in (False, True):
-        group = [one for one in every if (one[2] is not None) == beyond]
-        if group:
-            owners, lows, outsides = zip(*group)
-            at = [column for item in owners for column in item.columns]
-            found.ledger.replace(at, np.concatenate(lows), np.concatenate(outsides) if beyond else None)
+    if items:
+        found.ledger.replace([item.columns for item in items], columns_over([item.kind for item in items], found.runs))
 
 
 def improve(found):
     """Gives every shaped cause its best shape beside the other chosen explanations: those that are chosen one after the
     other, each beside what those before it have become, then all others at once."""
     rows = stratified(found.runs)
+    part = rows, found.runs.take(rows)
     for item in sorted(found.chosen):
         task = Task.of(found, item)
         if task:
-            settle(found, [task], [task.best(found, lambda columns: Beside(found, columns, rows), None)])
+            settle(found, [task], [task.best(found, Beside(found, task.columns, part), None)])
     tasks = [Task.of(found, item) for item in range(len(found.items)) if item not in found.chosen]
     tasks = [task for task in tasks if task]
-    if not tasks:
-        return
-    part = Beside(found, tasks[0].columns, rows)
-    pulls = []
-
-    def whitened():
+    if tasks:
+        beside, ledger = Beside(found, tasks[0].columns, part), found.ledger
         # V⁻¹ times what the chosen explanations leave: its product with a column is that column's pull.
-        if not pulls:
-            left = found.residual()
-            pulls.append(Column(left.low * found.ledger.kept, left.outside).samples(found.runs) / found.ledger.noise_m2)
-        return pulls[0]
-
-    settle(found, tasks, [task.best(found, lambda _: part, whitened) for task in tasks])
+        left = found.residual()
+        pulls = Column(left.low * ledger.kept, left.outside).samples(found.runs) / ledger.noise_m2
+        settle(found, tasks, [task.best(found, beside, pulls) for task in tasks])
 
 
 def stratified(runs):
@@ -232,8 +217,8 @@ def stratified(runs):
 
 
 def scan_pitches(found, pulls, axis):
-    """Gain and pitch of the best periodic error: r = A·cosψ·sin(w·x + φ), x = R·cosψ, is one frequency over x, whatever the
-    radius, so that what pulls at each place, folded into fine bins, holds every pitch in one transform."""
+    """Gain and pitch of the best periodic error. r = A·cosψ·sin(w·x + φ), x = R·cosψ, is one frequency over x, whatever the
+    radius: what pulls at each place, folded into fine bins, holds every pitch in one transform."""
     runs, noise_m2 = found.runs, found.ledger.noise_m2
     finest_per_m = finest_wave_per_m(runs)
     bins_per_m = BINS * finest_per_m
@@ -323,15 +308,12 @@ def lay(found, whole):
     lag = whole and runs.turned.any() and found.lag.se_s > 0
     if not shapes and not lag:
         return None
-    owners = [item for item, *_ in shapes]
     if moved:
-        for item, low, outside in zip(owners, *columns_over(moved, runs)):
-            columns.append(push_tangent(found, [(item, low, outside)], amount))
-    if lag and items:
-        late = runs.turn_to(runs.lag + LAG_STEP_S * runs.omega)
-        columns.append(push_tangent(found, list(zip(items, *columns_over([item.kind for item in items], late))), amount))
-    elif lag:
-        columns += ledger.push(np.zeros((1, *ledger.low.shape[1:])))
+        for (item, *_), block in zip(shapes, columns_over(moved, runs)):
+            columns.append(push_tangent(found, [item], [block], amount))
+    if lag:
+        late = columns_over([item.kind for item in items], runs.turn_to(runs.lag + LAG_STEP_S * runs.omega))
+        columns.append(push_tangent(found, items, late, amount))
     products = ledger.white()
     at = np.array(columns[len(columns) - len(shapes) - lag :])
     for column, prior in zip(at, priors):
@@ -345,16 +327,16 @@ def lay(found, whole):
     return solution and Tangents(shapes, lag, columns, solution)
 
 
-def push_tangent(found, moved, amount):
-    """The column of what explanations do as moved, beyond what they do now, at their present amounts."""
-    now = [column for item, *_ in moved for column in item.columns]
+def push_tangent(found, items, moved, amount):
+    """The column of what items do as moved, beyond what they do now, at their present amounts."""
+    now = [column for item in items for column in item.columns]
     low, outside = found.ledger.combine(now, [-amount[column] for column in now])
-    for item, lows, outsides in moved:
+    for item, (lows, outsides) in zip(items, moved):
         amounts = [amount[column] for column in item.columns]
         low += np.tensordot(amounts, lows, 1)
         if outsides is not None:
             outside += np.tensordot(amounts, outsides, 1)
-    return found.ledger.push(low[None], None if outside is None else outside[None])[0]
+    return found.ledger.push([(low[None], None if outside is None else outside[None])])[0][0]
 
 
 def polish(found):

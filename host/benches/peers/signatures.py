@@ -9,14 +9,13 @@ import numpy as np
 from circles import ORDERS
 
 BOTH, WHOLE_MACHINE = (0, 1), (None,)
-# Steps of the tabulated pulse of a reversal.
-STEPS = 300
+# Steps of the tabulated pulse of a reversal, and the decay a step up to which e^{decay·steps} does not overflow.
+STEPS, GENTLE = 300, 2.0
 # Price of one listed column; further prices of a second column and of a pattern.
 PRICE, PRICE_OF_PHASE, PRICE_OF_PATTERN = 14.0, 5.0, 14.0
 # f^a·R^b about 0.3 m/s and 0.15 m.
 LAWS = [(0, 0), (1, 0), (2, -1), (0, 1), (0, 2), (2, 0), (1, -1), (1, 1)]
 LAWS_OF_BUMPS = [(law, odd) for law in ((0, 0), (1, 0), (0, 1)) for odd in (False, True)]
-BUMPS = [(2 * np.pi * k / n, np.radians(width)) for n, width in ((72, 3.0), (36, 8.0), (18, 16.0)) for k in range(n)]
 # Widths of a bump beyond which it is nothing.
 FAR = 9.0
 # Most time constants of a drift to a campaign.
@@ -159,11 +158,11 @@ def waves(kind, runs):
     return out
 
 
-def samples(name, axis, shapes, runs, rows=slice(None)):
-    """Samples of a kind in some runs, for each shape: (shapes × columns) × runs × samples."""
+def samples(name, axis, shapes, runs):
+    """Samples of a kind, for each shape: (shapes × columns) × runs × samples."""
     if name == "backlash":
-        facing = runs.stroke(axis, rows)[1]
-        back_m = runs.radius[rows][:, None] * (1 - facing)
+        facing = runs.stroke(axis)[1]
+        back_m = runs.radius[:, None] * (1 - facing)
         out = np.empty((len(shapes), *facing.shape))
         for (play_m,), column in zip(shapes, out):
             # The play is crossed while the axis comes back by as much.
@@ -171,55 +170,54 @@ def samples(name, axis, shapes, runs, rows=slice(None)):
             np.multiply(facing, 1e-3 * crossed - 0.5e-3, out=column)
         return out
     if name == "lateral_play":
-        return (-0.5e-3 * runs.sign[rows][:, None] * np.abs(runs.direction[1 - axis][rows]))[None]
+        return (-0.5e-3 * runs.sign[:, None] * np.abs(runs.direction[1 - axis]))[None]
     if name == "reversal_spike":
-        return pulses(axis, np.array(shapes), runs, rows)
+        return pulses(axis, np.array(shapes), runs)
     if name == "cyclic_error":
-        along = runs.direction[axis][rows]
+        along = runs.direction[axis]
         out = np.empty((2 * len(shapes), *along.shape))
         scaled = 1e-6 * along
         for k, (pitch_m,) in enumerate(shapes):
-            phase = (2 * np.pi / pitch_m * runs.radius[rows])[:, None] * along
+            phase = (2 * np.pi / pitch_m * runs.radius)[:, None] * along
             np.multiply(scaled, np.sin(phase), out=out[2 * k])
             np.multiply(scaled, np.cos(phase), out=out[2 * k + 1])
         return out
     law, odd, centre_rad, width_rad = shapes[0]
-    size = (1e-6 * law_of(runs, law) * (runs.sign if odd else 1))[rows][:, None]
-    turns = (runs.psi[rows] - centre_rad) / (2 * np.pi)
+    size = (1e-6 * law_of(runs, law) * (runs.sign if odd else 1))[:, None]
+    turns = (runs.psi - centre_rad) / (2 * np.pi)
     off = 2 * np.pi / width_rad * (turns - np.rint(turns))
     return (size * np.where(np.abs(off) < FAR, np.exp(-0.5 * off * off), 0))[None]
 
 
-def pulses(axis, shapes, runs, rows):
+def pulses(axis, shapes, runs):
     """Friction turns over a presliding travel as 1 − 2e^{−x/x0}; the loop answers a step with e^{−t/decay} − e^{−t/rise}."""
-    radius, half_turn_s = runs.radius[rows], runs.half_turn_s[rows]
     decay_s = np.maximum(np.abs(shapes[:, 0]), 1e-4)[:, None]
     rise_s = np.clip(np.abs(shapes[:, 1])[:, None], 1e-5, 0.95 * decay_s)
     presliding_m = np.maximum(np.abs(shapes[:, 2]), 1e-8)[:, None]
     # Time to slide five presliding lengths: x = ½(f²/R)t².
-    slide_s = np.sqrt(10 * presliding_m * radius) / runs.feed[rows]
-    end_s = np.minimum(14 * decay_s + slide_s, half_turn_s)
+    slide_s = np.sqrt(10 * presliding_m * runs.radius) / runs.feed
+    end_s = np.minimum(14 * decay_s + slide_s, runs.half_turn_s)
     step_s = end_s / STEPS
     peak_s = np.log(decay_s / rise_s) * decay_s * rise_s / (decay_s - rise_s)
     peak = np.exp(-peak_s / decay_s) - np.exp(-peak_s / rise_s)
     # Shapes × runs × steps; a change of friction is spread evenly over a step.
-    travel = radius[:, None] * (1 - np.cos((runs.omega[rows] * step_s)[..., None] * np.arange(STEPS + 1)))
-    change = np.diff(1 - 2 * np.exp(-travel / presliding_m[..., None]))
-    overlap = end_s >= half_turn_s
+    travel = (runs.radius / presliding_m)[..., None] * (1 - stepped(1j * runs.omega * step_s, STEPS + 1).real)
+    change = np.diff(-2 * np.exp(-travel))
+    overlap = end_s >= runs.half_turn_s
     table = np.zeros((*step_s.shape, STEPS + 2))
     for way, tau_s in ((1, decay_s), (-1, rise_s)):
         ratio = step_s / tau_s
         keep = np.exp(-ratio)
-        answer = kept_sum((way * 0.5 / peak * (1 - keep) / ratio)[..., None] * change, keep)
+        answer = kept_sum((way * 0.5 / peak * (1 - keep) / ratio)[..., None] * change, ratio)
         table[..., 1:-1] += answer
         if overlap.any():
             # The two pulses before are still dying away, with the other sign and its opposite.
             faded = keep**STEPS
             before = np.where(overlap, (faded - 1) * answer[..., -1], 0)
-            table[..., :-1] += before[..., None] * np.exp(-ratio[..., None] * np.arange(STEPS + 1))
-    share, facing = runs.stroke(axis, rows)
+            table[..., :-1] += before[..., None] * stepped(-ratio, STEPS + 1)
+    share, facing = runs.stroke(axis)
     out = np.zeros((len(shapes), share.size))
-    for values, steps_a_half_turn, column in zip(table.reshape(len(shapes), -1), half_turn_s / step_s, out):
+    for values, steps_a_half_turn, column in zip(table.reshape(len(shapes), -1), runs.half_turn_s / step_s, out):
         steps = (share * steps_a_half_turn[:, None]).ravel()
         # Most of a slow circle lies beyond the pulse.
         within = np.flatnonzero(steps < STEPS)
@@ -233,37 +231,44 @@ def pulses(axis, shapes, runs, rows):
     return out.reshape(len(shapes), *share.shape)
 
 
-def kept_sum(values, keep):
-    """Running sums along the last axis that keep a share of what was before: doubling, not step by step."""
+def stepped(exponent, count):
+    """e^{exponent·k} for k = 0, 1, …, as coarse steps times fine ones."""
+    fine = 1 << (int(np.sqrt(count)) - 1).bit_length()
+    coarse = np.exp(exponent[..., None] * np.arange(0, count, fine))
+    out = coarse[..., :, None] * np.exp(exponent[..., None] * np.arange(fine))[..., None, :]
+    return out.reshape(*exponent.shape, -1)[..., :count]
+
+
+def kept_sum(values, ratio):
+    """Running sums along the last axis in which every step leaves e^{−ratio} of what was before."""
+    if ratio.max() < GENTLE:
+        growth = stepped(ratio, values.shape[-1])
+        return np.cumsum(values * growth, axis=-1) / growth
     width = 1
     while width < values.shape[-1]:
-        values[..., width:] += (keep**width)[..., None] * values[..., :-width]
+        values[..., width:] += np.exp(-width * ratio)[..., None] * values[..., :-width]
         width *= 2
     return values
 
 
 def columns_over(kinds, runs):
-    """Low coordinates of the columns of kinds, columns × runs × 17, and what they have outside, or nothing for each."""
+    """Blocks of kinds for the ledger."""
     known = [waves(kind, runs) for kind in kinds]
-    lows = [None] * len(kinds)
-    outsides = [None] * len(kinds)
-    smooth = [k for k, of in enumerate(known) if of is not None]
-    if smooth:
-        flat = runs.low_of(np.concatenate([known[k] for k in smooth]))
-        ends = np.cumsum([kinds[k].columns for k in smooth])
-        for k, low in zip(smooth, np.split(flat, ends[:-1])):
-            lows[k] = low
-    rest = [k for k, of in enumerate(known) if of is None]
-    if rest:
-        every = np.concatenate([samples(kinds[k].name, kinds[k].axis, [kinds[k].shape], runs) for k in rest])
-        flat, outside = runs.split(every)
-        ends = np.cumsum([kinds[k].columns for k in rest])[:-1]
-        for k, low, out in zip(rest, np.split(flat, ends), np.split(outside, ends)):
-            lows[k], outsides[k] = low, out
-    return lows, outsides
+    few = [of for of in known if of is not None]
+    rest = [samples(*kind[:2], [kind.shape], runs) for kind, of in zip(kinds, known) if of is None]
+    lows = iter(runs.low_of(np.concatenate(few)) if few else ())
+    parts = zip(*runs.split(np.concatenate(rest))) if rest else iter(())
+    blocks = []
+    for kind, of in zip(kinds, known):
+        if of is not None:
+            blocks.append((np.stack([next(lows) for _ in of]), None))
+        else:
+            low, outside = zip(*(next(parts) for _ in range(kind.columns)))
+            blocks.append((np.stack(low), np.stack(outside)))
+    return blocks
 
 
-def size_patterns():
+def _sizes():
     """Patterns of the mean radius that no cause covers."""
     out = []
     for law in LAWS:
@@ -275,14 +280,24 @@ def size_patterns():
     return out + [Kind("time", None, (law, tenth / 10)) for tenth in range(1, 10) for law in ((0, 0), (0, 1))]
 
 
-def harmonic_patterns():
-    """Order, law, parity and frame of the harmonics that no cause covers."""
+def _harmonics():
+    """Order, law, parity and frame (machine or clock) of the harmonics that no cause covers."""
     covered = {(2, (0, 1), False), (2, (2, -1), False), (2, (1, 0), True), (3, (0, 2), False)}
-    return [
-        (order, law, odd, machine)
+    free = [
+        (order, law, odd)
         for order in range(2, ORDERS + 1)
         for law in LAWS
         for odd in (False, True)
         if (order, law, odd) not in covered
-        for machine in (True, False)
     ]
+    return [Kind("harmonic", None, (*pattern, machine)) for pattern in free for machine in (True, False)]
+
+
+SIZES, HARMONICS = _sizes(), _harmonics()
+# Law, parity, centre and width, rad.
+BUMPS = [
+    Kind("bump", None, (law, odd, 2 * np.pi * place / places, np.radians(width_deg)))
+    for places, width_deg in ((72, 3.0), (36, 8.0), (18, 16.0))
+    for place in range(places)
+    for law, odd in LAWS_OF_BUMPS
+]

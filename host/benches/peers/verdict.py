@@ -137,7 +137,8 @@ def joined(findings):
     """One finding where both axes show the same cause of the same size."""
     out = []
     for finding in findings:
-        twin = next((other for other in out if other.cause == finding.cause and None not in (other.axis, finding.axis)), None)
+        same = [other for other in out if other.cause == finding.cause and None not in (other.axis, finding.axis)]
+        twin = same[0] if same else None
         off = abs(twin.value - finding.value) if twin else np.inf
         if twin and (off < 2 * (twin.half + finding.half) or off < 0.1 * abs(twin.value)):
             twin.axis = None
