@@ -17,15 +17,20 @@ from ledger import SMALLEST_OF_EXPLAINED, SMALLEST_OF_NOISE, Found, prune, selec
 from machine import measure_gain
 from ripples import find_teeth, find_tone
 from shapes import finish, improve, polish
-from signatures import BUMPS, CAUSES, HARMONICS, LAWS, LAWS_OF_BUMPS, SIZES, Kind, columns_over, law_of, starting_shapes
+from signatures import BUMPS, CAUSES, HARMONICS, LAWS_AND_PARITIES, SIZES, Kind, columns_over, law_of, starting_shapes
 from verdict import findings, misfit
 
 PASSES, ROUNDS, TONES = 6, 6, 2
 # Change of the response (shares of κ2 and b) and of the lag, s, that does not matter.
 SETTLED, SETTLED_LAG_S = (1e-3, 1e-2), 2e-4
-# How many of the most promising patterns join the search each time.
-PROMISING = 6
-FEWEST_RUNS = 6
+# How many of the most promising patterns join the search each time; fewest runs whose scatter says anything.
+PROMISING, FEWEST_RUNS = 6, 6
+# As tables: order, frame and law of the harmonics, laws of the bumps at each place, and the places.
+ORDERS_FRAMES_LAWS = np.array(
+    [(order, machine, LAWS_AND_PARITIES.index((law, odd))) for _, _, (order, law, odd, machine) in HARMONICS]
+).T
+LAWS_OF_BUMPS = [LAWS_AND_PARITIES.index(kind.shape[:2]) for kind in BUMPS if kind.shape[2:] == BUMPS[0].shape[2:]]
+PLACES_OF_BUMPS = np.array([kind.shape[2:] for kind in BUMPS[:: len(LAWS_OF_BUMPS)]]).T
 
 
 class Seen:
@@ -160,8 +165,7 @@ def enter(found, kinds):
 def propose(found):
     """Looks at what is left of the harmonics and of the places, and lets the best patterns compete."""
     left = found.residual()
-    laws = {law: law_of(found.runs, law) for law in LAWS}
-    sizes = np.array([laws[law] * (found.runs.sign if odd else 1) for law in LAWS for odd in (False, True)])
+    sizes = np.array([law_of(found.runs, law) * (found.runs.sign if odd else 1) for law, odd in LAWS_AND_PARITIES])
     # Of what is left, and also beside each chosen cause as if it were not there: a pattern may describe its data better.
     amount = dict(zip(found.columns, found.solution.coefficients))
     lows = [left.low]
@@ -184,14 +188,8 @@ def propose(found):
         found.add(new, [kind.price() for kind in new], columns_over(new, found.runs))
 
 
-def row_of(law, odd):
-    return 2 * LAWS.index(law) + odd
-
-
 def harmonics_offered(found, low, sizes):
-    runs = found.runs
-    shapes = [kind.shape for kind in HARMONICS]
-    rows, orders, machine = np.array([(row_of(law, odd), order, machine) for order, law, odd, machine in shapes]).T
+    runs, (orders, machine, rows) = found.runs, ORDERS_FRAMES_LAWS
     by_clock = runs.harmonics_of(low)
     pulls = np.stack([sizes @ by_clock, sizes @ (by_clock * runs.ahead.conj())])
     power, own = np.abs(pulls[machine, rows, orders]) ** 2, (sizes**2).sum(axis=1)[rows]
@@ -200,10 +198,9 @@ def harmonics_offered(found, low, sizes):
 
 
 def bumps_offered(found, left, sizes):
-    rows = [row_of(law, odd) for law, odd in LAWS_OF_BUMPS]
-    weights = bump_weights(*np.array([kind.shape[2:] for kind in BUMPS[:: len(rows)]]).T)
-    pulls = (sizes[rows] @ found.runs.place_means(left)) @ weights.T
-    own = np.multiply.outer((sizes[rows] ** 2).sum(axis=1), (weights**2).sum(axis=1))
+    sizes, weights = sizes[LAWS_OF_BUMPS], bump_weights(*PLACES_OF_BUMPS)
+    pulls = (sizes @ found.runs.place_means(left)) @ weights.T
+    own = np.multiply.outer((sizes**2).sum(axis=1), (weights**2).sum(axis=1))
     gain = pulls**2 / own * (found.runs.samples / (found.spread.noise_m2 * PLACES))
     # What takes χ² off white samples takes noise²·χ² of energy.
     return gain.T.ravel(), found.spread.noise_m2 * gain.T.ravel()

@@ -267,13 +267,13 @@ def energies(products, nuisance, items, chosen):
     solution = solve(products, columns_of(nuisance, items, chosen))
     if solution is None:
         return np.zeros(len(chosen)), 0.0
-    each, at = np.empty(len(chosen)), len(nuisance)
-    for k, item in enumerate(chosen):
-        own = slice(at, at + len(items[item].columns))
-        at = own.stop
-        # What leaving out some columns costs, by their coefficients and covariance.
-        left_out = solution.coefficients[own]
-        each[k] = left_out @ np.linalg.solve(solution.covariance[own, own], left_out)
+    # What leaving out columns costs, by their coefficients and covariance.
+    first = len(nuisance) + np.cumsum([0, *(len(items[item].columns) for item in chosen)])[:-1]
+    each = solution.coefficients[first] ** 2 / solution.covariance[first, first]
+    for k in (k for k, item in enumerate(chosen) if len(items[item].columns) > 1):
+        own = slice(first[k], first[k] + 2)
+        pair = solution.coefficients[own]
+        each[k] = pair @ np.linalg.solve(solution.covariance[own, own], pair)
     return each, max(solution.gain - solve(products, nuisance).gain, 0)
 
 

@@ -15,7 +15,7 @@ STEPS, GENTLE = 300, 2.0
 PRICE, PRICE_OF_PHASE, PRICE_OF_PATTERN = 14.0, 5.0, 14.0
 # f^a·R^b about 0.3 m/s and 0.15 m.
 LAWS = [(0, 0), (1, 0), (2, -1), (0, 1), (0, 2), (2, 0), (1, -1), (1, 1)]
-LAWS_OF_BUMPS = [(law, odd) for law in ((0, 0), (1, 0), (0, 1)) for odd in (False, True)]
+LAWS_AND_PARITIES = [(law, odd) for law in LAWS for odd in (False, True)]
 # Widths of a bump beyond which it is nothing.
 FAR = 9.0
 # Most time constants of a drift to a campaign.
@@ -299,5 +299,6 @@ BUMPS = [
     Kind("bump", None, (law, odd, 2 * np.pi * place / places, np.radians(width_deg)))
     for places, width_deg in ((72, 3.0), (36, 8.0), (18, 16.0))
     for place in range(places)
-    for law, odd in LAWS_OF_BUMPS
+    for law in ((0, 0), (1, 0), (0, 1))
+    for odd in (False, True)
 ]
