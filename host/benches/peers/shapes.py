@@ -277,7 +277,8 @@ def simplex(start, first_step, most, scores):
         values = [value for value, _ in points]
         if max(values) - min(values) < CLOSE:
             break
-    return tuple(float(value) for value in max(points, key=lambda point: point[0])[1])
+    # Of points that are equal the last.
+    return tuple(float(value) for value in max(reversed(points), key=lambda point: point[0])[1])
 
 
 @dataclass
