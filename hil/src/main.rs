@@ -61,6 +61,9 @@ enum Command {
         /// One JSON document.
         #[arg(long)]
         json: bool,
+        /// Exit code 5 unless the bar is met.
+        #[arg(long)]
+        check: bool,
     },
     /// Instructions of hot kernels (callgrind) and of the ticks (QEMU), held against the record in host/benches/instructions.toml.
     Instructions {
@@ -104,7 +107,7 @@ fn main() -> ExitCode {
         Command::Run { port, baud, image, worn_flash, json } => {
             run_scenarios(&port, &OpenOptions { image, baud, pace: Pace::Fast }, worn_flash, json)
         }
-        Command::Link { json } => run_link(json),
+        Command::Link { json, check } => run_link(json, check),
         Command::Instructions { record } => return run_instructions(record),
         Command::Rate { json, check } => run_rate(json, check),
         Command::Size { board, signed, json, check } => run_size(&board, signed, json, check),
@@ -199,7 +202,7 @@ fn run_scenarios(
     Ok(if failed == 0 { ExitCode::SUCCESS } else { ExitCode::from(5) })
 }
 
-fn run_link(as_json: bool) -> Result<ExitCode, ControllerError> {
+fn run_link(as_json: bool, check: bool) -> Result<ExitCode, ControllerError> {
     let report = link::measure(&mut |text: &str| eprintln!("{text}"))?;
     if as_json {
         println!("{:#}", report.document());
@@ -211,7 +214,7 @@ fn run_link(as_json: bool) -> Result<ExitCode, ControllerError> {
             link::BAR_PERCENT
         );
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(if check && !report.meets_bar() { ExitCode::from(5) } else { ExitCode::SUCCESS })
 }
 
 fn run_instructions(record: bool) -> ExitCode {

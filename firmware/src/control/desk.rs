@@ -150,6 +150,11 @@ where
         now
     }
 
+    #[inline]
+    fn now(&self) -> u32 {
+        self.shared.now()
+    }
+
     fn install(&mut self, image: Option<&[u8]>) -> Result<(), Refusal> {
         if matches!(self.snapshot().state, MotionState::Running | MotionState::Stopping) {
             return Err(Refusal::Motion(MotionRefusal::Busy));

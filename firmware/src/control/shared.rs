@@ -143,6 +143,17 @@ impl Shared {
         self.tick.store(tick, Relaxed);
     }
 
+    /// Publishes that time has passed and nothing else.
+    pub(super) fn pass(&self, tick: u32) {
+        self.tick.store(tick, Relaxed);
+    }
+
+    /// Ticks since boot.
+    #[inline]
+    pub(super) fn now(&self) -> u32 {
+        self.tick.load(Relaxed)
+    }
+
     /// Counts a set-point that found no room.
     pub(super) fn drop_one(&self) {
         self.dropped.store(self.dropped.load(Relaxed).wrapping_add(1), Relaxed);

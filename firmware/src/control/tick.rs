@@ -102,6 +102,26 @@ where
         output
     }
 
+    /// For who simulates long rests: lets so many ticks pass at once and says so, or does nothing. At rest, with no
+    /// program open, no wish and no set-point waiting, with the correction wholly engaged or disengaged, a tick only
+    /// counts the time, provided that the last two ticks had the same output, which is the caller's to know.
+    pub fn rest(&mut self, count: u32) -> bool {
+        let shared = &self.shared;
+        let wishes = shared.stop.load(Relaxed)
+            || shared.stop_input.load(Relaxed) != self.stop_input
+            || shared.bypass.load(Relaxed) != self.bypass;
+        let state = self.state();
+        let still =
+            matches!(state, MotionState::Idle | MotionState::Fault) && shared.snapshot().state == state;
+        let rests =
+            still && self.jobs.waiting() == 0 && !self.executor.blending() && !self.recording && !wishes;
+        if rests {
+            self.now = self.now.wrapping_add(count);
+            self.shared.pass(self.now);
+        }
+        rests
+    }
+
     #[inline]
     fn wishes(&mut self, late: bool) {
         if late {

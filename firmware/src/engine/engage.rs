@@ -35,6 +35,11 @@ impl Engage {
         self.full
     }
 
+    /// A change is under way.
+    pub(crate) const fn blending(&self) -> bool {
+        self.blending
+    }
+
     /// Asks for on or off. A blend under way is finished first: turning it round would be a step in velocity.
     pub(crate) fn set(&mut self, on: bool) {
         self.wanted = on;

@@ -179,7 +179,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
 
     /// Looks whether the link is still alive; to be called again and again.
     pub fn supervise(&mut self) {
-        if self.supervision.dead(&self.motion.snapshot()) {
+        if self.supervision.silent(self.motion.now()) && self.supervision.dead(self.motion.snapshot().state) {
             self.motion.hold();
         }
     }
@@ -194,7 +194,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
                 return None;
             }
         };
-        self.supervision.heard(self.motion.snapshot().tick);
+        self.supervision.heard(self.motion.now());
         let opens = matches!(command, Ok(Command::Hello));
         match self.session.turn(head, opens) {
             Turn::Repeated => {}

@@ -60,6 +60,9 @@ pub trait Motion {
     /// State, position and counts.
     fn snapshot(&self) -> Snapshot;
 
+    /// Ticks since boot, as in the snapshot.
+    fn now(&self) -> u32;
+
     /// Corrects with the table of this image from the next program on; `None`: no correction.
     ///
     /// # Errors

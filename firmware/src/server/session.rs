@@ -1,4 +1,5 @@
-//! Whose turn it is: new requests, repeated ones, and those that come too late.
+//! Whose turn it is: new requests, repeated ones, and those that come too late. Numbers may be left out: a host that has
+//! several requests on their way sends what was lost of them under new ones.
 use giotto_shared::wire::{self, Command, FromController, MAX_FRAME, Reply};
 
 /// Session and sequence number of a request.

@@ -1,6 +1,5 @@
 //! Whether the host is still there. A run outlives its host by one segment at most: if nothing was heard for a while,
 //! the segment in hand finishes and nothing else starts.
-use super::Snapshot;
 use giotto_shared::wire::{MotionState, SUPERVISE_MS};
 
 /// When the host was heard, and how long it may be silent.
@@ -36,11 +35,15 @@ impl Supervision {
         self.dead = false;
     }
 
-    /// Whether the link has died since it was last asked; only what runs can be left alone.
-    pub(super) fn dead(&mut self, now: &Snapshot) -> bool {
-        let silent = now.tick.wrapping_sub(self.heard_at);
-        let runs = matches!(now.state, MotionState::Running);
-        if !runs || self.dead || self.allowed == 0 || silent < self.allowed {
+    /// Whether the host has been silent for too long, and that has not been dealt with.
+    #[inline]
+    pub(super) const fn silent(&self, now: u32) -> bool {
+        !self.dead && self.allowed > 0 && now.wrapping_sub(self.heard_at) >= self.allowed
+    }
+
+    /// Whether the link has died, now that the host has been silent: only what runs can be left alone.
+    pub(super) const fn dead(&mut self, state: MotionState) -> bool {
+        if !matches!(state, MotionState::Running) {
             return false;
         }
         self.dead = true;

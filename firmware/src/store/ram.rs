@@ -50,6 +50,12 @@ impl<const N: usize, const ERASE: usize> RamFlash<N, ERASE> {
         self.bytes.iter().skip(at as usize).take(WORD).all(|&cell| cell == 0xff)
     }
 
+    fn cells(&mut self, offset: u32, count: usize) -> Result<&mut [u8], RamFlashError> {
+        let offset = offset as usize;
+        let cells = self.bytes.get_mut(offset..).and_then(|cells| cells.get_mut(..count));
+        cells.ok_or(RamFlashError::Range(NorFlashErrorKind::OutOfBounds))
+    }
+
     /// The cells, to look at or to damage.
     pub const fn bytes_mut(&mut self) -> &mut [u8; N] {
         &mut self.bytes
@@ -65,10 +71,7 @@ impl<const N: usize, const ERASE: usize> ReadNorFlash for RamFlash<N, ERASE> {
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Self::Error> {
         check_read(self, offset, bytes.len()).map_err(RamFlashError::Range)?;
-        let cells = self.bytes.iter().skip(offset as usize);
-        for (to, from) in bytes.iter_mut().zip(cells) {
-            *to = *from;
-        }
+        bytes.copy_from_slice(self.cells(offset, bytes.len())?);
         Ok(())
     }
 
@@ -83,22 +86,17 @@ impl<const N: usize, const ERASE: usize> NorFlash for RamFlash<N, ERASE> {
 
     fn erase(&mut self, from: u32, to: u32) -> Result<(), Self::Error> {
         check_erase(self, from, to).map_err(RamFlashError::Range)?;
-        let count = (to - from) as usize;
-        self.bytes.iter_mut().skip(from as usize).take(count).for_each(|cell| *cell = 0xff);
+        self.cells(from, (to - from) as usize)?.fill(0xff);
         Ok(())
     }
 
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Self::Error> {
         check_write(self, offset, bytes.len()).map_err(RamFlashError::Range)?;
-        for at in (offset..).step_by(WORD).take(bytes.len() / WORD) {
-            if !self.is_blank(at) {
-                return Err(RamFlashError::NotBlank { at });
-            }
+        let cells = self.cells(offset, bytes.len())?;
+        if let Some(word) = cells.chunks(WORD).position(|word| word.iter().any(|&cell| cell != 0xff)) {
+            return Err(RamFlashError::NotBlank { at: offset + (word * WORD) as u32 });
         }
-        let cells = self.bytes.iter_mut().skip(offset as usize);
-        for (cell, byte) in cells.zip(bytes) {
-            *cell = *byte;
-        }
+        cells.copy_from_slice(bytes);
         Ok(())
     }
 }

@@ -3,7 +3,7 @@
 //! The play is crossed while the axis turns round, in an angle √(2B/R); the shape parameter `play_m` (|B|) gives
 //! the signature that ramp: after the reversal the output stands still until the input has come back by B.
 use super::view::axes_of;
-use super::{Cause, CauseModel, EACH_AXIS, Effect, RunView, Words};
+use super::{Cause, CauseModel, EACH_AXIS, Effect, RunView, Stroke, Words};
 use crate::simulation::machine::Machine;
 use giotto_shared::Axis;
 use giotto_shared::term::Term;
@@ -46,15 +46,10 @@ impl CauseModel for Backlash {
 
     fn signature(&self, axis: Option<Axis>, shape: &[f64], _column: usize, view: &RunView, out: &mut [f64]) {
         let play_m = shape.first().copied().unwrap_or(0.0);
-        // For Y turn the circle by −90°: its reversals lie where those of X would.
-        let (at, quarter) = if axis == Some(Axis::Y) { (1, std::f64::consts::FRAC_PI_2) } else { (0, 0.0) };
-        for ((out, psi), direction) in out.iter_mut().zip(&view.psi_rad).zip(&view.direction) {
-            let (_, side) = view.since_reversal(*psi, quarter);
-            // cos u, u the angle since the reversal in the direction of travel, 0…π.
-            let cos = side * direction[at];
-            let back_m = view.radius_m * (1.0 - cos);
+        for (out, Stroke { facing, .. }) in out.iter_mut().zip(view.strokes_of(axis)) {
+            let back_m = view.radius_m * (1.0 - facing);
             let crossed = if play_m > 0.0 { (back_m / play_m).min(1.0) } else { 1.0 };
-            *out = 0.5e-3 * cos * (2.0 * crossed - 1.0);
+            *out = 0.5e-3 * facing * (2.0 * crossed - 1.0);
         }
     }
 

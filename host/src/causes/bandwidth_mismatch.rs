@@ -1,5 +1,5 @@
 //! Unequal second cumulants: `r = −(Δκ2/4)(f²/R)·|G|·cos2ψ`, the same both ways: a filter before or behind the servo.
-use super::{Cause, CauseModel, Effect, RunView, Words};
+use super::{Cause, CauseModel, Effect, Harmonics, RunView, Words};
 use crate::simulation::machine::Machine;
 use giotto_shared::Axis;
 use giotto_shared::term::Term;
@@ -28,18 +28,9 @@ impl CauseModel for BandwidthMismatch {
         &WORDS
     }
 
-    fn signature(
-        &self,
-        _axis: Option<Axis>,
-        _shape: &[f64],
-        _column: usize,
-        view: &RunView,
-        out: &mut [f64],
-    ) {
+    fn harmonics(&self, _axis: Option<Axis>, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
         let size = -0.25 * view.radius_m * view.omega_rad_s.powi(2) * view.gain;
-        for (out, psi) in out.iter_mut().zip(&view.psi_rad) {
-            *out = size * (2.0 * psi).cos();
-        }
+        Some(Harmonics::wave(2, [size, 0.0]))
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {

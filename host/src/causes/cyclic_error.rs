@@ -5,6 +5,7 @@ use crate::simulation::machine::Cyclic;
 use crate::simulation::machine::Machine;
 use giotto_shared::Axis;
 use giotto_shared::term::Term;
+use wide::f64x4;
 
 /// See the module.
 pub struct CyclicError;
@@ -69,9 +70,26 @@ impl CauseModel for CyclicError {
         let Some(pitch_m) = shape.first() else { return };
         let wave = std::f64::consts::TAU * view.radius_m / pitch_m;
         let at = usize::from(axis == Some(Axis::Y));
-        for (out, direction) in out.iter_mut().zip(&view.direction) {
+        for (out, direction) in out.iter_mut().zip(view.direction.iter()) {
             let along = direction[at];
             *out = 1e-6 * along * if column == 0 { (wave * along).sin() } else { (wave * along).cos() };
+        }
+    }
+
+    /// Sine and cosine together, four samples at a time.
+    fn signatures(&self, axis: Option<Axis>, shape: &[f64], view: &RunView, out: &mut [&mut [f64]]) {
+        let (Some(pitch_m), [sines, cosines]) = (shape.first(), out) else { return };
+        let wave = std::f64::consts::TAU * view.radius_m / pitch_m;
+        let at = usize::from(axis == Some(Axis::Y));
+        let outs = sines.chunks_mut(4).zip(cosines.chunks_mut(4));
+        for ((sines, cosines), part) in outs.zip(view.direction.chunks(4)) {
+            let along =
+                f64x4::from(std::array::from_fn(|k| part.get(k).map_or(0.0, |direction| direction[at])));
+            let (sin, cos) = (along * wave).sin_cos();
+            let scaled = along * 1e-6;
+            for (k, (sine, cosine)) in sines.iter_mut().zip(cosines).enumerate() {
+                (*sine, *cosine) = ((scaled * sin).as_array()[k], (scaled * cos).as_array()[k]);
+            }
         }
     }
 

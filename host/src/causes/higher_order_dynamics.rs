@@ -2,7 +2,7 @@
 //!
 //! (R/Rm)² = 1 + κ2 ω² + b ω⁴ is exact for a lag (b = 0) and for a second-order response (b = 1/ωn⁴), so the
 //! signature is taken there; the value is β2 beyond the lag's own 3κ2²/8: −b/2.
-use super::{Cause, CauseModel, Effect, RunView, Words};
+use super::{Cause, CauseModel, Effect, Harmonics, RunView, Words};
 use crate::simulation::machine::Machine;
 use giotto_shared::Axis;
 
@@ -30,16 +30,9 @@ impl CauseModel for HigherOrderDynamics {
         &WORDS
     }
 
-    fn signature(
-        &self,
-        _axis: Option<Axis>,
-        _shape: &[f64],
-        _column: usize,
-        view: &RunView,
-        out: &mut [f64],
-    ) {
+    fn harmonics(&self, _axis: Option<Axis>, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
         let (r, w) = (view.radius_m, view.omega_rad_s);
-        out.fill(r * w.powi(4) * view.gain.powi(3));
+        Some(Harmonics::mean(r * w.powi(4) * view.gain.powi(3)))
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {

@@ -1,5 +1,5 @@
 //! Serial arm whose joints lag unequally: mean `r = −½·f·d·(A12 − A21)`, A = J·diag(τ)·J⁻¹.
-use super::{Cause, CauseModel, Effect, RunView, Words};
+use super::{Cause, CauseModel, Effect, Harmonics, RunView, Words};
 use crate::simulation::machine::Machine;
 use giotto_shared::Axis;
 
@@ -27,15 +27,8 @@ impl CauseModel for JointLagMismatch {
         &WORDS
     }
 
-    fn signature(
-        &self,
-        _axis: Option<Axis>,
-        _shape: &[f64],
-        _column: usize,
-        view: &RunView,
-        out: &mut [f64],
-    ) {
-        out.fill(-0.5 * view.feed_m_s * view.sign);
+    fn harmonics(&self, _axis: Option<Axis>, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
+        Some(Harmonics::mean(-0.5 * view.feed_m_s * view.sign))
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {

@@ -35,9 +35,9 @@ impl CauseModel for LateralPlay {
     }
 
     fn signature(&self, axis: Option<Axis>, _shape: &[f64], _column: usize, view: &RunView, out: &mut [f64]) {
-        for (out, psi) in out.iter_mut().zip(&view.psi_rad) {
-            let side = if axis == Some(Axis::Y) { psi.cos() } else { psi.sin() };
-            *out = -0.5e-3 * view.sign * side.abs();
+        let side = usize::from(axis != Some(Axis::Y));
+        for (out, direction) in out.iter_mut().zip(view.direction.iter()) {
+            *out = -0.5e-3 * view.sign * direction[side].abs();
         }
     }
 

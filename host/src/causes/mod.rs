@@ -6,6 +6,7 @@ mod backlash;
 mod bandwidth_mismatch;
 pub mod cyclic_error;
 mod feed_clamp;
+mod harmonics;
 mod higher_order_dynamics;
 mod interpolation_chord;
 mod joint_lag_mismatch;
@@ -24,7 +25,8 @@ mod vibration;
 mod view;
 mod words;
 
-pub use view::RunView;
+pub use harmonics::{Harmonics, ORDERS};
+pub use view::{RunView, Stroke};
 pub use words::Words;
 
 use crate::simulation::machine::Machine;
@@ -192,15 +194,24 @@ pub trait CauseModel: Sync {
         1
     }
 
+    /// A signature that is nothing but a mean and a few waves of ψ, m per unit of the contract's value.
+    fn harmonics(&self, _axis: Option<Axis>, _shape: &[f64], _view: &RunView) -> Option<Harmonics> {
+        None
+    }
+
     /// Radial deviation in m per unit of the contract's value, at each sample of the run.
-    fn signature(
-        &self,
-        _axis: Option<Axis>,
-        _shape: &[f64],
-        _column: usize,
-        _view: &RunView,
-        _out: &mut [f64],
-    ) {
+    fn signature(&self, axis: Option<Axis>, shape: &[f64], _column: usize, view: &RunView, out: &mut [f64]) {
+        let waves = self.harmonics(axis, shape, view).unwrap_or_default();
+        for (out, psi) in out.iter_mut().zip(view.psi_rad.iter()) {
+            *out = waves.at(*psi);
+        }
+    }
+
+    /// All its columns in one go.
+    fn signatures(&self, axis: Option<Axis>, shape: &[f64], view: &RunView, out: &mut [&mut [f64]]) {
+        for (column, out) in out.iter_mut().enumerate() {
+            self.signature(axis, shape, column, view, out);
+        }
     }
 
     /// Standard error of the closed form itself, as a share of the value: a perfect measurement would still be

@@ -1,5 +1,5 @@
 //! A constant error of the radius: `r = offset`.
-use super::{Cause, CauseModel, Effect, RunView, Words};
+use super::{Cause, CauseModel, Effect, Harmonics, RunView, Words};
 use crate::simulation::machine::Machine;
 use giotto_shared::Axis;
 use giotto_shared::term::Term;
@@ -28,16 +28,8 @@ impl CauseModel for RadiusOffset {
         &WORDS
     }
 
-    fn signature(
-        &self,
-        _axis: Option<Axis>,
-        _shape: &[f64],
-        _column: usize,
-        view: &RunView,
-        out: &mut [f64],
-    ) {
-        debug_assert_eq!(view.psi_rad.len(), out.len());
-        out.fill(1e-3);
+    fn harmonics(&self, _axis: Option<Axis>, _shape: &[f64], _view: &RunView) -> Option<Harmonics> {
+        Some(Harmonics::mean(1e-3))
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {

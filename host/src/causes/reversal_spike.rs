@@ -65,14 +65,10 @@ impl CauseModel for ReversalSpike {
     fn signature(&self, axis: Option<Axis>, shape: &[f64], _column: usize, view: &RunView, out: &mut [f64]) {
         let &[decay_s, rise_s, presliding_m] = shape else { return };
         let pulse = Pulse::new(decay_s, rise_s, presliding_m, view);
-        let half_turn_s = view.half_turn_s();
-        let at = usize::from(axis == Some(Axis::Y));
-        let quarter = if at == 1 { std::f64::consts::FRAC_PI_2 } else { 0.0 };
-        for ((out, psi), direction) in out.iter_mut().zip(&view.psi_rad).zip(&view.direction) {
-            let (share, side) = view.since_reversal(*psi, quarter);
+        let steps_a_half_turn = view.half_turn_s() / pulse.step_s;
+        for (out, stroke) in out.iter_mut().zip(view.strokes_of(axis)) {
             // Against the new direction of travel, seen along the radius.
-            let facing = side * direction[at];
-            *out = 1e-6 * facing * pulse.at(share * half_turn_s);
+            *out = 1e-6 * stroke.facing * pulse.after(stroke.share * steps_a_half_turn);
         }
     }
 
@@ -103,6 +99,8 @@ impl CauseModel for ReversalSpike {
 
 /// Steps of the tabulated pulse.
 const STEPS: usize = 300;
+/// Presliding lengths after which the friction has turned to the last bit.
+const SLID: f64 = 38.0;
 
 /// The pulse after a reversal of one run, tabulated; it changes sign from one reversal to the next.
 struct Pulse {
@@ -127,9 +125,15 @@ impl Pulse {
         let take = [decay_s, rise_s].map(|tau| tau / step_s * (1.0 - (-step_s / tau).exp()));
         let mut friction_steps = [0.0; STEPS];
         let mut before = -1.0;
-        for (k, slot) in friction_steps.iter_mut().enumerate() {
-            let t = step_s * (k + 1) as f64;
-            let travel = view.radius_m * (1.0 - (view.omega_rad_s * t).cos());
+        let (turn_sin, turn_cos) = (view.omega_rad_s * step_s).sin_cos();
+        let (mut sin, mut cos) = (0.0, 1.0);
+        for slot in &mut friction_steps {
+            (cos, sin) = (cos * turn_cos - sin * turn_sin, sin * turn_cos + cos * turn_sin);
+            let travel = view.radius_m * (1.0 - cos);
+            if travel > SLID * presliding_m {
+                *slot = 1.0 - before;
+                break;
+            }
             let friction = 1.0 - 2.0 * (-travel / presliding_m).exp();
             *slot = friction - before;
             before = friction;
@@ -151,14 +155,12 @@ impl Pulse {
         Self { step_s, values }
     }
 
-    /// Value `t` s after the reversal, linear in between; the error is below 1 % of the peak.
-    fn at(&self, t: f64) -> f64 {
-        let place = t / self.step_s;
-        let k = place as usize;
-        if k >= STEPS {
-            return 0.0;
+    /// Value so many steps after the reversal, linear in between; the error is below 1 % of the peak.
+    fn after(&self, steps: f64) -> f64 {
+        let k = steps as usize;
+        match self.values.get(k..k + 2) {
+            Some([this, next]) => this + (steps - k as f64) * (next - this),
+            _ => 0.0,
         }
-        let share = place - k as f64;
-        self.values[k] + share * (self.values[k + 1] - self.values[k])
     }
 }

@@ -1,5 +1,5 @@
 //! Both axes long by the same share: `r = R·s`.
-use super::{Cause, CauseModel, Effect, RunView, Words};
+use super::{Cause, CauseModel, Effect, Harmonics, RunView, Words};
 use crate::simulation::machine::Machine;
 use giotto_shared::Axis;
 use giotto_shared::term::Term;
@@ -28,15 +28,8 @@ impl CauseModel for ScaleError {
         &WORDS
     }
 
-    fn signature(
-        &self,
-        _axis: Option<Axis>,
-        _shape: &[f64],
-        _column: usize,
-        view: &RunView,
-        out: &mut [f64],
-    ) {
-        out.fill(1e-6 * view.radius_m);
+    fn harmonics(&self, _axis: Option<Axis>, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
+        Some(Harmonics::mean(1e-6 * view.radius_m))
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {

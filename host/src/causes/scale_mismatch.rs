@@ -1,5 +1,5 @@
 //! X longer than Y: `r = ½R(sx − sy)cos2ψ`, the same both ways.
-use super::{Cause, CauseModel, Effect, RunView, Words};
+use super::{Cause, CauseModel, Effect, Harmonics, RunView, Words};
 use crate::simulation::machine::Machine;
 use giotto_shared::Axis;
 use giotto_shared::term::Term;
@@ -28,17 +28,8 @@ impl CauseModel for ScaleMismatch {
         &WORDS
     }
 
-    fn signature(
-        &self,
-        _axis: Option<Axis>,
-        _shape: &[f64],
-        _column: usize,
-        view: &RunView,
-        out: &mut [f64],
-    ) {
-        for (out, psi) in out.iter_mut().zip(&view.psi_rad) {
-            *out = 0.5e-6 * view.radius_m * (2.0 * psi).cos();
-        }
+    fn harmonics(&self, _axis: Option<Axis>, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
+        Some(Harmonics::wave(2, [0.5e-6 * view.radius_m, 0.0]))
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {

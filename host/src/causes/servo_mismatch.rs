@@ -3,7 +3,7 @@
 //! With loops of unequal gain the response differs by −jωΔτ·G², so that the oval is turned by the lag φ once
 //! more and shrunk by |G|²: `d·½fΔτ|G|²·sin(2ψ − dφ)`. With unequal dead times it is not. The shape parameter
 //! `turned` (1 or 0) is that choice.
-use super::{Bend, Cause, CauseModel, Effect, RunView, Words};
+use super::{Bend, Cause, CauseModel, Effect, Harmonics, RunView, Words};
 use crate::simulation::machine::Machine;
 use giotto_shared::Axis;
 use giotto_shared::term::Term;
@@ -44,13 +44,12 @@ impl CauseModel for ServoMismatch {
         Bend::Choice(1.0 - turned)
     }
 
-    fn signature(&self, _axis: Option<Axis>, shape: &[f64], _column: usize, view: &RunView, out: &mut [f64]) {
+    fn harmonics(&self, _axis: Option<Axis>, shape: &[f64], view: &RunView) -> Option<Harmonics> {
         let turned = shape.first().copied().unwrap_or(1.0);
-        let turn = turned * view.sign * view.lag_rad;
         let size = 0.5 * view.sign * view.feed_m_s * (1.0 + turned * (view.gain * view.gain - 1.0));
-        for (out, psi) in out.iter_mut().zip(&view.psi_rad) {
-            *out = size * (2.0 * psi - turn).sin();
-        }
+        // sin(2ψ − turn)
+        let (sin, cos) = (turned * view.sign * view.lag_rad).sin_cos();
+        Some(Harmonics::wave(2, [-size * sin, size * cos]))
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {

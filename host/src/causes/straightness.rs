@@ -1,7 +1,7 @@
 //! A bowed guide: moving along the axis shifts the other one by c·u². For X `r = (S/4)(sinψ + sin3ψ)`, for Y
 //! `r = (S/4)(cosψ − cos3ψ)`, S = cR². The value is the bow S over the largest circle measured.
 use super::view::axes_of;
-use super::{Cause, CauseModel, EACH_AXIS, Effect, RunView, Words};
+use super::{Cause, CauseModel, EACH_AXIS, Effect, Harmonics, RunView, Words};
 use crate::simulation::machine::Machine;
 use giotto_shared::Axis;
 use giotto_shared::term::Term;
@@ -34,12 +34,13 @@ impl CauseModel for Straightness {
         EACH_AXIS
     }
 
-    fn signature(&self, axis: Option<Axis>, _shape: &[f64], _column: usize, view: &RunView, out: &mut [f64]) {
-        let bow = 1e-6 * (view.radius_m / view.largest_radius_m).powi(2);
-        for (out, psi) in out.iter_mut().zip(&view.psi_rad) {
-            let (sin, cos) = psi.sin_cos();
-            *out = bow * if axis == Some(Axis::Y) { sin * sin * cos } else { cos * cos * sin };
-        }
+    fn harmonics(&self, axis: Option<Axis>, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
+        // cos²ψ·sinψ and sin²ψ·cosψ.
+        let bow = 0.25e-6 * (view.radius_m / view.largest_radius_m).powi(2);
+        Some(match axis {
+            Some(Axis::Y) => Harmonics::wave(1, [bow, 0.0]).with(3, [-bow, 0.0]),
+            _ => Harmonics::wave(1, [0.0, bow]).with(3, [0.0, bow]),
+        })
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {

@@ -1,6 +1,6 @@
 //! Growth with campaign time: `r = R·α·ΔT(t)`, `ΔT` linear in time (shape `curvature` 0) or
 //! settling: `(1 − e^{−ct})/(1 − e^{−c})`, `c` the campaign in time constants.
-use super::{Bend, Cause, CauseModel, Effect, RunView, Words};
+use super::{Bend, Cause, CauseModel, Effect, Harmonics, RunView, Words};
 use crate::simulation::machine::Machine;
 use giotto_shared::Axis;
 
@@ -46,8 +46,9 @@ impl CauseModel for ThermalDrift {
         shape.iter_mut().for_each(|value| *value = value.clamp(0.0, SETTLED));
     }
 
-    fn signature(&self, _axis: Option<Axis>, shape: &[f64], _column: usize, view: &RunView, out: &mut [f64]) {
-        out.fill(1e-6 * view.radius_m * growth(shape.first().copied().unwrap_or(0.0), view.elapsed));
+    fn harmonics(&self, _axis: Option<Axis>, shape: &[f64], view: &RunView) -> Option<Harmonics> {
+        let growth = growth(shape.first().copied().unwrap_or(0.0), view.elapsed);
+        Some(Harmonics::mean(1e-6 * view.radius_m * growth))
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {

@@ -1,8 +1,18 @@
 //! What a signature may know of a run: where the machine was at each sample, not what was measured.
 use super::Effect;
 use giotto_shared::Axis;
+use std::sync::Arc;
 
-/// The motion of one run, sample by sample.
+/// Between two reversals of an axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stroke {
+    /// Share of the half turn since the last reversal, 0…1.
+    pub share: f64,
+    /// Cosine of the angle since then: the direction cosine of the axis, positive where it has just turned.
+    pub facing: f64,
+}
+
+/// The motion of one run, sample by sample. Samples are shared: a copy costs nothing.
 #[derive(Clone, Debug)]
 pub struct RunView {
     /// Programmed radius R, m.
@@ -20,11 +30,13 @@ pub struct RunView {
     /// Largest radius of the campaign, m.
     pub largest_radius_m: f64,
     /// Polar angle of the machine ψ = θ − d·φ(ω) at each sample, rad: the lag of the servo removed.
-    pub psi_rad: Vec<f64>,
+    pub psi_rad: Arc<[f64]>,
     /// cosψ and sinψ at each sample.
-    pub direction: Vec<[f64; 2]>,
+    pub direction: Arc<[[f64; 2]]>,
+    /// Of X and Y: where each sample stands between the axis' reversals.
+    pub strokes: [Arc<[Stroke]>; 2],
     /// Time since the first sample, s.
-    pub time_s: Vec<f64>,
+    pub time_s: Arc<[f64]>,
     /// Gain |G(jω)| of the baseline.
     pub gain: f64,
     /// Phase lag φ(ω) of the servo, rad, ≥ 0.
@@ -33,19 +45,34 @@ pub struct RunView {
 
 impl RunView {
     /// Sets the machine angle and what follows from it.
-    pub fn place(&mut self, psi_rad: Vec<f64>) {
-        self.direction = psi_rad.iter().map(|psi| [psi.cos(), psi.sin()]).collect();
+    pub fn place(&mut self, psi_rad: Arc<[f64]>) {
+        self.direction = psi_rad
+            .iter()
+            .map(|psi| {
+                let (sin, cos) = psi.sin_cos();
+                [cos, sin]
+            })
+            .collect();
+        self.strokes = [(0, 0.0), (1, std::f64::consts::FRAC_PI_2)].map(|(axis, first_rad)| {
+            let strokes = psi_rad.iter().zip(self.direction.iter());
+            strokes.map(|(psi, direction)| self.stroke(psi - first_rad, direction[axis])).collect()
+        });
         self.psi_rad = psi_rad;
     }
 
-    /// Where the machine angle ψ stands between reversals of the axis whose reversals lie at `first_rad` + kπ:
-    /// the share of the half turn since the last one, 0…1, and the sign of the half turn (+1 from `first_rad` on).
-    pub fn since_reversal(&self, psi_rad: f64, first_rad: f64) -> (f64, f64) {
-        let halves = self.sign * (psi_rad - first_rad) * std::f64::consts::FRAC_1_PI;
+    /// At an angle since some reversal of an axis, and the direction cosine of the axis there.
+    fn stroke(&self, angle_rad: f64, direction: f64) -> Stroke {
+        let halves = self.sign * angle_rad * std::f64::consts::FRAC_1_PI;
         // `floor` without a call; angles are a few turns at most.
         let cut = halves as i64;
         let whole = cut - i64::from((cut as f64) > halves);
-        (halves - whole as f64, if whole % 2 == 0 { 1.0 } else { -1.0 })
+        let side = if whole % 2 == 0 { 1.0 } else { -1.0 };
+        Stroke { share: halves - whole as f64, facing: side * direction }
+    }
+
+    /// Where each sample stands between the reversals of an axis; of X where none is named.
+    pub fn strokes_of(&self, axis: Option<Axis>) -> &[Stroke] {
+        &self.strokes[axis.map_or(0, Axis::index)]
     }
 
     /// Duration of half a turn, s.

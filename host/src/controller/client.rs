@@ -1,18 +1,18 @@
-//! Requests and replies. Each request is repeated until it is answered; the controller sees to it that it
-//! happens once.
+//! Requests and replies, one at a time. Each request is repeated until it is answered; the controller sees to it that
+//! it happens once.
 use super::error::ControllerError;
 use super::link::Link;
 use giotto_shared::table::SCHEMA_HASH;
 use giotto_shared::wire::{
-    self, Accumulator, CHUNK, Command, FromController, Identity, MAX_FRAME, PROTOCOL_VERSION, Reply, Request,
-    SUPERVISE_MS, SetPoints, Status,
+    self, Accumulator, Command, FromController, Identity, MAX_FRAME, PROTOCOL_VERSION, Refusal, Reply,
+    Request, SUPERVISE_MS, SetPoints, Status,
 };
 use std::time::Duration;
 
 /// After so long without an answer a request is sent again.
-const REPEAT_AFTER: Duration = Duration::from_millis(300);
+pub(super) const REPEAT_AFTER: Duration = Duration::from_millis(300);
 /// After so long the controller is given up: erasing the sector of a large flash takes up to 2 s.
-const GIVE_UP_AFTER: Duration = Duration::from_secs(5);
+pub(super) const GIVE_UP_AFTER: Duration = Duration::from_secs(5);
 /// As above, for the first request: who does not answer now will not.
 const GIVE_UP_HELLO_AFTER: Duration = Duration::from_secs(3);
 
@@ -37,9 +37,10 @@ impl std::fmt::Debug for Controller {
     }
 }
 
-/// What came in: the answer waited for, or a batch of set-points that has been put away.
-enum Arrival {
-    Reply(Reply),
+/// What came in: an answer of this session, or a batch of set-points that has been put away.
+pub(super) enum Arrival {
+    /// With the number of the request.
+    Reply(u16, Result<Reply, Refusal>),
     SetPoints,
 }
 
@@ -157,23 +158,6 @@ impl Controller {
         }
     }
 
-    /// The first `length` bytes of a slot.
-    ///
-    /// # Errors
-    /// [`ControllerError::Refused`] and those of the link.
-    pub fn read_slot(&mut self, slot: u8, length: usize) -> Result<Vec<u8>, ControllerError> {
-        let mut bytes = Vec::with_capacity(length);
-        while bytes.len() < length {
-            let offset = u16::try_from(bytes.len()).map_err(|_| ControllerError::WrongReply)?;
-            let piece = (length - bytes.len()).min(CHUNK);
-            match self.ask(Command::ReadBack { slot, offset, length: piece as u8 })? {
-                Reply::Data { offset: at, data } if at == offset && data.len() == piece => bytes.extend(data),
-                _ => return Err(ControllerError::WrongReply),
-            }
-        }
-        Ok(bytes)
-    }
-
     /// Warm reset; returns when the controller answers again.
     ///
     /// # Errors
@@ -190,29 +174,51 @@ impl Controller {
     }
 
     fn exchange(&mut self, command: Command, give_up_after: Duration) -> Result<Reply, ControllerError> {
-        self.seq = self.seq.wrapping_add(1);
-        let request = Request { session: self.session, seq: self.seq, command };
-        let mut buffer = [0; MAX_FRAME];
-        let frame = wire::encode(&request, &mut buffer).map_err(|_| ControllerError::WrongReply)?.to_vec();
+        let (seq, frame) = self.next_frame(command)?;
         let give_up_at = self.link.now() + give_up_after;
         let mut attempts = 0;
         while attempts == 0 || self.link.now() < give_up_at {
-            self.repeats += u32::from(attempts > 0);
+            self.send_frame(seq, &frame, attempts > 0)?;
             attempts += 1;
-            // A zero first: it closes whatever a disturbed line has left open.
-            self.send(&[0])?;
-            self.send(&frame)?;
             let until = give_up_at.min(self.link.now() + REPEAT_AFTER);
             while let Some(arrival) = self.arrival(until)? {
-                if let Arrival::Reply(reply) = arrival {
-                    return match reply {
-                        Reply::Refused(refusal) => Err(ControllerError::Refused(refusal)),
-                        reply => Ok(reply),
-                    };
+                match arrival {
+                    Arrival::Reply(answered, reply) if answered == seq => {
+                        return reply.map_err(ControllerError::Refused);
+                    }
+                    // To an earlier request, sent twice or given up.
+                    Arrival::Reply(..) | Arrival::SetPoints => {}
                 }
             }
         }
-        Err(ControllerError::NoAnswer { port: self.name.clone(), waited: give_up_after })
+        Err(self.no_answer(give_up_after))
+    }
+
+    pub(super) fn no_answer(&self, waited: Duration) -> ControllerError {
+        ControllerError::NoAnswer { port: self.name.clone(), waited }
+    }
+
+    /// Number of the next request.
+    pub(super) const fn next_seq(&self) -> u16 {
+        self.seq.wrapping_add(1)
+    }
+
+    /// Number and frame of the next request.
+    pub(super) fn next_frame(&self, command: Command) -> Result<(u16, Vec<u8>), ControllerError> {
+        let seq = self.next_seq();
+        let request = Request { session: self.session, seq, command };
+        let mut buffer = [0; MAX_FRAME];
+        let frame = wire::encode(&request, &mut buffer).map_err(|_| ControllerError::WrongReply)?;
+        Ok((seq, frame.to_vec()))
+    }
+
+    /// Sends the frame of request `seq`; `again`: something was not answered.
+    pub(super) fn send_frame(&mut self, seq: u16, frame: &[u8], again: bool) -> Result<(), ControllerError> {
+        self.seq = seq;
+        self.repeats += u32::from(again);
+        // A zero first: it closes whatever a disturbed line has left open.
+        self.send(&[0])?;
+        self.send(frame)
     }
 
     /// Waits for a batch of set-points (put away in `set_points`); `false`: none came in time.
@@ -248,21 +254,23 @@ impl Controller {
     }
 
     /// The next message that is for us.
-    fn arrival(&mut self, until: Duration) -> Result<Option<Arrival>, ControllerError> {
+    pub(super) fn arrival(&mut self, until: Duration) -> Result<Option<Arrival>, ControllerError> {
         loop {
             while let Some(byte) = self.pending.pop_front() {
                 let Some(payload) = self.accumulator.push(byte) else { continue };
                 match postcard::from_bytes(payload) {
-                    Ok(FromController::Reply { session, seq, reply })
-                        if session == self.session && seq == self.seq =>
-                    {
-                        return Ok(Some(Arrival::Reply(reply)));
+                    Ok(FromController::Reply { session, seq, reply }) if session == self.session => {
+                        let reply = match reply {
+                            Reply::Refused(refusal) => Err(refusal),
+                            reply => Ok(reply),
+                        };
+                        return Ok(Some(Arrival::Reply(seq, reply)));
                     }
                     Ok(FromController::SetPoints(batch)) => {
                         self.set_points.push(batch);
                         return Ok(Some(Arrival::SetPoints));
                     }
-                    // An answer to an earlier request that was sent twice, or a message of another build.
+                    // An answer to another client, or a message of another build.
                     Ok(FromController::Reply { .. }) | Err(_) => {}
                 }
             }

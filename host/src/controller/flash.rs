@@ -118,12 +118,7 @@ impl Controller {
         let length = u16::try_from(image.len()).ok().filter(|length| *length <= max);
         let length = length.ok_or(ControllerError::Refused(Refusal::UploadTooLong { max }))?;
         self.command(Command::WriteBegin { length, crc: crc32(image) })?;
-        for (index, piece) in image.chunks(CHUNK).enumerate() {
-            let sent = index * CHUNK;
-            progress(Progress::Sent(sent, image.len()));
-            let data = Chunk::from_slice(piece).map_err(|_| ControllerError::WrongReply)?;
-            self.command(Command::WriteChunk { offset: sent as u16, data })?;
-        }
+        self.send_pieces(image, progress)?;
         progress(Progress::Sent(image.len(), image.len()));
         match self.ask(Command::WriteEnd)? {
             Reply::Written { slot } => {
@@ -132,6 +127,65 @@ impl Controller {
             }
             _ => Err(ControllerError::WrongReply),
         }
+    }
+
+    /// The bytes of an upload that has begun. The controller takes pieces in order: what it expects next says which it
+    /// has, even where the answers to those were lost.
+    fn send_pieces(
+        &mut self,
+        image: &[u8],
+        progress: &mut dyn FnMut(Progress),
+    ) -> Result<(), ControllerError> {
+        progress(Progress::Sent(0, image.len()));
+        let pieces: Vec<&[u8]> = image.chunks(CHUNK).collect();
+        let request = |index: usize| {
+            let data = pieces.get(index).and_then(|piece| Chunk::from_slice(piece).ok());
+            let offset = u16::try_from(index * CHUNK).ok();
+            let (offset, data) = offset.zip(data).ok_or(ControllerError::WrongReply)?;
+            Ok(Command::WriteChunk { offset, data })
+        };
+        let mut most = 0;
+        self.series(pieces.len(), &request, &mut |index, answer| {
+            let done = match answer {
+                Ok(Reply::Done) => index + 1,
+                Ok(_) => return Err(ControllerError::WrongReply),
+                Err(Refusal::OutOfOrder { expected }) => whole_pieces(usize::from(expected), image.len())
+                    .ok_or(ControllerError::Refused(Refusal::OutOfOrder { expected }))?,
+                Err(refusal) => return Err(ControllerError::Refused(refusal)),
+            };
+            if done > most {
+                most = done;
+                progress(Progress::Sent(image.len().min(done * CHUNK), image.len()));
+            }
+            Ok(done)
+        })
+    }
+
+    /// The first `length` bytes of a slot.
+    ///
+    /// # Errors
+    /// [`ControllerError::Refused`] and those of the link.
+    pub fn read_slot(&mut self, slot: u8, length: usize) -> Result<Vec<u8>, ControllerError> {
+        let mut bytes = Vec::with_capacity(length);
+        let piece = |index: usize| (length - length.min(index * CHUNK)).min(CHUNK);
+        let request = |index: usize| {
+            let offset = u16::try_from(index * CHUNK).map_err(|_| ControllerError::WrongReply)?;
+            Ok(Command::ReadBack { slot, offset, length: piece(index) as u8 })
+        };
+        self.series(length.div_ceil(CHUNK), &request, &mut |index, answer| {
+            let Reply::Data { offset, data } = answer.map_err(ControllerError::Refused)? else {
+                return Err(ControllerError::WrongReply);
+            };
+            if usize::from(offset) != index * CHUNK || data.len() != piece(index) {
+                return Err(ControllerError::WrongReply);
+            }
+            // One that is ahead, or was asked for twice, waits for its turn or has had it.
+            if usize::from(offset) == bytes.len() {
+                bytes.extend(data);
+            }
+            Ok(bytes.len().div_ceil(CHUNK))
+        })?;
+        Ok(bytes)
     }
 
     fn read_back(&mut self, slot: u8, image: &[u8]) -> Result<(), ControllerError> {
@@ -154,6 +208,11 @@ impl Controller {
             Some(offset) => Verdict::Differs { slot, offset },
         })
     }
+}
+
+/// How many pieces of an image end at `offset`; `None` if none does.
+fn whole_pieces(offset: usize, length: usize) -> Option<usize> {
+    (offset == length || offset < length && offset.is_multiple_of(CHUNK)).then(|| offset.div_ceil(CHUNK))
 }
 
 fn first_difference(a: &[u8], b: &[u8]) -> Option<usize> {

@@ -4,6 +4,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`client`] | requests and replies over any [`link`](link::Link): status, slots, runs |
+//! | `series` | requests of which several are on their way at once |
 //! | [`flash`] | a table onto a controller, and the proof that it is there |
 //! | [`recording`] | circles run, set-points received |
 //! | [`program`], [`streaming`] | programs and set-points, sent ahead of the machine |
@@ -22,6 +23,7 @@ pub mod port;
 pub mod program;
 pub mod recording;
 pub mod serial;
+mod series;
 pub mod streaming;
 pub mod virtual_controller;
 

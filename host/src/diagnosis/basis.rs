@@ -3,19 +3,28 @@
 //! Between runs the low orders scatter by more than the noise within a run tells: the centre moves (order
 //! 1), the size (order 0) and the oval (order 2) change from set-up to set-up. Giving each order a variance
 //! of its own makes the run, not the sample, the unit of replication.
-
+use super::vector::{axpys, dot, dots};
+use crate::causes::Harmonics;
 /// Highest order that may scatter between runs.
-pub const ORDERS: usize = 8;
+pub use crate::causes::ORDERS;
+
 /// Columns: the mean, then cosine and sine of each order.
 pub const COLUMNS: usize = 1 + 2 * ORDERS;
+
+/// Of a column that keeps so much of its length the rest is orthogonal at once.
+const NEARLY_ALL: f64 = 0.9;
+
+/// Coordinates in the low orders of one run.
+pub type Low = [f64; COLUMNS];
 
 /// Orthonormal columns and the triangle that made them.
 #[derive(Clone, Debug)]
 pub struct Basis {
-    /// Column k at sample i: `columns[k][i]`.
-    columns: Vec<Vec<f64>>,
+    /// One column behind the other.
+    columns: Vec<f64>,
+    samples: usize,
     /// R of the QR factorisation, upper triangle.
-    triangle: [[f64; COLUMNS]; COLUMNS],
+    triangle: [Low; COLUMNS],
 }
 
 #[allow(
@@ -23,85 +32,128 @@ pub struct Basis {
     reason = "columns, rows and orders are numbers here, not places in a list"
 )]
 impl Basis {
-    /// Gram–Schmidt (twice) on 1, cosθ, sinθ, …; a column that the earlier ones already span is left out as zero.
+    /// Gram–Schmidt (twice where it takes much) on 1, cosθ, sinθ, …; a column that the earlier ones already span is left out as zero.
     pub fn new(angle_rad: &[f64]) -> Self {
         Self::masked(angle_rad, &[])
     }
 
     /// The same over part of the samples: columns are 0 where `hidden` is true (empty: nowhere).
     pub fn masked(angle_rad: &[f64], hidden: &[bool]) -> Self {
-        let mut columns: Vec<Vec<f64>> = Vec::with_capacity(COLUMNS);
+        let samples = angle_rad.len();
         let mut triangle = [[0.0; COLUMNS]; COLUMNS];
+        let mut columns = waves(angle_rad, hidden);
         for k in 0..COLUMNS {
-            let order = k.div_ceil(2) as f64;
-            let mut column: Vec<f64> = match k {
-                0 => vec![1.0; angle_rad.len()],
-                _ if k % 2 == 1 => angle_rad.iter().map(|a| (order * a).cos()).collect(),
-                _ => angle_rad.iter().map(|a| (order * a).sin()).collect(),
-            };
-            for (value, hidden) in column.iter_mut().zip(hidden) {
-                if *hidden {
-                    *value = 0.0;
-                }
-            }
-            let length = dot(&column, &column).sqrt();
+            let (earlier, later) = columns.split_at_mut(k * samples);
+            let column = &mut later[..samples];
+            let length = dot(column, column).sqrt();
+            let mut left = length;
             for _ in 0..2 {
-                for (j, earlier) in columns.iter().enumerate() {
-                    let along = dot(&column, earlier);
-                    triangle[j][k] += along;
-                    axpy(-along, earlier, &mut column);
+                let before = left;
+                let mut along = [0.0; COLUMNS];
+                dots(earlier, column, &mut along[..k]);
+                axpys(&along.map(|a| -a)[..k], earlier, column);
+                for j in 0..k {
+                    triangle[j][k] += along[j];
+                }
+                left = dot(column, column).sqrt();
+                // What has lost little has lost no digits.
+                if left > NEARLY_ALL * before {
+                    break;
                 }
             }
-            let left = dot(&column, &column).sqrt();
             if left > 1e-9 * length {
                 column.iter_mut().for_each(|c| *c /= left);
                 triangle[k][k] = left;
             } else {
                 column.fill(0.0);
             }
-            columns.push(column);
         }
-        Self { columns, triangle }
+        Self { columns, samples, triangle }
     }
 
     /// Coordinates of a vector of samples in the basis.
-    pub fn coordinates(&self, samples: &[f64]) -> [f64; COLUMNS] {
+    pub fn coordinates(&self, samples: &[f64]) -> Low {
         let mut out = [0.0; COLUMNS];
-        for (out, column) in out.iter_mut().zip(&self.columns) {
-            *out = dot(column, samples);
-        }
+        dots(&self.columns, samples, &mut out);
         out
     }
 
-    /// Adds `amount` of basis column `k` to `samples`.
-    pub fn add(&self, k: usize, amount: f64, samples: &mut [f64]) {
-        axpy(amount, &self.columns[k], samples);
+    /// Coordinates along the two columns of the first order: the centre.
+    pub fn centre(&self, samples: &[f64]) -> [f64; 2] {
+        let mut out = [0.0; 2];
+        dots(&self.columns[self.samples..], samples, &mut out);
+        out
     }
 
-    /// Length of a column of ones over the samples seen.
-    pub fn length_of_ones(&self) -> f64 {
-        self.triangle[0][0]
+    /// Adds a vector of these coordinates to `samples`.
+    pub fn add(&self, coordinates: &Low, samples: &mut [f64]) {
+        axpys(coordinates, &self.columns, samples);
     }
 
-    /// Harmonics of the samples: `[mean, 0]`, then `[cos, sin]` of each order.
-    pub fn harmonics(&self, samples: &[f64]) -> [[f64; 2]; ORDERS + 1] {
-        self.harmonics_of(self.coordinates(samples))
+    /// Takes the low orders out of `samples`; their coordinates.
+    pub fn take_out(&self, samples: &mut [f64]) -> Low {
+        let coordinates = self.coordinates(samples);
+        self.add(&coordinates.map(|c| -c), samples);
+        coordinates
+    }
+
+    /// Harmonics of the samples about the angle of the basis.
+    pub fn harmonics(&self, samples: &[f64]) -> Harmonics {
+        self.harmonics_of(&self.coordinates(samples))
     }
 
     /// The same from their coordinates.
-    pub fn harmonics_of(&self, coordinates: [f64; COLUMNS]) -> [[f64; 2]; ORDERS + 1] {
-        let mut x = coordinates;
+    pub fn harmonics_of(&self, coordinates: &Low) -> Harmonics {
+        let mut x = *coordinates;
         for k in (0..COLUMNS).rev() {
             let above: f64 = (k + 1..COLUMNS).map(|j| self.triangle[k][j] * x[j]).sum();
             x[k] = if self.triangle[k][k] > 0.0 { (x[k] - above) / self.triangle[k][k] } else { 0.0 };
         }
-        let mut out = [[0.0; 2]; ORDERS + 1];
-        out[0][0] = x[0];
+        let mut out = Harmonics::default();
+        out.0[0][0] = x[0];
         for order in 1..=ORDERS {
-            out[order] = [x[2 * order - 1], x[2 * order]];
+            out.0[order] = [x[2 * order - 1], x[2 * order]];
         }
         out
     }
+
+    /// Coordinates of harmonics about the angle of the basis: the way back.
+    pub fn coordinates_of(&self, harmonics: &Harmonics) -> Low {
+        let mut out = [0.0; COLUMNS];
+        for (order, [c, s]) in harmonics.0.into_iter().enumerate() {
+            let first = (2 * order).saturating_sub(1);
+            for (column, amount) in [(first, c), (first + 1, s)] {
+                // Sine of the mean: there is none.
+                if amount != 0.0 && !(order == 0 && column > 0) {
+                    for row in 0..=column {
+                        out[row] += self.triangle[row][column] * amount;
+                    }
+                }
+            }
+        }
+        out
+    }
+}
+
+/// 1, cosθ, sinθ, cos2θ, …, one behind the other; 0 where hidden. By the addition theorem: eight steps of it lose less than
+/// a digit of sixteen.
+fn waves(angle_rad: &[f64], hidden: &[bool]) -> Vec<f64> {
+    let samples = angle_rad.len();
+    let mut columns = vec![0.0; COLUMNS * samples];
+    for (i, angle) in angle_rad.iter().enumerate() {
+        if hidden.get(i).copied().unwrap_or(false) {
+            continue;
+        }
+        let (sin, cos) = angle.sin_cos();
+        let (mut s, mut c) = (0.0, 1.0);
+        columns[i] = 1.0;
+        for order in 1..=ORDERS {
+            (c, s) = (c * cos - s * sin, s * cos + c * sin);
+            columns[(2 * order - 1) * samples + i] = c;
+            columns[2 * order * samples + i] = s;
+        }
+    }
+    columns
 }
 
 /// Order that a basis column belongs to.
@@ -109,25 +161,45 @@ pub const fn order_of(column: usize) -> usize {
     column.div_ceil(2)
 }
 
-/// Sums that run side by side in a scalar product: additions of one sum wait for each other.
-const LANES: usize = 16;
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// Scalar product.
-pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; LANES];
-    let (a_lanes, b_lanes) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
-    let rest: f64 = a_lanes.remainder().iter().zip(b_lanes.remainder()).map(|(a, b)| a * b).sum();
-    for (a, b) in a_lanes.zip(b_lanes) {
-        for lane in 0..LANES {
-            sums[lane] += a[lane] * b[lane];
+    fn angles() -> Vec<f64> {
+        (0..997).map(|i| 0.4 + f64::from(i) * 0.0063).collect()
+    }
+
+    #[test]
+    fn waves_are_sines_and_cosines() {
+        let angles = angles();
+        let columns = waves(&angles, &[]);
+        for (i, angle) in angles.iter().enumerate() {
+            for order in 1..=ORDERS {
+                let (sin, cos) = (order as f64 * angle).sin_cos();
+                assert!((columns[(2 * order - 1) * angles.len() + i] - cos).abs() < 1e-14);
+                assert!((columns[2 * order * angles.len() + i] - sin).abs() < 1e-14);
+            }
         }
     }
-    sums.iter().sum::<f64>() + rest
-}
 
-/// y += a·x.
-pub fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
-    for (y, x) in y.iter_mut().zip(x) {
-        *y += a * x;
+    #[test]
+    fn harmonics_and_coordinates_are_two_ways_to_say_it() {
+        let angles = angles();
+        let hidden: Vec<bool> = (0..angles.len()).map(|i| i % 50 < 9).collect();
+        let harmonics = Harmonics::mean(0.7).with(1, [0.1, -0.2]).with(3, [0.0, 0.5]).with(8, [0.3, 0.0]);
+        for hidden in [&[][..], &hidden] {
+            let basis = Basis::masked(&angles, hidden);
+            let mut samples: Vec<f64> = angles.iter().map(|angle| harmonics.at(*angle)).collect();
+            for (sample, hidden) in samples.iter_mut().zip(hidden) {
+                *sample = if *hidden { 0.0 } else { *sample };
+            }
+            let low = basis.coordinates(&samples);
+            let said = basis.coordinates_of(&harmonics);
+            assert!(low.iter().zip(&said).all(|(a, b)| (a - b).abs() < 1e-12), "{low:?} {said:?}");
+            let back = basis.harmonics_of(&said);
+            assert!(back.0.iter().zip(&harmonics.0).all(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]) < 1e-12));
+            assert_eq!(basis.take_out(&mut samples), low);
+            assert!(samples.iter().all(|left| left.abs() < 1e-12));
+        }
     }
 }

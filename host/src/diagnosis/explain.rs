@@ -1,7 +1,8 @@
 //! From a campaign to the set of explanations: prepare, search, refine, and again about the better model.
+use super::column::Column;
 use super::explained::{Explained, chosen_kinds, refit, residual};
 use super::item::{Item, Kind};
-use super::ledger::{Ledger, Samples};
+use super::ledger::Ledger;
 use super::linear::Solution;
 use super::material::{is_material, prune};
 use super::pattern::Pattern;
@@ -10,11 +11,13 @@ use super::roughness::{self, Teeth};
 use super::search::{columns_of, select};
 use super::shape;
 use super::spread;
-use super::survey::{self, Prepared, Response};
+use super::survey::{Lag, Prepared, Response, Survey, misfit};
 use super::tangent;
 use super::tone::{self, Tone};
 use crate::campaign::Campaign;
-use crate::causes::{ALL, Cause, Evidence};
+use crate::causes::{ALL, Cause, Evidence, Harmonics};
+use rayon::prelude::*;
+use std::sync::Arc;
 
 /// What stands before the search.
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +34,9 @@ const SETTLED: [f64; 2] = [1e-3, 1e-2];
 /// Change of the lag that does not matter, s.
 const SETTLED_LAG_S: f64 = 2e-4;
 
+/// Change of a response's own lag that makes it another one, s: the longest move of a pass.
+const OTHER_LAG_S: f64 = 5e-3;
+
 /// Most tones of one machine.
 const TONES: usize = 2;
 
@@ -45,9 +51,10 @@ struct Seen {
 
 /// Searches the explanations of a campaign.
 pub fn explain(campaign: &Campaign, start: &Start) -> Explained {
+    let survey = Survey::new(campaign);
     let (mut response, mut more_lag_s) = (start.response, 0.0);
     let mut seen = Seen::default();
-    let (mut found, mut longer_s) = pass(campaign, start, (response, more_lag_s), &mut seen, &[], None);
+    let (mut found, mut longer_s) = pass(&survey, start, (response, more_lag_s), &mut seen, &[], None);
     // Scatter is measured well only beside a model, so there are two passes at least.
     let mut known = None;
     for _ in 1..PASSES {
@@ -66,9 +73,12 @@ pub fn explain(campaign: &Campaign, start: &Start) -> Explained {
             break;
         }
         known = Some(kinds.len());
+        // A response of another kind has a lag of its own: what the old one lacked says nothing of it.
+        let other = (survey.lag(&refined).tau_s - survey.lag(&response).tau_s).abs() > OTHER_LAG_S;
+        more_lag_s = if other { 0.0 } else { more_lag_s + longer_s };
         response = refined;
-        more_lag_s += longer_s;
-        (found, longer_s) = pass(campaign, start, (response, more_lag_s), &mut seen, &kinds, Some(&left));
+        let left = left.all_samples(&found.runs);
+        (found, longer_s) = pass(&survey, start, (response, more_lag_s), &mut seen, &kinds, Some(&left));
     }
     found.tones = seen.tones;
     found
@@ -97,138 +107,87 @@ fn refined_response(found: &Explained, response: Response) -> Response {
     if 1.0 + refined.a_s2 * w2 + refined.b_s4 * w2 * w2 > 0.1 { refined } else { response }
 }
 
+/// What the runs leave of the baseline, and what is seen of it.
+struct Prepare {
+    runs: Vec<Prepared>,
+    lag: Lag,
+    data: Column,
+}
+
+/// Makes the runs ready: tones taken out, teeth hidden. `true`: what was found before is not to be trusted.
+fn prepare(survey: &Survey, (response, more_lag_s): (Response, f64), seen: &mut Seen) -> (Prepare, bool) {
+    let (mut runs, lag) = survey.prepare(&response, more_lag_s);
+    for tone in &seen.tones {
+        tone.remove(&mut runs);
+    }
+    let mut afresh = false;
+    if seen.looked_beside != Some(seen.tones.len()) {
+        // Before anything is believed: teeth look like everything.
+        let whole = misfit(&runs).all_samples(&runs);
+        seen.teeth = roughness::find(&runs, &whole, &spread::measure(&runs, &whole));
+        // What was found with a tone or teeth in sight is not to be trusted.
+        afresh = seen.looked_beside.is_some();
+        seen.looked_beside = Some(seen.tones.len());
+    }
+    if !seen.teeth.is_empty() {
+        runs.par_iter_mut().for_each(|run| {
+            let covered = |i: usize| seen.teeth.iter().any(|teeth| teeth.covers(run, i));
+            let hidden = (0..run.deviation_m.len()).map(covered).collect();
+            run.hide(hidden);
+        });
+    }
+    let data = misfit(&runs);
+    (Prepare { runs, lag, data }, afresh)
+}
+
+/// `kinds` and `left`: what the pass before has chosen, and what that left.
 fn pass(
-    campaign: &Campaign,
+    survey: &Survey,
     start: &Start,
     (response, more_lag_s): (Response, f64),
     seen: &mut Seen,
     kinds: &[Kind],
-    left: Option<&Samples>,
+    left: Option<&[Vec<f64>]>,
 ) -> (Explained, f64) {
-    let (mut runs, lag) = survey::prepare(campaign, &response, more_lag_s);
-    for tone in &seen.tones {
-        tone.remove(&mut runs);
-    }
-    let data = |runs: &[Prepared]| -> Samples {
-        runs.iter()
-            .map(|run| {
-                let shrink = run.view.radius_m * (run.view.gain - 1.0);
-                let mut out: Vec<f64> = run.deviation_m.iter().map(|deviation| deviation - shrink).collect();
-                run.mask(&mut out);
-                out
-            })
-            .collect()
-    };
-    let (mut kinds, mut left) = (kinds, left);
-    if seen.looked_beside != Some(seen.tones.len()) {
-        // Before anything is believed: teeth look like everything.
-        let whole = data(&runs);
-        let teeth = roughness::find(&runs, &whole, &spread::measure(&runs, &whole));
-        // What was found with a tone or teeth in sight is not to be trusted.
-        if seen.looked_beside.is_some() {
-            (kinds, left) = (&[], None);
-        }
-        seen.teeth = teeth;
-        seen.looked_beside = Some(seen.tones.len());
-    }
-    if !seen.teeth.is_empty() {
-        for run in &mut runs {
-            let hidden =
-                (0..run.deviation_m.len()).map(|i| seen.teeth.iter().any(|t| t.covers(run, i))).collect();
-            run.hide(hidden);
-        }
-    }
-    let data = data(&runs);
+    let (Prepare { runs, lag, data }, afresh) = prepare(survey, (response, more_lag_s), seen);
+    let (kinds, left) = if afresh { (&[][..], None) } else { (kinds, left) };
     // Once there is a model, what it leaves shows the scatter better than the data do.
-    let spread = spread::measure(&runs, left.unwrap_or(&data));
-    let mut ledger = Ledger::open(&runs, &spread, data);
-    // ∂ΔR/∂a about the response.
-    let own: Samples = runs
-        .iter()
-        .map(|run| {
-            let (w, g) = (run.view.omega_rad_s, run.view.gain);
-            let mut out = vec![-0.5 * run.view.radius_m * w * w * g.powi(3); run.deviation_m.len()];
-            run.mask(&mut out);
-            out
-        })
-        .collect();
-    let mut nuisance = vec![ledger.push(&runs, own)];
-    let mut items: Vec<Item> = Vec::new();
-    let add = |ledger: &mut Ledger, items: &mut Vec<Item>, kind: Kind, shapes: usize| -> usize {
-        let columns = (0..kind.columns()).map(|i| ledger.push(&runs, kind.samples(i, &runs))).collect();
-        items.push(Item { price: kind.price(shapes), columns, kind, fitted_beside: None });
-        items.len() - 1
+    let spread = match left {
+        Some(left) => spread::measure(&runs, left),
+        None => spread::measure(&runs, &data.all_samples(&runs)),
     };
-    let mut chosen = Vec::new();
-    for kind in kinds {
-        chosen.push(add(&mut ledger, &mut items, kind.clone(), shape::count(kind, &runs)));
-    }
-    // The data no longer hold what the response has taken in; its column still does.
-    if start.own_fourth_order {
-        let fourth = Kind::Cause { cause: Cause::HigherOrderDynamics, axis: None, shape: Vec::new() };
-        nuisance.push(ledger.push(&runs, fourth.samples(0, &runs)));
-    } else if response.b_s4 != 0.0 {
-        restore_fourth_order(&runs, &mut ledger, &response);
-    }
-    for model in ALL {
-        if model.evidence() != Evidence::Signature
-            || (start.own_fourth_order && model.cause() == Cause::HigherOrderDynamics)
-        {
-            continue;
-        }
-        let views: Vec<_> = runs.iter().map(|run| run.view.clone()).collect();
-        let shapes = model.shapes(&views);
-        for &axis in model.axes() {
-            let known = kinds.iter().any(
-                |kind| matches!(kind, Kind::Cause { cause, axis: at, .. } if *cause == model.cause() && *at == axis),
-            );
-            if let (false, Some(first)) = (known, shapes.first()) {
-                let kind = Kind::Cause { cause: model.cause(), axis, shape: first.clone() };
-                add(&mut ledger, &mut items, kind, shapes.len());
-            }
-        }
-    }
-    for pattern in Pattern::sizes() {
-        let kind = Kind::Pattern(pattern);
-        if !kinds.contains(&kind) {
-            add(&mut ledger, &mut items, kind, 1);
-        }
-    }
-    let all = vec![1.0; runs.len()];
-    let apart_m2 = seen.tones.iter().flat_map(|tone| &tone.energy_m2).sum::<f64>()
-        + seen.teeth.iter().map(|teeth| roughness::energy_m2(teeth, &runs)).sum::<f64>();
     let mut found = Explained {
-        apart_m2,
-        solution: Solution {
-            coefficients: Vec::new(),
-            covariance: nalgebra::DMatrix::zeros(0, 0),
-            gain: 0.0,
-        },
-        runs: Vec::new(),
+        apart_m2: seen.tones.iter().flat_map(|tone| &tone.energy_m2).sum::<f64>()
+            + seen.teeth.iter().map(|teeth| roughness::energy_m2(teeth, &runs)).sum::<f64>(),
+        solution: Solution::default(),
+        ledger: Ledger::open(&runs, &spread, data),
+        runs: runs.into(),
+        bases: survey.bases(),
         response,
         lag,
         spread,
-        ledger,
-        nuisance,
-        items,
-        chosen,
+        nuisance: Vec::new(),
+        items: Vec::new(),
+        chosen: Vec::new(),
         tones: Vec::new(),
         tangents: None,
         more_lag_s,
         teeth: seen.teeth.clone(),
     };
+    enter(&mut found, start, kinds);
+    let all = found.all();
     let mut barred: Vec<usize> = Vec::new();
     let mut polished: Vec<Kind> = Vec::new();
     for _ in 0..6 {
         let before: Vec<Kind> = chosen_kinds(&found);
         refit(&mut found, &all);
-        shape::improve(&mut found, &runs);
+        shape::improve(&mut found);
         refit(&mut found, &all);
         if before != polished {
-            tangent::polish(&mut found, &runs, &all);
+            tangent::polish(&mut found, &all);
             polished = chosen_kinds(&found);
         }
-        propose_patterns(&mut found, &runs);
+        propose_patterns(&mut found);
         let products = found.ledger.white(&all);
         found.chosen = select(&products, &found.nuisance, &found.items, &found.chosen, &barred);
         found.chosen = prune(&found, &all, found.chosen.clone(), &mut barred);
@@ -238,22 +197,72 @@ fn pass(
     }
     refit(&mut found, &all);
     if chosen_kinds(&found) != polished {
-        tangent::polish(&mut found, &runs, &all);
+        tangent::polish(&mut found, &all);
     }
-    let longer_s = tangent::finish(&mut found, &runs, &all);
-    found.runs = runs;
+    let longer_s = tangent::finish(&mut found, &all);
     (found, longer_s)
+}
+
+/// Enters the columns of the model itself, of what was chosen before, and of everything that may compete.
+fn enter(found: &mut Explained, start: &Start, kinds: &[Kind]) {
+    let runs = Arc::clone(&found.runs);
+    let views = shape::views(&runs);
+    // ∂ΔR/∂a about the response.
+    let own = |run: &Prepared| {
+        let (w, g) = (run.view.omega_rad_s, run.view.gain);
+        run.low_of(&Harmonics::mean(-0.5 * run.view.radius_m * w * w * g.powi(3)))
+    };
+    found.nuisance.push(found.ledger.push(Column::within(runs.iter().map(own).collect())));
+    let add = |found: &mut Explained, kind: Kind, shapes: usize| -> usize {
+        let columns = kind.columns_over(&runs).into_iter().map(|column| found.ledger.push(column)).collect();
+        found.items.push(Item { price: kind.price(shapes), columns, kind, fitted_beside: None });
+        found.items.len() - 1
+    };
+    for kind in kinds {
+        let item = add(found, kind.clone(), shape::count(kind, &views));
+        found.chosen.push(item);
+    }
+    // The data no longer hold what the response has taken in; its column still does.
+    if start.own_fourth_order {
+        let fourth = Kind::Cause { cause: Cause::HigherOrderDynamics, axis: None, shape: Vec::new() };
+        let columns = fourth.columns_over(&runs);
+        found.nuisance.extend(columns.into_iter().map(|column| found.ledger.push(column)));
+    } else if found.response.b_s4 != 0.0 {
+        restore_fourth_order(found);
+    }
+    for model in ALL {
+        if model.evidence() != Evidence::Signature
+            || (start.own_fourth_order && model.cause() == Cause::HigherOrderDynamics)
+        {
+            continue;
+        }
+        let shapes = model.shapes(&views);
+        for &axis in model.axes() {
+            let known = kinds.iter().any(
+                |kind| matches!(kind, Kind::Cause { cause, axis: at, .. } if *cause == model.cause() && *at == axis),
+            );
+            if let (false, Some(first)) = (known, shapes.first()) {
+                let kind = Kind::Cause { cause: model.cause(), axis, shape: first.clone() };
+                add(found, kind, shapes.len());
+            }
+        }
+    }
+    for pattern in Pattern::sizes() {
+        let kind = Kind::Pattern(pattern);
+        if !kinds.contains(&kind) {
+            add(found, kind, 1);
+        }
+    }
 }
 
 /// The response holds a fourth-order part that the search may still reject: give it back to the data, to first
 /// order exactly as its column would take it.
-fn restore_fourth_order(runs: &[Prepared], ledger: &mut Ledger, response: &Response) {
-    let mut data = ledger.samples(0).clone();
-    for (run, data) in runs.iter().zip(&mut data) {
-        let shift =
-            -0.5 * response.b_s4 * run.view.radius_m * run.view.omega_rad_s.powi(4) * run.view.gain.powi(3);
-        data.iter_mut().for_each(|y| *y += shift);
-        run.mask(data);
-    }
-    ledger.replace(runs, 0, data);
+fn restore_fourth_order(found: &mut Explained) {
+    let shift = |run: &Prepared| {
+        let (w, g) = (run.view.omega_rad_s, run.view.gain);
+        run.low_of(&Harmonics::mean(-0.5 * found.response.b_s4 * run.view.radius_m * w.powi(4) * g.powi(3)))
+    };
+    let mut data = found.ledger.column(0).clone();
+    data.add(1.0, &Column::within(found.runs.iter().map(shift).collect()));
+    found.ledger.replace(0, data);
 }

@@ -1,7 +1,8 @@
 //! What a search found, with all that is needed to refit it.
-use super::basis::axpy;
+use super::basis::Basis;
+use super::column::Column;
 use super::item::{Item, Kind};
-use super::ledger::{Ledger, Samples};
+use super::ledger::Ledger;
 use super::linear::{Solution, solve};
 use super::roughness::Teeth;
 use super::search::columns_of;
@@ -9,12 +10,15 @@ use super::spread::Spread;
 use super::survey::{Lag, Prepared, Response};
 use super::tangent::Tangents;
 use super::tone::Tone;
+use std::sync::Arc;
 
 /// What the search found, with all that is needed to refit it.
 #[derive(Clone, Debug)]
 pub struct Explained {
     /// The runs, ready.
-    pub runs: Vec<Prepared>,
+    pub runs: Arc<[Prepared]>,
+    /// The low orders of each run with nothing hidden.
+    pub bases: Vec<Arc<Basis>>,
     /// Shared response, as refined.
     pub response: Response,
     /// Lag of the machine behind the command.
@@ -43,14 +47,19 @@ pub struct Explained {
     pub apart_m2: f64,
 }
 
-/// What nuisance and chosen explanations leave, run by run.
-pub fn residual(found: &Explained) -> Samples {
-    let mut left = found.ledger.samples(0).clone();
+impl Explained {
+    /// Each run once.
+    pub fn all(&self) -> Vec<f64> {
+        vec![1.0; self.runs.len()]
+    }
+}
+
+/// What nuisance and chosen explanations leave.
+pub fn residual(found: &Explained) -> Column {
+    let mut left = found.ledger.column(0).clone();
     let columns = columns_of(&found.nuisance, &found.items, &found.chosen);
     for (&column, &amount) in columns.iter().zip(&found.solution.coefficients) {
-        for (left, samples) in left.iter_mut().zip(found.ledger.samples(column)) {
-            axpy(-amount, samples, left);
-        }
+        left.add(-amount, found.ledger.column(column));
     }
     left
 }
@@ -81,11 +90,6 @@ pub fn energies_of(found: &Explained, weights: &[f64], set: &[usize]) -> (Vec<f6
         })
         .collect();
     (each, (whole - gain(&[])).max(0.0))
-}
-
-/// Number of samples of all runs.
-pub fn samples(runs: &Samples) -> f64 {
-    runs.iter().map(|run| run.len() as f64).sum()
 }
 
 /// Fits nuisance and chosen again.

@@ -4,7 +4,6 @@
 //! their sizes; the shapes (pitch, time constants) are those found on all runs. The machine with the causes
 //! built in runs the circles left out, in the time domain, and what is measured there is compared.
 use super::baseline::{Size, fit_lag};
-use super::basis::{Basis, dot};
 use super::duration::Clamp;
 use super::explained::Explained;
 use super::item::Kind;
@@ -12,6 +11,7 @@ use super::linear::solve;
 use super::material::prune;
 use super::search::{columns_of, select};
 use super::survey::Response;
+use super::vector::dot;
 use crate::campaign::Campaign;
 use crate::causes::{Cause, Effect};
 use crate::model_file::{ModelFile, Servo};
@@ -238,14 +238,14 @@ fn fold(
                 None => test.started_s = found.runs[i].view.elapsed * found.runs[i].view.campaign_s,
             }
             // What the search hid from itself is measured all the same.
-            let basis = Basis::new(&run.samples.angle_rad);
+            let basis = &found.bases[i];
             let samples = run.samples.deviation_m.len() as f64;
             let left = |prediction: &[f64]| -> f64 {
                 let rest: Vec<f64> =
                     run.samples.deviation_m.iter().zip(prediction).map(|(y, p)| y - p).collect();
-                let coordinates = basis.coordinates(&rest);
                 // The centre is the operator's.
-                (dot(&rest, &rest) - coordinates[1].powi(2) - coordinates[2].powi(2)).max(0.0) / samples
+                let [cos, sin] = basis.centre(&rest);
+                (dot(&rest, &rest) - cos * cos - sin * sin).max(0.0) / samples
             };
             let simulated = |machine: &Machine| left(&circle(machine, &test).deviation_m);
             let base = simulated(&baseline);
@@ -289,7 +289,7 @@ fn beta_of(sizes: &[Size]) -> [f64; 2] {
 
 /// The model file of what was found on all runs.
 pub fn extended_model(campaign: &Campaign, found: &Explained, effects: Vec<Effect>) -> ModelFile {
-    let weights = vec![1.0; found.runs.len()];
+    let weights = found.all();
     let response = fitted(found, &weights, &found.chosen).map_or(found.response, |(response, _)| response);
     let servo = if response.b_s4 > 0.0 {
         let omega_n2 = response.b_s4.powf(-0.5);

@@ -1,10 +1,10 @@
 //! Explanations that compete: causes of the list and patterns without a name, and what each costs.
-use super::ledger::Samples;
+use super::basis::Low;
+use super::column::Column;
 use super::pattern::Pattern;
 use super::survey::Prepared;
-use crate::causes::Cause;
+use crate::causes::{Cause, Harmonics};
 use giotto_shared::Axis;
-use rayon::prelude::*;
 
 /// Price of one listed column: ln(78 runs) + 2·ln(25 competitors), about 11, and a margin for the scatter
 /// being estimated.
@@ -58,22 +58,33 @@ impl Kind {
         }
     }
 
-    /// One column, m per unit, at each sample of each run; 0 where a run hides its samples.
-    pub fn samples(&self, index: usize, runs: &[Prepared]) -> Samples {
-        runs.par_iter().map(|run| self.samples_of(index, run)).collect()
+    /// Its columns over all runs, m per unit; 0 where a run hides its samples.
+    pub fn columns_over(&self, runs: &[Prepared]) -> Vec<Column> {
+        let low = |index: usize| runs.iter().map(|run| self.low(index, run)).collect::<Option<Vec<Low>>>();
+        match (0..self.columns()).map(low).collect::<Option<Vec<_>>>() {
+            Some(low) => low.into_iter().map(Column::within).collect(),
+            None => Column::split(runs, self.columns(), |run, out| self.samples(run, out)),
+        }
     }
 
-    /// One column in one run.
-    pub fn samples_of(&self, index: usize, run: &Prepared) -> Vec<f64> {
-        let mut out = vec![0.0; run.deviation_m.len()];
+    /// Coordinates of one column in one run, where it is a few waves of the machine angle and nothing else.
+    pub fn low(&self, index: usize, run: &Prepared) -> Option<Low> {
+        self.harmonics(index, run).map(|waves| run.low_of(&waves))
+    }
+
+    fn harmonics(&self, index: usize, run: &Prepared) -> Option<Harmonics> {
         match self {
-            Self::Cause { cause, axis, shape } => {
-                cause.model().signature(*axis, shape, index, &run.view, &mut out);
-            }
-            Self::Pattern(pattern) => pattern.samples(index, run, &mut out),
+            Self::Cause { cause, axis, shape } => cause.model().harmonics(*axis, shape, &run.view),
+            Self::Pattern(pattern) => pattern.harmonics(index, run),
         }
-        run.mask(&mut out);
-        out
+    }
+
+    /// All columns at each sample of one run.
+    pub fn samples(&self, run: &Prepared, out: &mut [&mut [f64]]) {
+        match self {
+            Self::Cause { cause, axis, shape } => cause.model().signatures(*axis, shape, &run.view, out),
+            Self::Pattern(pattern) => out.iter_mut().for_each(|out| pattern.samples(run, out)),
+        }
     }
 
     /// What it has to take off χ², chosen from `shapes` starting shapes.

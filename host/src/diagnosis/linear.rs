@@ -1,8 +1,9 @@
 //! Small least-squares problems of the search, on normal equations that the ledger has summed.
+use super::products::Products;
 use nalgebra::{DMatrix, DVector};
 
 /// Solution of the normal equations for a set of columns.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Solution {
     /// Coefficients in the order of the set.
     pub coefficients: Vec<f64>,
@@ -14,17 +15,17 @@ pub struct Solution {
 
 /// Solves for the columns `set` of the summed products (column 0 is the data). `None`: they are not
 /// independent in these runs (scaled pivot below 1e-9).
-pub fn solve(products: &DMatrix<f64>, set: &[usize]) -> Option<Solution> {
+pub fn solve(products: &Products, set: &[usize]) -> Option<Solution> {
     let n = set.len();
     if n == 0 {
         return Some(Solution { coefficients: Vec::new(), covariance: DMatrix::zeros(0, 0), gain: 0.0 });
     }
-    let scale: Vec<f64> = set.iter().map(|&i| products[(i, i)].sqrt()).collect();
+    let scale: Vec<f64> = set.iter().map(|&i| products.at(i, i).sqrt()).collect();
     if scale.iter().any(|s| !s.is_finite() || *s <= 0.0) {
         return None;
     }
-    let matrix = DMatrix::from_fn(n, n, |i, j| products[(set[i], set[j])] / (scale[i] * scale[j]));
-    let right = DVector::from_fn(n, |i, _| products[(set[i], 0)] / scale[i]);
+    let matrix = DMatrix::from_fn(n, n, |i, j| products.at(set[i], set[j]) / (scale[i] * scale[j]));
+    let right = DVector::from_fn(n, |i, _| products.at(set[i], 0) / scale[i]);
     let factor = matrix.cholesky()?;
     if factor.l_dirty().diagonal().iter().any(|pivot| pivot * pivot < 1e-9) {
         return None;
@@ -41,7 +42,7 @@ pub fn solve(products: &DMatrix<f64>, set: &[usize]) -> Option<Solution> {
 /// A set of columns factored once, to which candidates are added one at a time: n² for each instead of n³.
 #[derive(Clone, Debug)]
 pub struct Factor<'a> {
-    products: &'a DMatrix<f64>,
+    products: &'a Products,
     set: Vec<usize>,
     /// Rows of L of the scaled normal matrix, one behind the other, each followed by its forward solution.
     rows: Vec<Vec<f64>>,
@@ -50,7 +51,7 @@ pub struct Factor<'a> {
 
 impl<'a> Factor<'a> {
     /// The columns `set` of the summed products (column 0 is the data). `None`: they are not independent.
-    pub fn new(products: &'a DMatrix<f64>, set: &[usize]) -> Option<Self> {
+    pub fn new(products: &'a Products, set: &[usize]) -> Option<Self> {
         let mut factor = Self { products, set: Vec::new(), rows: Vec::new(), gain: 0.0 };
         set.iter().all(|&column| factor.push(column)).then_some(factor)
     }
@@ -72,7 +73,7 @@ impl<'a> Factor<'a> {
 
     fn push(&mut self, column: usize) -> bool {
         let p = self.products;
-        let own = p[(column, column)];
+        let own = p.at(column, column);
         if !own.is_finite() || own <= 0.0 {
             return false;
         }
@@ -80,7 +81,7 @@ impl<'a> Factor<'a> {
         let mut row = Vec::with_capacity(n + 2);
         for (i, (&other, earlier)) in self.set.iter().zip(&self.rows).enumerate() {
             let along: f64 = row.iter().zip(&earlier[..i]).map(|(a, b): (&f64, &f64)| a * b).sum();
-            row.push((p[(column, other)] / (own * p[(other, other)]).sqrt() - along) / earlier[i]);
+            row.push((p.at(column, other) / (own * p.at(other, other)).sqrt() - along) / earlier[i]);
         }
         let pivot = 1.0 - row.iter().map(|l| l * l).sum::<f64>();
         // The same bound as in `solve`; not a number fails it too.
@@ -88,7 +89,7 @@ impl<'a> Factor<'a> {
             return false;
         }
         let along: f64 = row.iter().zip(&self.rows).map(|(l, earlier)| l * earlier[earlier.len() - 1]).sum();
-        let forward = (p[(column, 0)] / own.sqrt() - along) / pivot.sqrt();
+        let forward = (p.at(column, 0) / own.sqrt() - along) / pivot.sqrt();
         row.push(pivot.sqrt());
         row.push(forward);
         self.gain += forward * forward;
@@ -136,7 +137,8 @@ mod tests {
         let x: Vec<f64> = (60..=70).map(f64::from).collect();
         let y: Vec<f64> = (130..=140).map(f64::from).collect();
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let products = DMatrix::from_row_slice(2, 2, &[dot(&y, &y), dot(&y, &x), dot(&x, &y), dot(&x, &x)]);
+        let both = [&y, &x];
+        let products = Products::from_fn(2, |i, j| dot(both[i], both[j]));
         let solution = solve(&products, &[1]).unwrap();
         assert!((solution.coefficients[0] / 2.074_380_165_289_26 - 1.0).abs() < 1e-12);
         assert!(((dot(&y, &y) - solution.gain) / 127.272_727_272_727 - 1.0).abs() < 1e-9);
@@ -144,7 +146,7 @@ mod tests {
 
     #[test]
     fn dependent_columns_are_refused() {
-        let products = DMatrix::from_row_slice(3, 3, &[4.0, 2.0, 4.0, 2.0, 1.0, 2.0, 4.0, 2.0, 4.0]);
+        let products = Products::from_fn(3, |i, j| [2.0, 1.0, 2.0][i] * [2.0, 1.0, 2.0][j]);
         assert!(solve(&products, &[1, 2]).is_none());
     }
 
@@ -154,7 +156,7 @@ mod tests {
             (0..40).map(|i| f64::from((i * (3 + 2 * k as i32) + i * i) % 17) - 6.0).collect()
         });
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let products = DMatrix::from_fn(5, 5, |i, j| dot(&columns[i], &columns[j]));
+        let products = Products::from_fn(5, |i, j| dot(&columns[i], &columns[j]));
         let mut factor = Factor::new(&products, &[3, 1]).unwrap();
         let direct = |set: &[usize]| solve(&products, set).unwrap().gain;
         assert!((factor.gain() / direct(&[1, 3]) - 1.0).abs() < 1e-12);

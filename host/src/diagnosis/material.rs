@@ -1,5 +1,5 @@
 //! What is too small to be of interest, real or not: it may be the error of another explanation's form.
-use super::explained::{Explained, energies, energies_of, samples};
+use super::explained::{Explained, energies, energies_of};
 use super::tone::Tone;
 
 /// Root mean square below which an explanation is of no interest, as a share of the noise of a sample.
@@ -9,17 +9,15 @@ const SMALLEST_OF_EXPLAINED: [f64; 2] = [0.045, 0.07];
 
 /// Root mean square below which a pattern is of no interest, m.
 pub fn smallest_pattern_m(found: &Explained) -> f64 {
-    let (_, explained) = energies(found, &vec![1.0; found.runs.len()]);
-    let count = samples(found.ledger.samples(0));
-    (SMALLEST_OF_NOISE * found.spread.noise_m()).max(SMALLEST_OF_EXPLAINED[1] * (explained / count).sqrt())
+    SMALLEST_OF_NOISE * found.spread.noise_m()
 }
 
 /// Whether a tone is large enough to be of interest.
 pub fn is_material(found: &Explained, tone: &Tone) -> bool {
-    let (_, explained) = energies(found, &vec![1.0; found.runs.len()]);
+    let (_, explained) = energies(found, &found.all());
     // Teeth and other tones, too, leave something of the kind.
     let explained = explained + found.apart_m2;
-    let count = samples(found.ledger.samples(0));
+    let count = found.ledger.samples(&found.all());
     let rms = (tone.whole_energy_m2() / count).sqrt();
     rms > 2.0 * SMALLEST_OF_NOISE * found.spread.noise_m()
         && rms > SMALLEST_OF_EXPLAINED[1] * (explained / count).sqrt()
@@ -27,7 +25,7 @@ pub fn is_material(found: &Explained, tone: &Tone) -> bool {
 
 /// Drops from a set what is real perhaps but of no interest, the smallest first, and bars it from coming back.
 pub fn prune(found: &Explained, weights: &[f64], mut set: Vec<usize>, barred: &mut Vec<usize>) -> Vec<usize> {
-    let count: f64 = found.ledger.samples(0).iter().zip(weights).map(|(run, w)| w * run.len() as f64).sum();
+    let count = found.ledger.samples(weights);
     loop {
         let (each, whole) = energies_of(found, weights, &set);
         // Beside what was taken out before, too, the search's own may be the error of another's form.

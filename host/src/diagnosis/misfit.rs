@@ -1,12 +1,14 @@
 //! The misfit, seen: what the baseline leaves, by kind.
-use super::basis::{ORDERS, dot};
+use super::basis::{COLUMNS, ORDERS};
+use super::column::Column;
 use super::explained::{Explained, residual};
-use super::ledger::Samples;
 use super::places::{PLACES, place_means};
 use super::roughness;
 use super::spread::WHOLE;
 use super::survey::Prepared;
 use super::tone::Tone;
+use super::vector::dot;
+use crate::causes::Harmonics;
 use serde::Serialize;
 
 /// Root mean squares over all samples, µm.
@@ -33,43 +35,54 @@ pub struct Misfit {
 /// Root mean square of what the found model leaves in sample, µm.
 pub fn rms_um(found: &Explained) -> f64 {
     let left = residual(found);
-    let (mut sum, mut count) = (0.0, 0.0);
-    for (run, left) in found.runs.iter().zip(&left) {
-        let c = run.basis.coordinates(left);
-        sum += dot(left, left) - c[1] * c[1] - c[2] * c[2];
-        count += left.len() as f64;
+    let sum: f64 = energies_m2(found, &left).iter().sum();
+    (sum / found.ledger.samples(&found.all()).max(1.0)).max(0.0).sqrt() * 1e6
+}
+
+/// Sum of squares of a column in each run, the centre free, m².
+fn energies_m2(found: &Explained, column: &Column) -> Vec<f64> {
+    let energy = |(index, run): (usize, &Prepared)| {
+        let (low, outside) = (&column.low()[index], column.outside(run));
+        let low = low[0] * low[0] + (3..COLUMNS).map(|k| low[k] * low[k]).sum::<f64>();
+        low + dot(outside, outside)
+    };
+    found.runs.iter().enumerate().map(energy).collect()
+}
+
+/// The baseline's misfit with its own coefficient fitted, by least squares of the samples; and the coefficient.
+pub fn of_baseline(found: &Explained) -> (Column, f64) {
+    let (data, own) = (found.ledger.column(0), found.ledger.column(found.nuisance[0]));
+    let (mut up, mut down) = (0.0, 0.0);
+    for (index, run) in found.runs.iter().enumerate() {
+        let (y, x) = (&data.low()[index], &own.low()[index]);
+        up += dot(y, x) + dot(data.outside(run), own.outside(run));
+        down += dot(x, x) + dot(own.outside(run), own.outside(run));
     }
-    (sum / f64::max(count, 1.0)).max(0.0).sqrt() * 1e6
+    let amount = if down > 0.0 { up / down } else { 0.0 };
+    let mut left = data.clone();
+    left.add(-amount, own);
+    (left, amount)
 }
 
 /// Splits what the baseline leaves. The kinds are orthogonal but for drift, which is a part of size.
 pub fn split(found: &Explained) -> Misfit {
-    let data: &Samples = found.ledger.samples(0);
-    let count: f64 = data.iter().map(|run| run.len() as f64).sum::<f64>().max(1.0);
-    // Size after the baseline's own coefficient has been fitted.
-    let own = found.ledger.samples(found.nuisance[0]);
-    let (mut up, mut down) = (0.0, 0.0);
-    for (y, x) in data.iter().zip(own) {
-        up += dot(y, x);
-        down += dot(x, x);
-    }
-    let amount = if down > 0.0 { up / down } else { 0.0 };
-    let left: Samples =
-        data.iter().zip(own).map(|(y, x)| y.iter().zip(x).map(|(y, x)| y - amount * x).collect()).collect();
+    let count = found.ledger.samples(&found.all()).max(1.0);
+    let (left, _) = of_baseline(found);
     // Of a circle that teeth hide for the most part no harmonics are read.
     let seen = |run: &Prepared| run.visible() as f64 > WHOLE * run.deviation_m.len() as f64;
     let harmonics: Vec<Harmonics> = found
         .runs
         .iter()
-        .zip(&left)
-        .map(|(run, left)| if seen(run) { run.basis.harmonics(left) } else { Harmonics::default() })
+        .zip(left.low())
+        .map(|(run, low)| if seen(run) { run.basis.harmonics_of(low) } else { Harmonics::default() })
         .collect();
-    let (mut whole, mut size) = (0.0, 0.0);
-    for (run, (left, harmonics)) in found.runs.iter().zip(left.iter().zip(&harmonics)) {
-        let c = run.basis.coordinates(left);
-        whole += dot(left, left) - c[1] * c[1] - c[2] * c[2];
-        size += left.len() as f64 * harmonics[0][0].powi(2);
-    }
+    let whole: f64 = energies_m2(found, &left).iter().sum();
+    let size: f64 = found
+        .runs
+        .iter()
+        .zip(&harmonics)
+        .map(|(run, waves)| run.place.len() as f64 * waves.0[0][0].powi(2))
+        .sum();
     let [even, odd] = parity(found, &harmonics);
     let places = localised(&place_means(&found.runs, &left), count);
     let tone: f64 = found.tones.iter().map(Tone::whole_energy_m2).sum();
@@ -87,8 +100,6 @@ pub fn split(found: &Explained) -> Misfit {
     }
 }
 
-type Harmonics = [[f64; 2]; ORDERS + 1];
-
 /// Energy of the harmonics 2 to 8 that is the same in both directions, and that flips: by pairs of runs of one
 /// radius and speed. A run without a twin counts half to each.
 fn parity(found: &Explained, harmonics: &[Harmonics]) -> [f64; 2] {
@@ -103,10 +114,10 @@ fn parity(found: &Explained, harmonics: &[Harmonics]) -> [f64; 2] {
         let half = 0.5 * run.deviation_m.len() as f64;
         for order in 2..=ORDERS {
             for part in 0..2 {
-                let here = own[order][part];
+                let here = own.0[order][part];
                 match twin {
                     Some(twin) => {
-                        let there = harmonics[twin][order][part];
+                        let there = harmonics[twin].0[order][part];
                         energy[0] += half * (0.5 * (here + there)).powi(2);
                         energy[1] += half * (0.5 * (here - there)).powi(2);
                     }
@@ -150,11 +161,11 @@ fn localised(places: &[[f64; PLACES]], count: f64) -> f64 {
 fn drift_um(found: &Explained, harmonics: &[Harmonics]) -> f64 {
     let n = found.runs.len().max(1) as f64;
     let mean_t = found.runs.iter().map(|run| run.view.elapsed).sum::<f64>() / n;
-    let mean_y = harmonics.iter().map(|h| h[0][0]).sum::<f64>() / n;
+    let mean_y = harmonics.iter().map(|h| h.0[0][0]).sum::<f64>() / n;
     let (mut ty, mut tt) = (0.0, 0.0);
     for (run, h) in found.runs.iter().zip(harmonics) {
         let t = run.view.elapsed - mean_t;
-        ty += t * (h[0][0] - mean_y);
+        ty += t * (h.0[0][0] - mean_y);
         tt += t * t;
     }
     if tt > 0.0 { (ty * ty / tt / n).sqrt() * 1e6 } else { 0.0 }

@@ -7,6 +7,7 @@
 //! is found is stated with its doubts ([`verdict`], [`unexplained`]) and proven on runs left out ([`gain`]).
 pub mod baseline;
 pub mod basis;
+pub mod column;
 pub mod duration;
 pub mod explain;
 pub mod explained;
@@ -21,6 +22,7 @@ pub mod pattern;
 pub mod picture;
 pub mod pitch;
 pub mod places;
+pub mod products;
 pub mod propose;
 pub mod roughness;
 pub mod search;
@@ -30,6 +32,7 @@ pub mod survey;
 pub mod tangent;
 pub mod tone;
 pub mod unexplained;
+pub mod vector;
 pub mod verdict;
 
 pub use finding::{Estimate, Finding, Unexplained};

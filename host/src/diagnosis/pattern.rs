@@ -3,6 +3,7 @@
 //! They compete with the causes on the same evidence, so that an effect outside the list is not bent into
 //! it: a third harmonic that flips with direction explains such data better than any listed cause could.
 use super::survey::Prepared;
+use crate::causes::Harmonics;
 use serde::Serialize;
 
 /// How a pattern depends on feed and radius: f^a·R^b, scaled to about 1 over the campaign.
@@ -19,13 +20,20 @@ impl Law {
         Self { feed, radius }
     }
 
-    fn at(self, run: &Prepared) -> f64 {
+    /// Size in a run.
+    pub(super) fn at(self, run: &Prepared) -> f64 {
         // Reference 0.3 m/s and 0.15 m: only a scale.
         (run.view.feed_m_s / 0.3).powf(self.feed) * (run.view.radius_m / 0.15).powf(self.radius)
     }
 }
 
-const LAWS: [Law; 8] = [
+/// Widths of a bump beyond which it is nothing.
+const FAR: f64 = 9.0;
+/// Of a pattern whose coefficient is 1, m.
+const SCALE: f64 = 1e-6;
+
+/// The laws that patterns go by.
+pub(super) const LAWS: [Law; 8] = [
     Law::new(0.0, 0.0),
     Law::new(1.0, 0.0),
     Law::new(2.0, -1.0),
@@ -93,32 +101,46 @@ impl Pattern {
         }
     }
 
-    /// Values at each sample of a run (any scale).
-    pub fn samples(&self, column: usize, run: &Prepared, out: &mut [f64]) {
-        const SCALE: f64 = 1e-6;
-        let parity = |odd: bool| if odd { run.view.sign } else { 1.0 };
+    /// Whether it flips with the direction.
+    pub const fn odd(&self) -> bool {
+        match self {
+            Self::Size { odd, .. } | Self::Harmonic { odd, .. } | Self::Bump { odd, .. } => *odd,
+            Self::Time { .. } => false,
+        }
+    }
+
+    /// Size in a run with the parity, m.
+    fn amplitude_m(&self, run: &Prepared) -> f64 {
+        SCALE * self.size(run) * if self.odd() { run.view.sign } else { 1.0 }
+    }
+
+    /// As waves of the machine angle (any scale); nothing for a bump.
+    pub fn harmonics(&self, column: usize, run: &Prepared) -> Option<Harmonics> {
+        let size = self.amplitude_m(run);
         match *self {
-            Self::Size { odd, law } => out.fill(SCALE * parity(odd) * law.at(run)),
-            Self::Time { step, law } => {
+            Self::Size { .. } => Some(Harmonics::mean(size)),
+            Self::Time { step, .. } => {
                 let share = run.view.elapsed;
-                out.fill(SCALE * law.at(run) * step.map_or(share, |at| f64::from(share > at)));
+                Some(Harmonics::mean(size * step.map_or(share, |at| f64::from(share > at))))
             }
-            Self::Harmonic { order, odd, machine, law } => {
-                let size = SCALE * parity(odd) * law.at(run);
-                let turn = if machine { 0.0 } else { run.turned_rad };
-                for (out, psi) in out.iter_mut().zip(&run.view.psi_rad) {
-                    let (sin, cos) = (order as f64 * (psi + turn)).sin_cos();
-                    *out = size * if column == 0 { cos } else { sin };
-                }
+            Self::Harmonic { order, machine, .. } => {
+                let waves = Harmonics::wave(order, if column == 0 { [size, 0.0] } else { [0.0, size] });
+                // Waves of the clock are waves of the recorded angle.
+                Some(if machine { waves } else { waves.seen_from(-run.turned_rad) })
             }
-            Self::Bump { centre_rad, width_rad, odd, law } => {
-                let size = SCALE * parity(odd) * law.at(run);
-                for (out, psi) in out.iter_mut().zip(&run.view.psi_rad) {
-                    let turn = std::f64::consts::TAU;
-                    let off = (psi - centre_rad + 0.5 * turn).rem_euclid(turn) - 0.5 * turn;
-                    *out = size * (-0.5 * (off / width_rad).powi(2)).exp();
-                }
-            }
+            Self::Bump { .. } => None,
+        }
+    }
+
+    /// Values at each sample of a run (any scale); only bumps need them.
+    pub fn samples(&self, run: &Prepared, out: &mut [f64]) {
+        let Self::Bump { centre_rad, width_rad, .. } = *self else { return };
+        let size = self.amplitude_m(run);
+        for (out, psi) in out.iter_mut().zip(run.view.psi_rad.iter()) {
+            let turns = (psi - centre_rad) * (1.0 / std::f64::consts::TAU);
+            let off = std::f64::consts::TAU * (turns - turns.round()) / width_rad;
+            // Far out there is nothing left of it to the last bit.
+            *out = if off.abs() < FAR { size * (-0.5 * off * off).exp() } else { 0.0 };
         }
     }
 
@@ -147,7 +169,7 @@ impl Pattern {
     }
 
     /// Harmonics that no cause covers, of orders up to `highest`.
-    pub fn harmonics(highest: usize) -> Vec<Self> {
+    pub fn all_harmonics(highest: usize) -> Vec<Self> {
         let mut out = Vec::new();
         for order in 2..=highest {
             for law in LAWS {
@@ -168,19 +190,17 @@ impl Pattern {
         out
     }
 
-    /// Bumps all around the circle.
-    pub fn bumps() -> Vec<Self> {
-        let mut out = Vec::new();
-        for (places, width_deg) in [(72, 3.0), (36, 8.0), (18, 16.0)] {
-            for place in 0..places {
-                let centre_rad = std::f64::consts::TAU * f64::from(place) / f64::from(places);
-                for odd in [false, true] {
-                    for law in [Law::new(0.0, 0.0), Law::new(1.0, 0.0), Law::new(0.0, 1.0)] {
-                        out.push(Self::Bump { centre_rad, width_rad: f64::to_radians(width_deg), odd, law });
-                    }
-                }
-            }
-        }
-        out
+    /// Centres and widths of the bumps all around the circle, rad.
+    pub fn places_of_bumps() -> impl Iterator<Item = (f64, f64)> {
+        [(72, 3.0_f64), (36, 8.0), (18, 16.0)].into_iter().flat_map(|(places, width_deg)| {
+            let centre = move |place: i32| std::f64::consts::TAU * f64::from(place) / f64::from(places);
+            (0..places).map(move |place| (centre(place), width_deg.to_radians()))
+        })
+    }
+
+    /// Laws of the bumps, and whether they flip with the direction.
+    pub fn laws_of_bumps() -> impl Iterator<Item = (Law, bool)> {
+        let laws = [Law::new(0.0, 0.0), Law::new(1.0, 0.0), Law::new(0.0, 1.0)];
+        laws.into_iter().flat_map(|law| [false, true].map(|odd| (law, odd)))
     }
 }

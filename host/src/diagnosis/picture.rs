@@ -1,8 +1,8 @@
 //! Run by run, what was measured and what the simulation leaves of it, before and after: what plots draw.
-use super::basis::{axpy, dot};
+use super::column::Column;
 use super::explained::{Explained, residual};
 use super::item::Kind;
-use super::ledger::Samples;
+use super::misfit::of_baseline;
 use super::search::columns_of;
 use crate::campaign::Campaign;
 use std::f64::consts::TAU;
@@ -28,15 +28,9 @@ pub struct RunPicture {
 
 /// Draws every run. `seen` is the campaign without the effects of a given model.
 pub fn draw(campaign: &Campaign, seen: &Campaign, found: &Explained) -> Vec<RunPicture> {
-    let data = found.ledger.samples(0);
-    let own = found.ledger.samples(found.nuisance[0]);
     // The baseline with its own coefficient fitted, as in `misfit`.
-    let (mut up, mut down) = (0.0, 0.0);
-    for (y, x) in data.iter().zip(own) {
-        up += dot(y, x);
-        down += dot(x, x);
-    }
-    let amount = if down > 0.0 { up / down } else { 0.0 };
+    let (_, amount) = of_baseline(found);
+    let (data, own) = (found.ledger.column(0), found.ledger.column(found.nuisance[0]));
     let left = left_by_simulation(found);
     found
         .runs
@@ -50,19 +44,20 @@ pub fn draw(campaign: &Campaign, seen: &Campaign, found: &Explained) -> Vec<RunP
             // The baseline is a size: the same at every sample of the run. It knows the programmed feed only.
             let size = (0..raw.len()).find(|&i| visible(i)).map_or(0.0, |i| {
                 let slowed = found.response.gain(run.programmed_m_s / radius) - run.view.gain;
-                run.deviation_m[i] - data[at][i] + amount * own[at][i] + radius * slowed
+                let (data, own) = (data.samples(run, at), own.samples(run, at));
+                run.deviation_m[i] - data[i] + amount * own[i] + radius * slowed
             });
             let centred = |samples: Vec<f64>| -> (f64, Vec<f64>) {
                 let mut read = samples.clone();
                 run.mask(&mut read);
-                let harmonics = run.basis.harmonics(&read);
+                let harmonics = run.basis.harmonics(&read).0;
                 let [c, s] = harmonics[1];
                 let free = samples.iter().zip(theta).map(|(y, a)| y - c * a.cos() - s * a.sin()).collect();
                 (harmonics[0][0], free)
             };
             let measured = centred(campaign.runs[run.index].samples.deviation_m.clone());
             let before = centred(raw.iter().map(|y| y - size).collect());
-            let after = centred(left[at].clone());
+            let after = centred(left.samples(run, at));
             let everywhere = |_: usize| true;
             RunPicture {
                 index: run.index,
@@ -81,17 +76,14 @@ pub fn draw(campaign: &Campaign, seen: &Campaign, found: &Explained) -> Vec<RunP
 
 /// What the extended simulation leaves: the residual of the search, and what has no name, which no simulation
 /// holds.
-fn left_by_simulation(found: &Explained) -> Samples {
+fn left_by_simulation(found: &Explained) -> Column {
     let mut left = residual(found);
     let columns = columns_of(&found.nuisance, &found.items, &found.chosen);
     for &item in &found.chosen {
         let Kind::Pattern(_) = found.items[item].kind else { continue };
         for own in &found.items[item].columns {
             let Some(at) = columns.iter().position(|column| column == own) else { continue };
-            let amount = found.solution.coefficients[at];
-            for (left, samples) in left.iter_mut().zip(found.ledger.samples(*own)) {
-                axpy(amount, samples, left);
-            }
+            left.add(found.solution.coefficients[at], found.ledger.column(*own));
         }
     }
     left

@@ -2,7 +2,7 @@
 //!
 //! `r = A·cosψ·sin(w·x + φ)` with `x = R·cosψ` is one frequency over x, whatever the radius. What pulls at each
 //! place, folded into fine bins of x, holds every pitch at once in one transform; 1 % of a gain is lost to the bins.
-use super::ledger::Samples;
+use super::column::Column;
 use super::survey::Prepared;
 use giotto_shared::Axis;
 use rustfft::FftPlanner;
@@ -26,7 +26,7 @@ const FINENESS: f64 = 4.0;
 /// explanations leave, so that its product with a column is that column's pull.
 pub fn scan(
     runs: &[Prepared],
-    whitened: &Samples,
+    whitened: &Column,
     noise_m2: f64,
     axis: Axis,
     finest_wave_per_m: f64,
@@ -38,8 +38,9 @@ pub fn scan(
     let length = ((FINENESS * travel_m * bins_per_m) as usize + 1).next_power_of_two();
     let mut pull = vec![Complex::new(0.0, 0.0); length];
     let mut own = pull.clone();
-    for (run, whitened) in runs.iter().zip(whitened) {
-        for (at, (direction, value)) in run.view.direction.iter().zip(whitened).enumerate() {
+    for (index, run) in runs.iter().enumerate() {
+        let pulls = whitened.samples(run, index);
+        for (at, (direction, value)) in run.view.direction.iter().zip(&pulls).enumerate() {
             if run.hidden.get(at).is_some_and(|hidden| *hidden) {
                 continue;
             }

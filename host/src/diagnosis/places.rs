@@ -1,30 +1,32 @@
 //! The circle in bins of the machine angle.
+use super::column::Column;
 use super::survey::Prepared;
+use super::vector::axpy;
 use rayon::prelude::*;
 
 /// Bins of the machine angle in which what is left is averaged.
 pub const PLACES: usize = 72;
 
-/// Mean residual in each bin of the machine angle with the mean and the centre of the run taken off.
-pub fn place_means(runs: &[Prepared], left: &[Vec<f64>]) -> Vec<[f64; PLACES]> {
-    runs.par_iter()
-        .zip(left)
-        .map(|(run, left)| {
-            let mut clean = left.clone();
-            let coordinates = run.basis.coordinates(left);
-            for (k, amount) in coordinates.iter().enumerate().take(3) {
-                run.basis.add(k, -amount, &mut clean);
-            }
-            let (mut sums, mut counts) = ([0.0; PLACES], [0.0; PLACES]);
-            for (value, psi) in clean.iter().zip(&run.view.psi_rad) {
-                let share = (psi / std::f64::consts::TAU).rem_euclid(1.0);
-                let bin = ((share * PLACES as f64) as usize).min(PLACES - 1);
-                sums[bin] += value;
-                counts[bin] += 1.0;
-            }
-            std::array::from_fn(|bin| if counts[bin] > 0.0 { sums[bin] / counts[bin] } else { 0.0 })
-        })
-        .collect()
+/// Mean of a column in each bin of the machine angle, with the mean and the centre of each run taken off.
+pub fn place_means(runs: &[Prepared], column: &Column) -> Vec<[f64; PLACES]> {
+    let means = |(index, run): (usize, &Prepared)| {
+        let mut low = column.low()[index];
+        low[..3].fill(0.0);
+        let mut clean = vec![0.0; run.deviation_m.len()];
+        axpy(1.0, column.outside(run), &mut clean);
+        run.basis.add(&low, &mut clean);
+        let (mut sums, mut counts) = ([0.0; PLACES], [0.0; PLACES]);
+        for (value, psi) in clean.iter().zip(run.view.psi_rad.iter()) {
+            let turns = psi * (1.0 / std::f64::consts::TAU);
+            // Less its floor, which is a call on some processors.
+            let share = turns - (turns as i64 - i64::from(turns < 0.0)) as f64;
+            let bin = ((share * PLACES as f64) as usize).min(PLACES - 1);
+            sums[bin] += value;
+            counts[bin] += 1.0;
+        }
+        std::array::from_fn(|bin| if counts[bin] > 0.0 { sums[bin] / counts[bin] } else { 0.0 })
+    };
+    runs.par_iter().enumerate().map(means).collect()
 }
 
 /// A bump over the bins, free of mean and first harmonic.

@@ -1,102 +1,158 @@
 //! Patterns that the data themselves suggest.
-use super::basis::ORDERS;
-use super::explained::{Explained, residual, samples};
+use super::basis::{Low, ORDERS};
+use super::explained::{Explained, residual};
 use super::item::{Item, Kind};
 use super::material::smallest_pattern_m;
-use super::pattern::Pattern;
+use super::pattern::{LAWS, Law, Pattern};
 use super::places::{PLACES, bump_weights, place_means};
 use super::search::columns_of;
 use super::survey::Prepared;
+use super::vector::axpy;
+use crate::causes::Harmonics;
 use rayon::prelude::*;
-
-type Harmonics = [[f64; 2]; ORDERS + 1];
+use std::sync::Arc;
 
 /// How many of the most promising patterns join the search each time.
 const PROMISING: usize = 6;
 
+/// A pattern that may be worth while.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    pattern: Pattern,
+    /// What it would take off χ².
+    gain: f64,
+    /// Energy that it would take, m².
+    energy_m2: f64,
+}
+
 /// Looks at what is left of the harmonics and of the places, and lets the best patterns compete.
-pub fn propose_patterns(found: &mut Explained, runs: &[Prepared]) {
-    let left = residual(found);
-    let noise = found.spread.noise_m2;
-    let columns = columns_of(&found.nuisance, &found.items, &found.chosen);
-    let amount = |column: usize| {
-        let at = columns.iter().position(|&c| c == column);
-        at.map_or(0.0, |at| found.solution.coefficients[at])
-    };
-    // Of what is left, and also beside each chosen cause as if it were not there: a pattern may describe its data better.
-    let view = |with: &[usize]| -> Vec<Harmonics> {
-        let terms: Vec<(f64, usize)> =
-            columns.iter().filter(|column| !with.contains(column)).map(|&c| (amount(c), c)).collect();
-        let of = |(run, prepared): (usize, &Prepared)| {
-            let mut coordinates = found.ledger.coordinates(0)[run];
-            for &(amount, column) in &terms {
-                for (own, other) in coordinates.iter_mut().zip(&found.ledger.coordinates(column)[run]) {
-                    *own -= amount * other;
-                }
-            }
-            prepared.basis.harmonics_of(coordinates)
-        };
-        runs.iter().enumerate().map(of).collect()
-    };
-    let listed = found.chosen.iter().filter(|&&item| found.items[item].listed());
-    let views: Vec<Vec<Harmonics>> =
-        std::iter::once(view(&[])).chain(listed.map(|&item| view(&found.items[item].columns))).collect();
-    let candidates: Vec<(usize, Pattern)> = (0..views.len())
-        .flat_map(|view| Pattern::harmonics(ORDERS).into_iter().map(move |p| (view, p)))
-        .collect();
-    let mut ranked: Vec<(f64, f64, Pattern)> = candidates
-        .into_par_iter()
-        .map(|(view, pattern)| {
-            let harmonics = &views[view];
-            let Pattern::Harmonic { order, odd, machine, .. } = pattern else { return (0.0, 0.0, pattern) };
-            let (mut re, mut im, mut own, mut energy) = (0.0, 0.0, 0.0, 0.0);
-            for (run, harmonics) in runs.iter().zip(harmonics) {
-                let between = found.spread.order_m2[order];
-                let variance = between + 2.0 * noise / run.deviation_m.len() as f64;
-                let size = pattern.size(run) * if odd { run.view.sign } else { 1.0 };
-                let turn = if machine { order as f64 * run.turned_rad } else { 0.0 };
-                let (sin, cos) = turn.sin_cos();
-                let [c, s] = harmonics[order];
-                re += size * (c * cos + s * sin) / variance;
-                im += size * (s * cos - c * sin) / variance;
-                own += size * size / variance;
-                energy += 0.5 * run.deviation_m.len() as f64 * size * size;
-            }
-            if own > 0.0 {
-                ((re * re + im * im) / own, energy * (re * re + im * im) / (own * own), pattern)
-            } else {
-                (0.0, 0.0, pattern)
-            }
-        })
-        .collect();
-    let places = place_means(runs, &left);
-    ranked.par_extend(Pattern::bumps().into_par_iter().map(|pattern| {
-        let Pattern::Bump { centre_rad, width_rad, odd, .. } = pattern else { return (0.0, 0.0, pattern) };
-        let weights = bump_weights(centre_rad, width_rad);
-        let (mut sum, mut own) = (0.0, 0.0);
-        for (run, means) in runs.iter().zip(&places) {
-            let variance = noise * PLACES as f64 / run.deviation_m.len() as f64;
-            let size = pattern.size(run) * if odd { run.view.sign } else { 1.0 };
-            for (weight, mean) in weights.iter().zip(means) {
-                sum += size * weight * mean / variance;
-                own += (size * weight).powi(2) / variance;
-            }
-        }
-        // What takes χ² off white samples takes noise²·χ² of energy.
-        let gain = if own > 0.0 { sum * sum / own } else { 0.0 };
-        (gain, gain * noise, pattern)
-    }));
-    let count = samples(found.ledger.samples(0));
+pub fn propose_patterns(found: &mut Explained) {
+    let runs = Arc::clone(&found.runs);
+    let sizes = Sizes::new(&runs);
+    let mut ranked = harmonics(found, &sizes);
+    ranked.extend(bumps(found, &sizes));
+    let count = found.ledger.samples(&found.all());
     let smallest_m = smallest_pattern_m(found);
-    ranked.retain(|(gain, energy, pattern)| {
-        let kind = Kind::Pattern(*pattern);
-        let rms = (energy / count).sqrt();
-        *gain > kind.price(1) && rms > 0.3 * smallest_m && !found.items.iter().any(|item| item.kind == kind)
+    ranked.retain(|candidate| {
+        let kind = Kind::Pattern(candidate.pattern);
+        let rms_m = (candidate.energy_m2 / count).sqrt();
+        candidate.gain > kind.price(1)
+            && rms_m > 0.3 * smallest_m
+            && !found.items.iter().any(|item| item.kind == kind)
     });
-    ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-    for (_, _, pattern) in ranked.into_iter().take(PROMISING) {
+    ranked.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let mut new: Vec<Pattern> = Vec::with_capacity(PROMISING);
+    for candidate in ranked {
+        if new.len() < PROMISING && !new.contains(&candidate.pattern) {
+            new.push(candidate.pattern);
+        }
+    }
+    for pattern in new {
         let kind = Kind::Pattern(pattern);
-        let columns = (0..kind.columns()).map(|i| found.ledger.push(runs, kind.samples(i, runs))).collect();
+        let columns = kind.columns_over(&runs).into_iter().map(|column| found.ledger.push(column)).collect();
         found.items.push(Item { price: kind.price(1), columns, kind, fitted_beside: None });
     }
+}
+
+/// The laws that patterns go by, in every run.
+struct Sizes {
+    sign: Vec<f64>,
+    by_law: Vec<Vec<f64>>,
+}
+
+impl Sizes {
+    fn new(runs: &[Prepared]) -> Self {
+        let by_law = LAWS.iter().map(|law| runs.iter().map(|run| law.at(run)).collect()).collect();
+        Self { sign: runs.iter().map(|run| run.view.sign).collect(), by_law }
+    }
+
+    /// Run by run; every pattern goes by one of the laws.
+    fn of(&self, law: Law, odd: bool) -> impl Iterator<Item = f64> {
+        let at = LAWS.iter().position(|other| *other == law);
+        let sizes = at.map_or(&[][..], |at| &self.by_law[at]);
+        sizes.iter().zip(&self.sign).map(move |(size, sign)| if odd { size * sign } else { *size })
+    }
+}
+
+/// Of what is left, and also beside each chosen cause as if it were not there: a pattern may describe its data better.
+fn views(found: &Explained) -> Vec<Vec<Harmonics>> {
+    let columns = columns_of(&found.nuisance, &found.items, &found.chosen);
+    let left = residual(found);
+    let view = |without: &[usize]| -> Vec<Harmonics> {
+        let mut low: Vec<Low> = left.low().to_vec();
+        for (column, amount) in columns.iter().zip(&found.solution.coefficients) {
+            if without.contains(column) {
+                for (own, other) in low.iter_mut().zip(found.ledger.column(*column).low()) {
+                    axpy(*amount, other, own);
+                }
+            }
+        }
+        found.runs.iter().zip(&low).map(|(run, low)| run.basis.harmonics_of(low)).collect()
+    };
+    let listed = found.chosen.iter().filter(|&&item| found.items[item].listed());
+    std::iter::once(view(&[])).chain(listed.map(|&item| view(&found.items[item].columns))).collect()
+}
+
+fn harmonics(found: &Explained, sizes: &Sizes) -> Vec<Candidate> {
+    let runs = &found.runs;
+    let patterns = Pattern::all_harmonics(ORDERS);
+    let one_view = |by_clock: Vec<Harmonics>| -> Vec<Candidate> {
+        let turned = |(run, waves): (&Prepared, &Harmonics)| waves.seen_from(-run.turned_rad);
+        let by_machine: Vec<Harmonics> = runs.iter().zip(&by_clock).map(turned).collect();
+        let candidate = |pattern: &Pattern| {
+            let Pattern::Harmonic { order, odd, machine, law } = *pattern else { return None };
+            let waves = if machine { &by_machine } else { &by_clock };
+            let (mut re, mut im, mut own, mut energy) = (0.0, 0.0, 0.0, 0.0);
+            for ((run, waves), size) in runs.iter().zip(waves).zip(sizes.of(law, odd)) {
+                let samples = run.deviation_m.len() as f64;
+                let variance = found.spread.order_m2[order] + 2.0 * found.spread.noise_m2 / samples;
+                let [c, s] = waves.0[order];
+                re += size * c / variance;
+                im += size * s / variance;
+                own += size * size / variance;
+                energy += 0.5 * samples * size * size;
+            }
+            let pull = re * re + im * im;
+            (own > 0.0).then(|| Candidate {
+                pattern: *pattern,
+                gain: pull / own,
+                energy_m2: energy * pull / (own * own),
+            })
+        };
+        patterns.iter().filter_map(candidate).collect()
+    };
+    views(found).into_par_iter().flat_map_iter(one_view).collect()
+}
+
+fn bumps(found: &Explained, sizes: &Sizes) -> Vec<Candidate> {
+    let noise_m2 = found.spread.noise_m2;
+    let places = place_means(&found.runs, &residual(found));
+    // Pull at each place and weight of all runs together, for each law and parity.
+    let laws: Vec<(Law, bool, [f64; PLACES], f64)> = Pattern::laws_of_bumps()
+        .map(|(law, odd)| {
+            let (mut pulls, mut own) = ([0.0; PLACES], 0.0);
+            for ((run, means), size) in found.runs.iter().zip(&places).zip(sizes.of(law, odd)) {
+                let variance = noise_m2 * PLACES as f64 / run.deviation_m.len() as f64;
+                axpy(size / variance, means, &mut pulls);
+                own += size * size / variance;
+            }
+            (law, odd, pulls, own)
+        })
+        .collect();
+    let mut out = Vec::new();
+    for (centre_rad, width_rad) in Pattern::places_of_bumps() {
+        let weights = bump_weights(centre_rad, width_rad);
+        let square: f64 = weights.iter().map(|weight| weight * weight).sum();
+        for (law, odd, pulls, own) in &laws {
+            let sum: f64 = weights.iter().zip(pulls).map(|(weight, pull)| weight * pull).sum();
+            let own = own * square;
+            if own > 0.0 {
+                // What takes χ² off white samples takes noise²·χ² of energy.
+                let gain = sum * sum / own;
+                let pattern = Pattern::Bump { centre_rad, width_rad, odd: *odd, law: *law };
+                out.push(Candidate { pattern, gain, energy_m2: gain * noise_m2 });
+            }
+        }
+    }
+    out
 }

@@ -3,7 +3,6 @@
 //! Teeth have no fixed place, so power is looked at: second differences of neighbouring samples, over bins of
 //! the speed of one axis. The first quarter second after a reversal is left out, since a friction spike is
 //! steep there too. Where teeth are found, the other explanations do not look.
-use super::ledger::Samples;
 use super::spread::Spread;
 use super::survey::Prepared;
 use giotto_shared::Axis;
@@ -41,7 +40,7 @@ const PARTLY: f64 = 1.15;
 const CONTRAST: f64 = 1.25;
 
 /// Looks for teeth on both axes.
-pub fn find(runs: &[Prepared], residual: &Samples, spread: &Spread) -> Vec<Teeth> {
+pub fn find(runs: &[Prepared], residual: &[Vec<f64>], spread: &Spread) -> Vec<Teeth> {
     let both = [Axis::X, Axis::Y].map(|axis| find_on(axis, runs, residual, spread, None));
     let rougher = |a: &Teeth, b: &Teeth| a.significance > b.significance;
     match both {
@@ -68,18 +67,18 @@ fn bin_of(speed: f64) -> Option<usize> {
 fn find_on(
     axis: Axis,
     runs: &[Prepared],
-    residual: &Samples,
+    residual: &[Vec<f64>],
     spread: &Spread,
     known: Option<&Teeth>,
 ) -> Option<Teeth> {
-    let quarter = if axis == Axis::Y { std::f64::consts::FRAC_PI_2 } else { 0.0 };
     let (sums, counts) = runs
         .par_iter()
         .zip(residual)
         .map(|(run, left)| {
             let (mut sums, mut counts) = ([0.0; BINS], [0.0; BINS]);
+            let strokes = run.view.strokes_of(Some(axis));
             for i in 1..left.len().saturating_sub(1) {
-                let share = run.view.since_reversal(run.view.psi_rad[i], quarter).0;
+                let share = strokes[i].share;
                 let facing = run.view.direction[i][axis.index()].abs();
                 // A step at the reversal itself shows beside it, if the lag is off.
                 let beside = share.min(1.0 - share) * std::f64::consts::PI < BESIDE_RAD;
@@ -136,13 +135,10 @@ fn find_on(
         .iter()
         .zip(residual)
         .filter_map(|(run, left)| {
-            let clean = {
-                let mut clean = left.clone();
-                for (k, amount) in run.basis.coordinates(left).iter().enumerate().take(3) {
-                    run.basis.add(k, -amount, &mut clean);
-                }
-                clean
-            };
+            let mut clean = left.clone();
+            let mut low = run.basis.coordinates(left).map(|c| -c);
+            low[3..].fill(0.0);
+            run.basis.add(&low, &mut clean);
             let zone: Vec<f64> = (0..left.len())
                 .filter(|&i| {
                     axis_speed(run, axis, i) < 0.6 * below_m_s
@@ -168,7 +164,7 @@ fn find_on(
 
 /// Runs in which the axis is both slow and fast have to be rough where it is slow and smooth where it is fast: a
 /// tone seen by a slow sampling is rough all around its run, and slow runs are those in which the axis is slow.
-fn contrast(axis: Axis, below_m_s: f64, runs: &[Prepared], residual: &Samples, noise_m2: f64) -> bool {
+fn contrast(axis: Axis, below_m_s: f64, runs: &[Prepared], residual: &[Vec<f64>], noise_m2: f64) -> bool {
     let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
     for (run, left) in runs.iter().zip(residual) {
         let (mut own, mut count) = ([0.0; 2], [0.0; 2]);

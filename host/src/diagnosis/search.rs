@@ -6,14 +6,14 @@
 //! when others make them needless, and are exchanged for better ones until nothing improves.
 use super::item::Item;
 use super::linear::Factor;
-use nalgebra::DMatrix;
+use super::products::Products;
 use std::cell::Cell;
 
 /// Most members.
 const MOST: usize = 14;
 
 /// Evidence of a set: `None` where its columns are not independent in these runs.
-pub fn evidence(products: &DMatrix<f64>, nuisance: &[usize], items: &[Item], set: &[usize]) -> Option<f64> {
+pub fn evidence(products: &Products, nuisance: &[usize], items: &[Item], set: &[usize]) -> Option<f64> {
     let price: f64 = set.iter().map(|&i| items[i].price).sum();
     Factor::new(products, &columns_of(nuisance, items, set)).map(|factor| factor.gain() - price)
 }
@@ -25,7 +25,7 @@ pub fn columns_of(nuisance: &[usize], items: &[Item], set: &[usize]) -> Vec<usiz
 
 /// The best set, starting from `start` and without the `barred`.
 pub fn select(
-    products: &DMatrix<f64>,
+    products: &Products,
     nuisance: &[usize],
     items: &[Item],
     start: &[usize],
@@ -101,14 +101,14 @@ mod tests {
     use crate::diagnosis::item::Kind;
 
     /// Products of the data and three columns: the first explains it, the second nearly does, the third not at all.
-    fn products() -> DMatrix<f64> {
+    fn products() -> Products {
         let columns: [Vec<f64>; 4] = [
             (0..60).map(|i| 2.0 * f64::from(i % 7) + 0.3 * f64::from((i * 13) % 5)).collect(),
             (0..60).map(|i| f64::from(i % 7)).collect(),
             (0..60).map(|i| f64::from(i % 7) + f64::from(i % 3)).collect(),
             (0..60).map(|i| f64::from((i * 31) % 11) - 5.0).collect(),
         ];
-        DMatrix::from_fn(4, 4, |i, j| columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum())
+        Products::from_fn(4, |i, j| columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum())
     }
 
     fn items(price: f64) -> Vec<Item> {
@@ -144,8 +144,8 @@ mod tests {
         let sum: Vec<f64> = one.iter().zip(&other).map(|(a, b)| a + b).collect();
         let columns = [sum, one, other, (0..60).map(|i| wave(i, 7)).collect()];
         let products =
-            DMatrix::from_fn(4, 4, |i, j| columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum());
-        let worth = products[(0, 0)];
+            Products::from_fn(4, |i, j| columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum());
+        let worth = products.at(0, 0);
         assert_eq!(select(&products, &[], &items(0.4 * worth), &[], &[]), vec![0, 1]);
         assert!(select(&products, &[], &items(0.6 * worth), &[], &[]).is_empty(), "above their worth");
     }

@@ -3,9 +3,11 @@
 //! Both are measured before any cause is assumed: the noise from second differences of neighbouring samples,
 //! the scatter from what is left of each run's harmonics when any dependence on R, direction, f, f²/R and
 //! time has been taken out. Tests against the noise within a run alone would make everything significant.
-use super::basis::{COLUMNS, ORDERS, order_of};
+use super::basis::{COLUMNS, Low, ORDERS, order_of};
 use super::linear;
 use super::survey::Prepared;
+use crate::causes::Harmonics;
+use rayon::prelude::*;
 
 /// Variance components, SI (m²).
 #[derive(Clone, Debug, PartialEq)]
@@ -23,7 +25,7 @@ impl Spread {
     }
 
     /// Share of a basis column that scatter between runs takes away from `samples` samples that are seen: 0 nothing, 1 all.
-    pub fn discounts(&self, samples: usize) -> [f64; COLUMNS] {
+    pub fn discounts(&self, samples: usize) -> Low {
         let mut out = [0.0; COLUMNS];
         for (column, out) in out.iter_mut().enumerate() {
             *out = match order_of(column) {
@@ -48,11 +50,12 @@ pub fn measure(runs: &[Prepared], residual: &[Vec<f64>]) -> Spread {
     let mut order_m2 = [0.0; ORDERS + 1];
     // Of a circle that is hidden for the most part nothing low can be read.
     let seen = |run: &Prepared| run.visible() as f64 > WHOLE * run.deviation_m.len() as f64;
-    let (runs, harmonics): (Vec<&Prepared>, Vec<_>) = runs
-        .iter()
+    // Waves of the machine angle, as the signatures are.
+    let (runs, harmonics): (Vec<&Prepared>, Vec<Harmonics>) = runs
+        .par_iter()
         .zip(residual)
         .filter(|(run, _)| seen(run))
-        .map(|(run, left)| (run, machine_frame(run, &run.basis.harmonics(left))))
+        .map(|(run, left)| (run, run.basis.harmonics(left).seen_from(-run.turned_rad)))
         .unzip();
     for (order, slot) in order_m2.iter_mut().enumerate() {
         if order == 1 {
@@ -61,23 +64,11 @@ pub fn measure(runs: &[Prepared], residual: &[Vec<f64>]) -> Spread {
         let within = noise_m2 * mean_inverse_samples(&runs) * if order == 0 { 1.0 } else { 2.0 };
         let parts = if order == 0 { 1 } else { 2 };
         let total: f64 = (0..parts)
-            .map(|part| pure_error(&runs, &harmonics.iter().map(|h| h[order][part]).collect::<Vec<_>>()))
+            .map(|part| pure_error(&runs, &harmonics.iter().map(|h| h.0[order][part]).collect::<Vec<_>>()))
             .sum();
         *slot = (total / parts as f64 - within).max(0.0);
     }
     Spread { noise_m2, order_m2 }
-}
-
-/// Harmonics turned from the inferred to the machine angle.
-fn machine_frame(run: &Prepared, harmonics: &[[f64; 2]; ORDERS + 1]) -> [[f64; 2]; ORDERS + 1] {
-    let mut out = *harmonics;
-    for (order, pair) in out.iter_mut().enumerate().skip(1) {
-        let shift = run.turned_rad * order as f64;
-        let (sin, cos) = shift.sin_cos();
-        let [c, s] = *pair;
-        *pair = [c * cos + s * sin, s * cos - c * sin];
-    }
-    out
 }
 
 fn mean_inverse_samples(runs: &[&Prepared]) -> f64 {
@@ -88,7 +79,7 @@ fn mean_inverse_samples(runs: &[&Prepared]) -> f64 {
 /// those that shake.
 fn noise(residual: &[Vec<f64>]) -> f64 {
     let mut variances: Vec<f64> = residual
-        .iter()
+        .par_iter()
         .filter(|run| run.len() >= 16)
         .map(|run| {
             let mut squares: Vec<f64> =

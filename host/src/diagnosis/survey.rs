@@ -2,10 +2,14 @@
 //!
 //! A ballbar gives time, not angle: the recorded pattern is turned by the lag φ(ω) of the machine. The
 //! set-up offset does not move between runs, so the turn of the first harmonic with speed measures φ.
-use super::basis::Basis;
+use super::basis::{Basis, Low};
+use super::column::Column;
 use crate::campaign::{Campaign, Run};
-use crate::causes::RunView;
+use crate::causes::{Harmonics, RunView};
 use crate::model_file::Servo;
+use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::Arc;
 
 /// One run, ready.
 #[derive(Clone, Debug)]
@@ -21,9 +25,11 @@ pub struct Prepared {
     /// Angle by which the recorded pattern runs ahead of the machine: θ − ψ = d·φ, rad; 0 for measured angles.
     pub turned_rad: f64,
     /// Samples that nothing is read from (empty: none).
-    pub hidden: Vec<bool>,
+    pub hidden: Arc<[bool]>,
     /// Low orders of the circle, orthonormal over the samples; orders about the inferred angle.
-    pub basis: Basis,
+    pub basis: Arc<Basis>,
+    /// Where its samples are in a vector over those of all runs.
+    pub place: Range<usize>,
 }
 
 /// The part of the response that all runs share: (R/Rm)² = 1 + aω² + bω⁴.
@@ -78,7 +84,8 @@ impl Prepared {
     /// Takes the recorded pattern as one that runs ahead of the machine by the lag `lag_rad`.
     pub fn turn_to(&mut self, lag_rad: f64) {
         let turned_rad = self.view.sign * lag_rad;
-        let psi = self.view.psi_rad.iter().map(|psi| psi + self.turned_rad - turned_rad).collect();
+        let psi: Arc<[f64]> =
+            self.view.psi_rad.iter().map(|psi| psi + self.turned_rad - turned_rad).collect();
         self.view.lag_rad = lag_rad;
         self.turned_rad = turned_rad;
         self.view.place(psi);
@@ -87,8 +94,8 @@ impl Prepared {
     /// Hides samples from every product.
     pub fn hide(&mut self, hidden: Vec<bool>) {
         let angle: Vec<f64> = self.view.psi_rad.iter().map(|psi| psi + self.turned_rad).collect();
-        self.basis = Basis::masked(&angle, &hidden);
-        self.hidden = hidden;
+        self.basis = Arc::new(Basis::masked(&angle, &hidden));
+        self.hidden = hidden.into();
         let mut deviation = std::mem::take(&mut self.deviation_m);
         self.mask(&mut deviation);
         self.deviation_m = deviation;
@@ -99,9 +106,14 @@ impl Prepared {
         self.deviation_m.len() - self.hidden.iter().filter(|hidden| **hidden).count()
     }
 
+    /// Coordinates in the low orders of waves of the machine angle.
+    pub fn low_of(&self, waves: &Harmonics) -> Low {
+        self.basis.coordinates_of(&waves.seen_from(self.turned_rad))
+    }
+
     /// Zero where hidden.
     pub fn mask(&self, samples: &mut [f64]) {
-        for (sample, hidden) in samples.iter_mut().zip(&self.hidden) {
+        for (sample, hidden) in samples.iter_mut().zip(self.hidden.iter()) {
             if *hidden {
                 *sample = 0.0;
             }
@@ -147,74 +159,130 @@ pub fn believed_feed_m_s(run: &Run) -> f64 {
 /// What a campaign without start times is taken to last, s.
 const UNTIMED_S: f64 = 3600.0;
 
-/// Makes the runs ready about a first guess of the response, their lag `more_lag_s` longer than the set-up offset says.
-pub fn prepare(campaign: &Campaign, response: &Response, more_lag_s: f64) -> (Vec<Prepared>, Lag) {
-    let starts: Vec<f64> =
-        campaign.runs.iter().enumerate().map(|(i, run)| run.started_s.unwrap_or(i as f64)).collect();
-    let first = starts.iter().copied().fold(f64::INFINITY, f64::min);
-    let span = starts.iter().copied().fold(f64::NEG_INFINITY, f64::max) - first;
-    let timed = campaign.runs.iter().all(|run| run.started_s.is_some());
-    // What a run shows of a drift is that of its middle.
-    let middle = |index: usize, omega: f64| match campaign.runs[index].started_s {
-        Some(started_s) => started_s + std::f64::consts::PI / omega,
-        None => starts[index],
-    };
-    let largest = campaign.runs.iter().map(|run| run.radius_m).fold(0.0, f64::max);
-    let mut runs: Vec<Prepared> = campaign
-        .runs
-        .iter()
-        .enumerate()
-        .map(|(index, run)| {
-            let feed = believed_feed_m_s(run);
-            let omega = feed / run.radius_m;
-            let theta = &run.samples.angle_rad;
-            let from = theta.first().copied().unwrap_or(0.0);
-            let time_s = run
-                .samples
-                .time_s
-                .clone()
-                .unwrap_or_else(|| theta.iter().map(|angle| (angle - from).abs() / omega).collect());
-            Prepared {
-                index,
-                programmed_m_s: run.feed_m_s,
-                turned_rad: 0.0,
-                deviation_m: run.samples.deviation_m.clone(),
-                hidden: Vec::new(),
-                basis: Basis::new(theta),
-                view: RunView {
-                    radius_m: run.radius_m,
-                    feed_m_s: feed,
-                    omega_rad_s: omega,
-                    sign: run.sign(),
-                    elapsed: if span > 0.0 { (middle(index, omega) - first) / span } else { 0.0 },
-                    campaign_s: if timed && span > 0.0 { span } else { UNTIMED_S },
-                    largest_radius_m: largest,
-                    psi_rad: theta.clone(),
-                    direction: Vec::new(),
-                    time_s,
-                    gain: response.gain(omega),
-                    lag_rad: 0.0,
-                },
-            }
-        })
-        .collect();
-    let inferred = campaign.runs.iter().any(|run| run.samples.angle_inferred);
-    let mut lag = if inferred {
-        measure_lag(&runs, response)
-    } else {
-        Lag { tau_s: 0.0, tau3_s3: 0.0, measured: true, se_s: 0.0 }
-    };
-    lag.tau_s += more_lag_s;
-    for run in &mut runs {
-        if inferred {
-            run.turn_to(lag.phase(run.view.omega_rad_s));
+/// A campaign read once: what no model of the machine changes.
+#[derive(Clone, Debug)]
+pub struct Survey {
+    runs: Vec<Prepared>,
+    /// First harmonic of each run.
+    firsts: Vec<[f64; 2]>,
+    /// Whether the angles follow from the time, and so hold the lag.
+    inferred: bool,
+}
+
+impl Survey {
+    /// Reads a campaign.
+    pub fn new(campaign: &Campaign) -> Self {
+        let starts: Vec<f64> =
+            campaign.runs.iter().enumerate().map(|(i, run)| run.started_s.unwrap_or(i as f64)).collect();
+        let began = starts.iter().copied().fold(f64::INFINITY, f64::min);
+        let span = starts.iter().copied().fold(f64::NEG_INFINITY, f64::max) - began;
+        let timed = campaign.runs.iter().all(|run| run.started_s.is_some());
+        // What a run shows of a drift is that of its middle.
+        let middle = |index: usize, omega: f64| match campaign.runs[index].started_s {
+            Some(started_s) => started_s + std::f64::consts::PI / omega,
+            None => starts[index],
+        };
+        let largest = campaign.runs.iter().map(|run| run.radius_m).fold(0.0, f64::max);
+        let ends: Vec<usize> = campaign
+            .runs
+            .iter()
+            .scan(0, |end, run| {
+                *end += run.samples.deviation_m.len();
+                Some(*end)
+            })
+            .collect();
+        let (runs, firsts) = campaign
+            .runs
+            .par_iter()
+            .zip(&ends)
+            .enumerate()
+            .map(|(index, (run, &end))| {
+                let feed = believed_feed_m_s(run);
+                let omega = feed / run.radius_m;
+                let theta = &run.samples.angle_rad;
+                let from = theta.first().copied().unwrap_or(0.0);
+                let time_s = match &run.samples.time_s {
+                    Some(time_s) => time_s.as_slice().into(),
+                    None => theta.iter().map(|angle| (angle - from).abs() / omega).collect(),
+                };
+                let basis = Basis::new(theta);
+                let [_, first, ..] = basis.harmonics(&run.samples.deviation_m).0;
+                let prepared = Prepared {
+                    index,
+                    programmed_m_s: run.feed_m_s,
+                    turned_rad: 0.0,
+                    deviation_m: run.samples.deviation_m.clone(),
+                    hidden: Arc::default(),
+                    basis: Arc::new(basis),
+                    place: end - theta.len()..end,
+                    view: RunView {
+                        radius_m: run.radius_m,
+                        feed_m_s: feed,
+                        omega_rad_s: omega,
+                        sign: run.sign(),
+                        elapsed: if span > 0.0 { (middle(index, omega) - began) / span } else { 0.0 },
+                        campaign_s: if timed && span > 0.0 { span } else { UNTIMED_S },
+                        largest_radius_m: largest,
+                        psi_rad: theta.as_slice().into(),
+                        direction: Arc::default(),
+                        strokes: Default::default(),
+                        time_s,
+                        gain: 1.0,
+                        lag_rad: 0.0,
+                    },
+                };
+                (prepared, first)
+            })
+            .unzip();
+        let inferred = campaign.runs.iter().any(|run| run.samples.angle_inferred);
+        Self { runs, firsts, inferred }
+    }
+
+    /// The low orders of each run about its recorded angle, nothing hidden.
+    pub fn bases(&self) -> Vec<Arc<Basis>> {
+        self.runs.iter().map(|run| Arc::clone(&run.basis)).collect()
+    }
+
+    /// Lag of the machine behind the command: by the turn of the set-up offset, or else that of the response's own chain.
+    pub fn lag(&self, response: &Response) -> Lag {
+        if self.inferred {
+            self.measure_lag(response)
         } else {
-            // An angle that was measured holds no lag, but the servo's own phase still turns its signatures.
-            run.view.lag_rad = response.own_lag().phase(run.view.omega_rad_s);
-            run.view.place(run.view.psi_rad.clone());
+            Lag { tau_s: 0.0, tau3_s3: 0.0, measured: true, se_s: 0.0 }
         }
     }
-    (runs, lag)
+
+    /// The runs about a guess of the response, their lag `more_lag_s` longer than the set-up offset says.
+    pub fn prepare(&self, response: &Response, more_lag_s: f64) -> (Vec<Prepared>, Lag) {
+        let mut lag = self.lag(response);
+        lag.tau_s += more_lag_s;
+        let place = |run: &Prepared| {
+            let mut run = run.clone();
+            let omega = run.view.omega_rad_s;
+            run.view.gain = response.gain(omega);
+            if self.inferred {
+                run.turn_to(lag.phase(omega));
+            } else {
+                // An angle that was measured holds no lag, but the servo's own phase still turns its signatures.
+                run.view.lag_rad = response.own_lag().phase(omega);
+                run.view.place(Arc::clone(&run.view.psi_rad));
+            }
+            run
+        };
+        (self.runs.par_iter().map(place).collect(), lag)
+    }
+}
+
+/// What the baseline leaves of the runs, where it is seen.
+pub fn misfit(runs: &[Prepared]) -> Column {
+    let left = |run: &Prepared, out: &mut [&mut [f64]]| {
+        let shrink = run.view.radius_m * (run.view.gain - 1.0);
+        for (out, deviation) in out.iter_mut().flat_map(|out| out.iter_mut()).zip(&run.deviation_m) {
+            *out = deviation - shrink;
+        }
+    };
+    let column = Column::split(runs, 1, left).pop();
+    column.unwrap_or_else(|| Column::zero(runs.len()))
 }
 
 /// Dead time that a servo may have on top of its own lag, s.
@@ -223,69 +291,71 @@ const UNSEEN_S: f64 = 0.01;
 /// Least eccentricity that shows its turn clearly against a micrometre of noise, m.
 const SMALLEST_OFFSET_M: f64 = 3e-6;
 
-/// Fits z = E·e^{idφ(ω)} to the first harmonics z = c + is of all runs.
-fn measure_lag(runs: &[Prepared], response: &Response) -> Lag {
-    let points: Vec<(f64, f64, [f64; 2])> = runs
-        .iter()
-        .filter_map(|run| {
-            let first = run.basis.harmonics(&run.deviation_m).get(1).copied()?;
-            Some((run.view.sign, run.view.omega_rad_s, first))
-        })
-        .collect();
-    let unmeasured = response.own_lag();
-    let guess = unmeasured.tau_s;
-    let cost = |tau: f64, tau3: f64| -> (f64, f64) {
-        let (mut re, mut im) = (0.0, 0.0);
-        for (sign, omega, [c, s]) in &points {
-            let phase = -sign * omega * (tau - tau3 * omega * omega);
-            let (sin, cos) = phase.sin_cos();
-            re += c * cos - s * sin;
-            im += c * sin + s * cos;
-        }
-        let n = points.len() as f64;
-        let (re, im) = (re / n, im / n);
-        let left = points.iter().map(|(_, _, [c, s])| c * c + s * s).sum::<f64>() / n - re * re - im * im;
-        (left.max(0.0), re.hypot(im))
-    };
-    let fastest = points.iter().map(|p| p.1).fold(0.0, f64::max);
-    let slowest = points.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
-    if points.len() < 3 || fastest <= 0.0 || (fastest - slowest) < 0.2 * fastest {
-        return unmeasured;
-    }
-    // A phase beyond ±π at the fastest run would be another branch.
-    let widest = (std::f64::consts::PI / fastest).min(0.2);
-    let mut tau = (0..=80)
-        .map(|i| -0.1 * widest + 1.1 * widest * f64::from(i) / 80.0)
-        .min_by(|l, r| cost(*l, 0.0).0.total_cmp(&cost(*r, 0.0).0))
-        .unwrap_or(guess);
-    let mut tau3 = 0.0;
-    let mut step = [widest / 80.0, 0.2 * tau.abs().max(1e-3) / (fastest * fastest)];
-    #[allow(clippy::needless_range_loop, reason = "the axis is a choice of parameter")]
-    for _ in 0..60 {
-        for axis in 0..2 {
-            let at =
-                |delta: f64| if axis == 0 { cost(tau + delta, tau3).0 } else { cost(tau, tau3 + delta).0 };
-            let (low, mid, high) = (at(-step[axis]), at(0.0), at(step[axis]));
-            let bend = low - 2.0 * mid + high;
-            let delta = if bend > 0.0 {
-                (0.5 * step[axis] * (low - high) / bend).clamp(-step[axis], step[axis])
-            } else {
-                0.0
-            };
-            if at(delta) <= mid {
-                if axis == 0 { tau += delta } else { tau3 += delta }
+impl Survey {
+    /// Fits z = E·e^{idφ(ω)} to the first harmonics z = c + is of all runs.
+    fn measure_lag(&self, response: &Response) -> Lag {
+        let points: Vec<(f64, f64, [f64; 2])> = self
+            .runs
+            .iter()
+            .zip(&self.firsts)
+            .map(|(run, first)| (run.view.sign, run.view.omega_rad_s, *first))
+            .collect();
+        let unmeasured = response.own_lag();
+        let guess = unmeasured.tau_s;
+        let cost = |tau: f64, tau3: f64| -> (f64, f64) {
+            let (mut re, mut im) = (0.0, 0.0);
+            for (sign, omega, [c, s]) in &points {
+                let phase = -sign * omega * (tau - tau3 * omega * omega);
+                let (sin, cos) = phase.sin_cos();
+                re += c * cos - s * sin;
+                im += c * sin + s * cos;
             }
-            step[axis] *= 0.85;
+            let n = points.len() as f64;
+            let (re, im) = (re / n, im / n);
+            let left = points.iter().map(|(_, _, [c, s])| c * c + s * s).sum::<f64>() / n - re * re - im * im;
+            (left.max(0.0), re.hypot(im))
+        };
+        let fastest = points.iter().map(|p| p.1).fold(0.0, f64::max);
+        let slowest = points.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
+        if points.len() < 3 || fastest <= 0.0 || (fastest - slowest) < 0.2 * fastest {
+            return unmeasured;
         }
+        // A phase beyond ±π at the fastest run would be another branch.
+        let widest = (std::f64::consts::PI / fastest).min(0.2);
+        let mut tau = (0..=80)
+            .map(|i| -0.1 * widest + 1.1 * widest * f64::from(i) / 80.0)
+            .min_by(|l, r| cost(*l, 0.0).0.total_cmp(&cost(*r, 0.0).0))
+            .unwrap_or(guess);
+        let mut tau3 = 0.0;
+        let mut step = [widest / 80.0, 0.2 * tau.abs().max(1e-3) / (fastest * fastest)];
+        #[allow(clippy::needless_range_loop, reason = "the axis is a choice of parameter")]
+        for _ in 0..60 {
+            for axis in 0..2 {
+                let at = |delta: f64| {
+                    if axis == 0 { cost(tau + delta, tau3).0 } else { cost(tau, tau3 + delta).0 }
+                };
+                let (low, mid, high) = (at(-step[axis]), at(0.0), at(step[axis]));
+                let bend = low - 2.0 * mid + high;
+                let delta = if bend > 0.0 {
+                    (0.5 * step[axis] * (low - high) / bend).clamp(-step[axis], step[axis])
+                } else {
+                    0.0
+                };
+                if at(delta) <= mid {
+                    if axis == 0 { tau += delta } else { tau3 += delta }
+                }
+                step[axis] *= 0.85;
+            }
+        }
+        let (left, eccentricity) = cost(tau, tau3);
+        // Standard error of the phase at the fastest run, rad.
+        let se = (left / points.len() as f64).sqrt() / eccentricity.max(1e-12);
+        if eccentricity < SMALLEST_OFFSET_M || se > 0.02 {
+            return unmeasured;
+        }
+        // τ and τ3 share what the fastest runs tell.
+        Lag { tau_s: tau, tau3_s3: tau3, measured: true, se_s: 2.0 * se / fastest }
     }
-    let (left, eccentricity) = cost(tau, tau3);
-    // Standard error of the phase at the fastest run, rad.
-    let se = (left / points.len() as f64).sqrt() / eccentricity.max(1e-12);
-    if eccentricity < SMALLEST_OFFSET_M || se > 0.02 {
-        return unmeasured;
-    }
-    // τ and τ3 share what the fastest runs tell.
-    Lag { tau_s: tau, tau3_s3: tau3, measured: true, se_s: 2.0 * se / fastest }
 }
 
 #[cfg(test)]

@@ -3,14 +3,15 @@
 //! Fitted beside the chosen columns, these tangents tell how far each shape is from its best (a Gauss–Newton step with
 //! the sizes projected out), and how much of each size hangs on a shape that is itself only estimated: intervals count
 //! them in. A weak prior keeps what the runs cannot tell within a few of its steps.
+use super::column::Column;
 use super::explained::{Explained, refit};
 use super::item::Kind;
-use super::ledger::Samples;
 use super::linear::{Solution, solve};
 use super::search::columns_of;
 use super::survey::Prepared;
 use crate::causes::Bend;
 use nalgebra::DMatrix;
+use std::sync::Arc;
 
 /// One shape parameter of one chosen explanation.
 #[derive(Clone, Copy, Debug)]
@@ -49,7 +50,8 @@ const WORTH: f64 = 0.3;
 /// Lays the tangents into the ledger, behind the columns that are there, and fits all together: the amounts, or the
 /// `whole` with choices and the lag. Take them out again
 /// with [`Ledger::truncate`](super::ledger::Ledger::truncate).
-fn lay(found: &mut Explained, runs: &[Prepared], weights: &[f64], whole: bool) -> Option<Tangents> {
+fn lay(found: &mut Explained, weights: &[f64], whole: bool) -> Option<Tangents> {
+    let runs = Arc::clone(&found.runs);
     let travel_m = 2.0 * runs.iter().map(|run| run.view.radius_m).fold(1e-3, f64::max);
     let mut columns = columns_of(&found.nuisance, &found.items, &found.chosen);
     let amounts: Vec<(usize, Vec<f64>)> = found
@@ -75,8 +77,8 @@ fn lay(found: &mut Explained, runs: &[Prepared], weights: &[f64], whole: bool) -
             let mut shape = shape.clone();
             shape[which] += step;
             let moved = Kind::Cause { cause, axis, shape };
-            let tangent = difference(found, *item, amounts, &moved, runs);
-            columns.push(found.ledger.push(runs, tangent));
+            let tangent = difference(found, *item, amounts, &moved, &runs);
+            columns.push(found.ledger.push(tangent));
             shapes.push(Shape { item: *item, which, step, prior });
         }
     }
@@ -87,12 +89,12 @@ fn lay(found: &mut Explained, runs: &[Prepared], weights: &[f64], whole: bool) -
         for run in &mut late {
             run.turn_to(run.view.lag_rad + LAG_STEP_S * run.view.omega_rad_s);
         }
-        let mut tangent: Samples = runs.iter().map(|run| vec![0.0; run.deviation_m.len()]).collect();
+        let mut tangent = Column::zero(runs.len());
         for (item, amounts) in &amounts {
             let kind = found.items[*item].kind.clone();
-            add(&mut tangent, difference(found, *item, amounts, &kind, &late));
+            tangent.add(1.0, &difference(found, *item, amounts, &kind, &late));
         }
-        columns.push(found.ledger.push(runs, tangent));
+        columns.push(found.ledger.push(tangent));
     }
     if shapes.is_empty() && !lag {
         return None;
@@ -100,56 +102,45 @@ fn lay(found: &mut Explained, runs: &[Prepared], weights: &[f64], whole: bool) -
     let mut products = found.ledger.white(weights);
     let own = columns.len() - shapes.len() - usize::from(lag);
     for (&column, shape) in columns[own..].iter().zip(&shapes) {
-        products[(column, column)] += shape.prior.powi(-2);
+        *products.at_mut(column, column) += shape.prior.powi(-2);
     }
     if lag {
         // About what the set-up offset says.
         let column = columns[columns.len() - 1];
         let stiff = (LAG_STEP_S / found.lag.se_s).powi(2);
-        products[(column, column)] += stiff;
-        products[(column, 0)] -= stiff * found.more_lag_s / LAG_STEP_S;
-        products[(0, column)] = products[(column, 0)];
+        *products.at_mut(column, column) += stiff;
+        *products.at_mut(column, 0) -= stiff * found.more_lag_s / LAG_STEP_S;
     }
     let solution = solve(&products, &columns)?;
     Some(Tangents { shapes, lag, columns, solution })
 }
 
 /// What the explanation `item` does as `moved` on `runs`, beyond what it does now, at its present amounts.
-fn difference(found: &Explained, item: usize, amounts: &[f64], moved: &Kind, runs: &[Prepared]) -> Samples {
-    let mut out: Samples = runs.iter().map(|run| vec![0.0; run.deviation_m.len()]).collect();
-    for (index, (&amount, &column)) in amounts.iter().zip(&found.items[item].columns).enumerate() {
-        let mut change = moved.samples(index, runs);
-        for (change, now) in change.iter_mut().zip(found.ledger.samples(column)) {
-            for (change, now) in change.iter_mut().zip(now) {
-                *change = amount * (*change - now);
-            }
-        }
-        add(&mut out, change);
+fn difference(found: &Explained, item: usize, amounts: &[f64], moved: &Kind, runs: &[Prepared]) -> Column {
+    let mut out = Column::zero(runs.len());
+    let columns = found.items[item].columns.iter().zip(moved.columns_over(runs));
+    for (&amount, (&now, moved)) in amounts.iter().zip(columns) {
+        out.add(amount, &moved);
+        out.add(-amount, found.ledger.column(now));
     }
     out
 }
 
-fn add(sum: &mut Samples, more: Samples) {
-    for (sum, more) in sum.iter_mut().flatten().zip(more.iter().flatten()) {
-        *sum += more;
-    }
-}
-
 /// Moves the shapes of the chosen explanations to their best beside each other.
-pub fn polish(found: &mut Explained, runs: &[Prepared], weights: &[f64]) {
+pub fn polish(found: &mut Explained, weights: &[f64]) {
     for _ in 0..4 {
         let size = found.ledger.size();
-        let tangents = lay(found, runs, weights, false);
+        let tangents = lay(found, weights, false);
         found.ledger.truncate(size);
         let Some(tangents) = tangents else { return };
-        if tangents.solution.gain - found.solution.gain < WORTH || !step(found, runs, weights, &tangents) {
+        if tangents.solution.gain - found.solution.gain < WORTH || !step(found, weights, &tangents) {
             return;
         }
     }
 }
 
 /// One move along the tangents, shortened until it gains; `false`: there is none.
-fn step(found: &mut Explained, runs: &[Prepared], weights: &[f64], tangents: &Tangents) -> bool {
+fn step(found: &mut Explained, weights: &[f64], tangents: &Tangents) -> bool {
     let first = tangents.columns.len() - tangents.shapes.len() - usize::from(tangents.lag);
     let before: Vec<Kind> = found.items.iter().map(|item| item.kind.clone()).collect();
     let solution = found.solution.clone();
@@ -164,7 +155,7 @@ fn step(found: &mut Explained, runs: &[Prepared], weights: &[f64], tangents: &Ta
                 cause.model().tidy(shape);
             }
         }
-        relay(found, runs, &tangents.shapes);
+        relay(found, &tangents.shapes);
         refit(found, weights);
         if found.solution.gain > solution.gain + 0.1 * WORTH {
             return true;
@@ -173,26 +164,26 @@ fn step(found: &mut Explained, runs: &[Prepared], weights: &[f64], tangents: &Ta
             item.kind = kind.clone();
         }
     }
-    relay(found, runs, &tangents.shapes);
+    relay(found, &tangents.shapes);
     found.solution = solution;
     false
 }
 
 /// Brings the columns of the moved shapes up to date.
-fn relay(found: &mut Explained, runs: &[Prepared], shapes: &[Shape]) {
+fn relay(found: &mut Explained, shapes: &[Shape]) {
     let mut items: Vec<usize> = shapes.iter().map(|shape| shape.item).collect();
     items.dedup();
     for item in items {
-        for (index, column) in found.items[item].columns.clone().into_iter().enumerate() {
-            let samples = found.items[item].kind.samples(index, runs);
-            found.ledger.replace(runs, column, samples);
+        let item = &found.items[item];
+        for (&at, column) in item.columns.iter().zip(item.kind.columns_over(&found.runs)) {
+            found.ledger.replace(at, column);
         }
     }
 }
 
 /// Lays the tangents for good, so that intervals count them in, and says how much longer the lag ought to be, s.
-pub fn finish(found: &mut Explained, runs: &[Prepared], weights: &[f64]) -> f64 {
-    found.tangents = lay(found, runs, weights, true);
+pub fn finish(found: &mut Explained, weights: &[f64]) -> f64 {
+    found.tangents = lay(found, weights, true);
     match &found.tangents {
         Some(Tangents { lag: true, solution, .. }) => {
             let steps = solution.coefficients.last().copied().unwrap_or(0.0);

@@ -2,14 +2,16 @@
 //!
 //! Each run has a phase of its own, so power is added, not amplitude; a run counts for at most `CAP`, so
 //! that the sharp harmonics of a few runs cannot pose as a tone that all share.
-use super::basis::{axpy, dot};
-use super::ledger::Samples;
+use super::column::Column;
 use super::spread::Spread;
 use super::survey::Prepared;
+use super::vector::{axpy, dot, wave_sum};
 use giotto_shared::Axis;
 use rayon::prelude::*;
-use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
+use rustfft::{Fft, FftPlanner};
+use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// How the amplitude depends on the run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,19 +64,36 @@ struct Spectrum {
     step_hz: f64,
 }
 
+/// What a run leaves outside its low orders.
+struct Clean<'a> {
+    run: &'a Prepared,
+    samples: &'a [f64],
+    turn_s: f64,
+}
+
 /// Looks for a tone in what the other explanations leave.
-pub fn find(runs: &[Prepared], residual: &Samples, spread: &Spread) -> Option<Tone> {
-    let clean: Vec<(usize, Vec<f64>, f64)> = runs
+pub fn find(runs: &[Prepared], residual: &Column, spread: &Spread) -> Option<Tone> {
+    let clean: Vec<Clean<'_>> = runs
+        .iter()
+        .map(|run| Clean {
+            run,
+            samples: residual.outside(run),
+            turn_s: std::f64::consts::TAU / run.view.omega_rad_s,
+        })
+        .filter(|clean| clean.turn_s <= LONGEST_TURN_S && clean.samples.len() >= 64)
+        .collect();
+    let mut planner = FftPlanner::new();
+    let transforms: BTreeMap<usize, Arc<dyn Fft<f64>>> = clean
+        .iter()
+        .map(|clean| padded(clean.samples.len()))
+        .map(|length| (length, planner.plan_fft_forward(length)))
+        .collect();
+    let spectra: Vec<Spectrum> = clean
         .par_iter()
-        .enumerate()
-        .filter_map(|(index, run)| {
-            let turn_s = std::f64::consts::TAU / run.view.omega_rad_s;
-            (turn_s <= LONGEST_TURN_S && run.deviation_m.len() >= 64)
-                .then(|| (index, without_low_orders(run, &residual[index]), turn_s))
+        .filter_map(|clean| {
+            Some(spectrum(clean, transforms.get(&padded(clean.samples.len()))?, spread.noise_m2))
         })
         .collect();
-    let spectra: Vec<Spectrum> =
-        clean.par_iter().map(|(_, samples, turn_s)| spectrum(samples, *turn_s, spread.noise_m2)).collect();
     let longest = spectra.iter().map(|s| s.turn_s).fold(0.0, f64::max);
     let highest = spectra.iter().map(|s| s.nyquist_hz).fold(0.0, f64::max);
     if spectra.len() < 4 || longest <= 0.0 {
@@ -119,26 +138,27 @@ pub fn find(runs: &[Prepared], residual: &Samples, spread: &Spread) -> Option<To
 
 fn refine(
     runs: &[Prepared],
-    clean: &[(usize, Vec<f64>, f64)],
+    clean: &[Clean<'_>],
     spread: &Spread,
     start_hz: f64,
     step_hz: f64,
-    residual: &Samples,
+    residual: &Column,
 ) -> Option<Tone> {
-    let usable: Vec<&(usize, Vec<f64>, f64)> = clean
+    let usable: Vec<&Clean<'_>> = clean
         .iter()
-        .filter(|(_, samples, turn_s)| {
-            start_hz < 0.47 * samples.len() as f64 / turn_s && start_hz * turn_s > FEWEST_WAVES
+        .filter(|clean| {
+            start_hz < 0.47 * clean.samples.len() as f64 / clean.turn_s
+                && start_hz * clean.turn_s > FEWEST_WAVES
         })
         .collect();
     let swung = |axis: Option<Axis>| -> Vec<Vec<f64>> {
-        usable.iter().map(|(index, samples, _)| swing(&runs[*index], samples, axis)).collect()
+        usable.par_iter().map(|clean| swing(clean.run, clean.samples, axis)).collect()
     };
     let sum_at = |swung: &[Vec<f64>], axis: Option<Axis>, hz: f64| -> f64 {
         usable
-            .par_iter()
+            .iter()
             .zip(swung)
-            .map(|((_, _, turn_s), samples)| power(samples, *turn_s, hz, spread.noise_m2) * loudness(axis))
+            .map(|(clean, samples)| power(samples, clean.turn_s, hz, spread.noise_m2) * loudness(axis))
             .sum()
     };
     // A swing along an axis shows on the circle as two sidebands, one turn below and above.
@@ -146,8 +166,9 @@ fn refine(
         .into_iter()
         .flat_map(|axis| {
             let swung = swung(axis);
-            let sums: Vec<(f64, Option<Axis>, f64)> = (-48..=48)
-                .map(|i| start_hz + 0.5 * step_hz * f64::from(i))
+            let sums: Vec<(f64, Option<Axis>, f64)> = (-24..=24)
+                .into_par_iter()
+                .map(|i| start_hz + step_hz * f64::from(i))
                 .map(|hz| (sum_at(&swung, axis, hz), axis, hz))
                 .collect();
             sums
@@ -160,6 +181,7 @@ fn refine(
     let mut half = step_hz;
     for _ in 0..12 {
         let values: Vec<(f64, f64)> = (-3..=3)
+            .into_par_iter()
             .map(|i| {
                 let hz = centre + half * f64::from(i) / 3.0;
                 (total(hz), hz)
@@ -174,13 +196,13 @@ fn refine(
     let powers: Vec<(f64, f64, f64)> = usable
         .iter()
         .zip(&swung)
-        .map(|((index, samples, turn_s), swung)| {
-            let view = &runs[*index].view;
-            let power = power(swung, *turn_s, centre, spread.noise_m2) * loudness(axis);
+        .map(|(clean, swung)| {
+            let view = &clean.run.view;
+            let power = power(swung, clean.turn_s, centre, spread.noise_m2) * loudness(axis);
             // χ²₂ with non-centrality n·A²/(2σ²).
             (
                 power,
-                samples.len() as f64 / (2.0 * spread.noise_m2 * loudness(axis)),
+                swung.len() as f64 / (2.0 * spread.noise_m2 * loudness(axis)),
                 view.feed_m_s.powi(2) / view.radius_m,
             )
         })
@@ -217,11 +239,12 @@ fn refine(
         gain: total(centre),
         energy_m2: Vec::new(),
     };
+    // A tone without its low orders takes nothing from the low orders.
     tone.energy_m2 = runs
         .par_iter()
-        .zip(residual)
-        .map(|(run, left)| {
-            let mut without = left.clone();
+        .map(|run| {
+            let left = residual.outside(run);
+            let mut without = left.to_vec();
             tone.remove_from(run, &mut without);
             dot(left, left) - dot(&without, &without)
         })
@@ -275,10 +298,7 @@ impl Tone {
                 (0..n).map(|i| swing(i) * (wave * i as f64).sin()).collect(),
             ];
             for column in &mut columns {
-                let coordinates = run.basis.coordinates(column);
-                for (k, amount) in coordinates.iter().enumerate() {
-                    run.basis.add(k, -amount, column);
-                }
+                run.basis.take_out(column);
             }
             let [cos, sin] = &mut columns;
             let length = dot(cos, cos);
@@ -297,26 +317,21 @@ impl Tone {
     }
 }
 
-fn without_low_orders(run: &Prepared, samples: &[f64]) -> Vec<f64> {
-    let mut out = samples.to_vec();
-    for (k, amount) in run.basis.coordinates(samples).iter().enumerate() {
-        run.basis.add(k, -amount, &mut out);
-    }
-    out
+fn padded(samples: usize) -> usize {
+    (PAD * samples).next_power_of_two()
 }
 
-fn spectrum(samples: &[f64], turn_s: f64, noise_m2: f64) -> Spectrum {
-    let n = samples.len();
-    let length = (PAD * n).next_power_of_two();
-    let mut buffer: Vec<Complex<f64>> = samples.iter().map(|&x| Complex::new(x, 0.0)).collect();
+fn spectrum(clean: &Clean<'_>, transform: &Arc<dyn Fft<f64>>, noise_m2: f64) -> Spectrum {
+    let (n, length) = (clean.samples.len(), transform.len());
+    let mut buffer: Vec<Complex<f64>> = clean.samples.iter().map(|&x| Complex::new(x, 0.0)).collect();
     buffer.resize(length, Complex::default());
-    FftPlanner::new().plan_fft_forward(length).process(&mut buffer);
+    transform.process(&mut buffer);
     let scale = 2.0 / (n as f64 * noise_m2);
     Spectrum {
-        turn_s,
-        nyquist_hz: 0.5 * n as f64 / turn_s,
+        turn_s: clean.turn_s,
+        nyquist_hz: 0.5 * n as f64 / clean.turn_s,
         power: buffer[..length / 2].iter().map(|x| scale * x.norm_sqr()).collect(),
-        step_hz: n as f64 / (turn_s * length as f64),
+        step_hz: n as f64 / (clean.turn_s * length as f64),
     }
 }
 
@@ -330,7 +345,9 @@ impl Spectrum {
 fn swing(run: &Prepared, samples: &[f64], axis: Option<Axis>) -> Vec<f64> {
     match axis {
         None => samples.to_vec(),
-        Some(axis) => samples.iter().zip(&run.view.direction).map(|(x, d)| x * d[axis.index()]).collect(),
+        Some(axis) => {
+            samples.iter().zip(run.view.direction.iter()).map(|(x, d)| x * d[axis.index()]).collect()
+        }
     }
 }
 
@@ -341,13 +358,6 @@ fn loudness(axis: Option<Axis>) -> f64 {
 
 /// Power at one frequency, in units of χ²₂.
 fn power(samples: &[f64], turn_s: f64, hz: f64, noise_m2: f64) -> f64 {
-    let wave = std::f64::consts::TAU * hz * turn_s / samples.len() as f64;
-    let turn = Complex::new(wave.cos(), wave.sin());
-    let mut phase = Complex::new(1.0, 0.0);
-    let mut sum = Complex::new(0.0, 0.0);
-    for &x in samples {
-        sum += phase * x;
-        phase *= turn;
-    }
-    2.0 * sum.norm_sqr() / (samples.len() as f64 * noise_m2)
+    let [re, im] = wave_sum(samples, std::f64::consts::TAU * hz * turn_s / samples.len() as f64);
+    2.0 * (re * re + im * im) / (samples.len() as f64 * noise_m2)
 }

@@ -7,7 +7,7 @@ use super::pattern::{Law, Pattern};
 
 /// Describes the patterns that the search had to take in.
 pub fn describe(found: &Explained, durations: &Durations) -> Unexplained {
-    let weights = vec![1.0; found.runs.len()];
+    let weights = found.all();
     let (each, _) = energies(found, &weights);
     let samples: f64 = found.runs.iter().map(|run| run.deviation_m.len() as f64).sum();
     let mut patterns: Vec<(f64, Pattern)> = found

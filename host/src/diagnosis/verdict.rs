@@ -18,7 +18,7 @@ const HIGHEST: f64 = 0.999;
 
 /// Findings, largest share first. `clamp_energy_m2` is what the clamp's slower feed explains.
 pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> {
-    let weights = vec![1.0; found.runs.len()];
+    let weights = found.all();
     let samples: f64 = found.runs.iter().map(|run| run.deviation_m.len() as f64).sum();
     let (each, _) = energies(found, &weights);
     let tone_energies: Vec<f64> = found.tones.iter().map(Tone::whole_energy_m2).collect();
@@ -246,8 +246,8 @@ fn robust_variances(found: &Explained) -> Vec<f64> {
         let pull: Vec<f64> = columns
             .iter()
             .map(|&a| {
-                let fitted: f64 = columns.iter().zip(&coefficients).map(|(&b, x)| white[(a, b)] * x).sum();
-                white[(a, 0)] - fitted
+                let fitted: f64 = columns.iter().zip(&coefficients).map(|(&b, x)| white.at(a, b) * x).sum();
+                white.at(a, 0) - fitted
             })
             .collect();
         for i in 0..n {

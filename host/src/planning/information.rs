@@ -3,13 +3,15 @@
 use super::grid::Circle;
 use crate::causes::{Cause, RunView};
 use crate::diagnosis::Diagnosis;
-use crate::diagnosis::basis::{Basis, COLUMNS, ORDERS, dot};
+use crate::diagnosis::basis::{Basis, COLUMNS, ORDERS};
 use crate::diagnosis::spread::Spread;
 use crate::diagnosis::survey::Response;
+use crate::diagnosis::vector::dot;
 use giotto_shared::Axis;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 /// Samples of a view, and of the turn it stands for.
 const VIEW: usize = 720;
@@ -48,8 +50,9 @@ pub fn views(circles: &[Circle], response: &Response, elapsed: &[f64]) -> Vec<Ru
                 elapsed: *elapsed,
                 campaign_s: 3600.0,
                 largest_radius_m: largest,
-                psi_rad: Vec::new(),
-                direction: Vec::new(),
+                psi_rad: Arc::default(),
+                direction: Arc::default(),
+                strokes: Default::default(),
                 time_s: (0..VIEW).map(|i| angle(i) / omega).collect(),
                 gain: response.gain(omega),
                 lag_rad: (response.a_s2.max(0.0).sqrt() * omega).atan(),

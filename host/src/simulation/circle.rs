@@ -1,8 +1,12 @@
 //! A circular test on the simulated machine: one lap in the steady state.
-use super::axis::{self, Grid};
-use super::command::{Command, Knots};
+use super::axis::{self, AxisPoint, Grid};
+use super::chain::{Chain, Discrete};
+use super::command::Knots;
 use super::geometry::{self, Place};
 use super::machine::{AccDec, Machine};
+use super::memory::Memory;
+use super::orbit::{self, PIECE, Round};
+use super::wave::Turns;
 use crate::campaign::{Run, Samples};
 use giotto_shared::Direction;
 use std::f64::consts::TAU;
@@ -14,12 +18,14 @@ pub const MAX_RATE_HZ: f64 = 1000.0;
 
 /// Fewest steps a turn; the command is then met to (2π/360)⁴·R/384, 0.1 nm for R = 300 mm.
 const MIN_STEPS_PER_TURN: usize = 360;
-/// The run-in lasts so many of the slowest time constants; four equal poles are then down to 1e-9.
-const RUN_IN_TIME_CONSTANTS: f64 = 32.0;
+/// A run-in from rest lasts so many of the slowest time constants; four equal poles are then down to 1e-9.
+pub(super) const RUN_IN_TIME_CONSTANTS: f64 = 32.0;
+/// Share of a turn that holds a reversal of each axis, whatever the phase.
+pub(super) const ONE_REVERSAL_TURNS: f64 = 0.75;
 /// Chords whose sagitta is below this many metres are not told from the arc.
 const NEGLIGIBLE_SAGITTA_M: f64 = 1e-9;
-/// Bound on the work of one test.
-const MAX_STEPS: f64 = 2e6;
+/// Bound on the work before and during the lap.
+pub(super) const MAX_STEPS: f64 = 2e6;
 
 /// A circle to be run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,7 +91,8 @@ impl Trace {
             radius_m: test.radius_m,
             turn_s,
             angle_rad: (0..position_m.len()).map(|i| test.start_angle_rad + step * i as f64).collect(),
-            deviation_m: position_m.iter().map(|p| p[0].hypot(p[1]) - test.radius_m).collect(),
+            // Lengths of machines neither overflow nor vanish when squared: no need of hypot.
+            deviation_m: position_m.iter().map(|[x, y]| (x * x + y * y).sqrt() - test.radius_m).collect(),
             position_m,
         }
     }
@@ -123,46 +130,102 @@ pub fn circle(machine: &Machine, test: &CircleTest) -> Trace {
         return Trace::new(test, turn_s, vec![[f64::NAN; 2]; samples]);
     }
     let omega = f64::from(test.direction.sign()) * feed / test.radius_m;
-    let step_s = turn_s / (samples * MIN_STEPS_PER_TURN.div_ceil(samples)) as f64;
+    let lap = Lap { machine, test, omega_rad_s: omega, turn_s, samples };
     let chord_s = machine
         .interpolation_s
         .filter(|dt| (feed * dt).powi(2) / (8.0 * test.radius_m) > NEGLIGIBLE_SAGITTA_M);
-    let step_s = chord_s.map_or(step_s, |dt| dt / (dt / step_s).ceil());
-    let times = |i: usize| turn_s * i as f64 / samples as f64;
-
-    let axes: [Vec<_>; 2] = std::array::from_fn(|axis| {
-        let back_s =
-            machine.dead_time_s[axis] + RUN_IN_TIME_CONSTANTS * machine.settling_s(axis) + 0.75 * turn_s;
-        let run_in = (back_s / step_s).min(MAX_STEPS).ceil();
-        let grid = Grid {
-            start_s: -run_in * step_s,
-            step_s,
-            steps: run_in as usize + (turn_s / step_s).min(MAX_STEPS).ceil() as usize,
-        };
-        let arc = Command::circle(axis, test.radius_m, omega, test.start_angle_rad);
-        let command = match chord_s {
-            Some(dt) => chords(&arc, dt, grid, machine),
-            None => arc,
-        };
-        axis::motion(machine, axis, &command, grid, (0..samples).map(times))
-    });
-    let place = Place { centre_m: test.centre_m };
-    let position_m = (0..samples)
-        .map(|i| geometry::tool(machine, place, test.started_s + times(i), [axes[0][i], axes[1][i]]))
-        .collect();
-    Trace::new(test, turn_s, position_m)
+    Trace::new(test, turn_s, chord_s.map_or_else(|| lap.along_arc(), |dt| lap.along_chords(dt)))
 }
 
-/// Set-points of the interpolator, one of them at t = 0, joined by chords.
-fn chords(arc: &Command, dt: f64, grid: Grid, machine: &Machine) -> Command {
-    let window = if let AccDec::MovingAverage(t) = machine.acc_dec { t } else { 0.0 };
-    let before = ((window - grid.start_s) / dt).ceil() + 1.0;
-    let after = ((grid.start_s + grid.step_s * grid.steps as f64) / dt).ceil() + 1.0;
-    let vertices = (0..=(before + after) as usize).map(|k| {
-        let t = (k as f64 - before) * dt;
-        arc.at(t, t)[0]
-    });
-    Command::Knots(Knots::chords(-before * dt, dt, vertices.collect()))
+/// One turn of the tool.
+struct Lap<'a> {
+    machine: &'a Machine,
+    test: &'a CircleTest,
+    omega_rad_s: f64,
+    turn_s: f64,
+    samples: usize,
+}
+
+impl Lap<'_> {
+    fn seconds(&self, sample: usize) -> f64 {
+        self.turn_s * sample as f64 / self.samples as f64
+    }
+
+    fn tool(&self, sample: usize, axes: [AxisPoint; 2]) -> [f64; 2] {
+        let place = Place { centre_m: self.test.centre_m };
+        geometry::tool(self.machine, place, self.test.started_s + self.seconds(sample), axes)
+    }
+
+    /// Steps from sample to sample.
+    fn every(&self) -> usize {
+        MIN_STEPS_PER_TURN.div_ceil(self.samples)
+    }
+
+    fn step_s(&self) -> f64 {
+        self.turn_s / (self.samples * self.every()) as f64
+    }
+
+    /// The controller commands the arc itself. Both axes go piece by piece, so that what lies between is never far.
+    fn along_arc(&self) -> Vec<[f64; 2]> {
+        let (machine, samples, every, step_s) = (self.machine, self.samples, self.every(), self.step_s());
+        let step_rad = TAU.copysign(self.omega_rad_s) / (samples * every) as f64;
+        let turns = Turns::new(self.test.start_angle_rad, step_rad);
+        let (radius_m, omega_rad_s) = (self.test.radius_m, self.omega_rad_s);
+        let round = Round { machine, turns: &turns, radius_m, omega_rad_s, step_s };
+        let [x, y] = [0, 1].map(|axis| Chain::new(machine, axis));
+        let same = x == y;
+        let x = Discrete::new(x, step_s);
+        let y = if same { x.clone() } else { Discrete::new(y, step_s) };
+        let mut axes = [orbit::axis(round, 0, &x), orbit::axis(round, 1, &y)];
+        let piece = samples.min((PIECE / every).max(1));
+        let mut waves = vec![[0.0; 2]; piece * every];
+        let mut points = [0, 1].map(|_| Vec::with_capacity(piece));
+        let mut position_m = Vec::with_capacity(samples);
+        for first in (0..samples).step_by(piece) {
+            let waves = &mut waves[..piece.min(samples - first) * every];
+            turns.fill((first * every) as f64, waves);
+            for (axis, points) in axes.iter_mut().zip(&mut points) {
+                points.clear();
+                axis.follow(waves, every, points);
+            }
+            let both = points[0].iter().zip(&points[1]).enumerate();
+            position_m.extend(both.map(|(i, (x, y))| self.tool(first + i, [*x, *y])));
+        }
+        position_m
+    }
+
+    /// The controller issues a set-point every `dt` and joins them by chords.
+    fn along_chords(&self, dt: f64) -> Vec<[f64; 2]> {
+        let step_s = dt / (dt / self.step_s()).ceil();
+        let axes = [0, 1].map(|axis| {
+            let grid = self.grid(axis, step_s);
+            let knots = self.chords(axis, dt, grid);
+            axis::motion(self.machine, axis, &knots, grid, (0..self.samples).map(|i| self.seconds(i)))
+        });
+        axes[0].iter().zip(&axes[1]).enumerate().map(|(i, (x, y))| self.tool(i, [*x, *y])).collect()
+    }
+
+    /// Steps from rest, until nothing is left of the start and what remembers reversals has seen one, then the lap.
+    fn grid(&self, axis: usize, step_s: f64) -> Grid {
+        let machine = self.machine;
+        let reversal_s = if Memory::needed(machine, axis) { ONE_REVERSAL_TURNS * self.turn_s } else { 0.0 };
+        let settling_s = RUN_IN_TIME_CONSTANTS * machine.settling_s(axis);
+        let before = ((machine.dead_time_s[axis] + settling_s + reversal_s) / step_s).min(MAX_STEPS).ceil();
+        let lap = (self.turn_s / step_s).min(MAX_STEPS).ceil();
+        Grid { start_s: -before * step_s, step_s, steps: before as usize + lap as usize }
+    }
+
+    /// Set-points of the interpolator, one of them at t = 0, joined by chords.
+    fn chords(&self, axis: usize, dt: f64, grid: Grid) -> Knots {
+        let window = if let AccDec::MovingAverage(t) = self.machine.acc_dec { t } else { 0.0 };
+        let before = ((window - grid.start_s) / dt).ceil() + 1.0;
+        let after = ((grid.start_s + grid.step_s * grid.steps as f64) / dt).ceil() + 1.0;
+        let turns = Turns::new(self.test.start_angle_rad, self.omega_rad_s * dt);
+        let mut waves = vec![[0.0; 2]; (before + after) as usize + 1];
+        turns.fill(-before, &mut waves);
+        let vertices = waves.iter().map(|wave| self.test.radius_m * wave[axis]);
+        Knots::chords(-before * dt, dt, vertices.collect())
+    }
 }
 
 /// Samples that the simulated ballbar takes of a turn.

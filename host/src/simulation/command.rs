@@ -1,58 +1,8 @@
-//! Commands of one axis over time: a circle in closed form, or knots joined by cubics or chords.
-use std::f64::consts::FRAC_PI_2;
+//! The command of one axis over time as knots, joined by cubics or chords. A circle that the controller does not cut
+//! into chords is a [`super::wave`] instead.
 
-/// A command that reaches back to the beginning of time, so that filters have no start-up of their own.
-#[derive(Clone, Debug)]
-pub(super) enum Command {
-    /// radius·cos(ω·t + phase).
-    Harmonic {
-        /// Amplitude, m.
-        radius_m: f64,
-        /// Signed angular rate, rad/s.
-        omega_rad_s: f64,
-        /// Phase at t = 0, rad.
-        phase_rad: f64,
-    },
-    /// Knots at equal distance; before the first and after the last the command stands still.
-    Knots(Knots),
-}
-
-impl Command {
-    /// One axis (0: X, 1: Y) of a circle.
-    pub(super) fn circle(axis: usize, radius_m: f64, omega_rad_s: f64, start_rad: f64) -> Self {
-        let phase_rad = if axis == 0 { start_rad } else { start_rad - FRAC_PI_2 };
-        Self::Harmonic { radius_m, omega_rad_s, phase_rad }
-    }
-
-    /// Position and velocity at `t`; where the velocity jumps, it is that of the piece in which `inside` lies.
-    pub(super) fn at(&self, t: f64, inside: f64) -> [f64; 2] {
-        match self {
-            Self::Harmonic { radius_m, omega_rad_s, phase_rad } => {
-                let (sin, cos) = (omega_rad_s * t + phase_rad).sin_cos();
-                [radius_m * cos, -radius_m * omega_rad_s * sin]
-            }
-            Self::Knots(knots) => knots.at(t, inside),
-        }
-    }
-
-    /// Antiderivative of the position at `t`, up to a constant.
-    fn integral(&self, t: f64) -> f64 {
-        match self {
-            Self::Harmonic { radius_m, omega_rad_s, phase_rad } => {
-                radius_m / omega_rad_s * (omega_rad_s * t + phase_rad).sin()
-            }
-            Self::Knots(knots) => knots.integral(t),
-        }
-    }
-
-    /// Position and velocity of the mean over the last `window_s`.
-    pub(super) fn mean_at(&self, t: f64, window_s: f64) -> [f64; 2] {
-        let (now, then) = (self.at(t, t)[0], self.at(t - window_s, t - window_s)[0]);
-        [(self.integral(t) - self.integral(t - window_s)) / window_s, (now - then) / window_s]
-    }
-}
-
-/// Knots `dt_s` apart from `start_s` on, joined by cubics in Hermite form.
+/// Knots `dt_s` apart from `start_s` on, joined by cubics in Hermite form; before the first and after the last the
+/// command stands still, so that filters have no start-up of their own.
 #[derive(Clone, Debug)]
 pub(super) struct Knots {
     start_s: f64,
@@ -108,7 +58,8 @@ impl Knots {
         }
     }
 
-    fn at(&self, t: f64, inside: f64) -> [f64; 2] {
+    /// Position and velocity at `t`; where the velocity jumps, it is that of the piece in which `inside` lies.
+    pub(super) fn at(&self, t: f64, inside: f64) -> [f64; 2] {
         match self.piece(inside) {
             Err(end) => [self.position_m[end], 0.0],
             Ok(k) => {
@@ -119,6 +70,13 @@ impl Knots {
         }
     }
 
+    /// Position and velocity of the mean over the last `window_s`.
+    pub(super) fn mean_at(&self, t: f64, window_s: f64) -> [f64; 2] {
+        let (now, then) = (self.at(t, t)[0], self.at(t - window_s, t - window_s)[0]);
+        [(self.integral(t) - self.integral(t - window_s)) / window_s, (now - then) / window_s]
+    }
+
+    /// Antiderivative of the position at `t`, up to a constant.
     fn integral(&self, t: f64) -> f64 {
         match self.piece(t) {
             Err(0) => self.position_m[0] * (t - self.start_s),
@@ -169,26 +127,25 @@ mod tests {
     fn moving_average_of_knots_is_the_integral() {
         let dt = 0.01;
         for knots in [Knots::smooth(0.0, dt, sine(dt)), Knots::chords(0.0, dt, sine(dt))] {
-            let command = Command::Knots(knots);
             let (t, window, n) = (7.3123, 0.0417, 20_000);
             let step = window / f64::from(n);
             let sum: f64 =
-                (0..n).map(|i| t - window + (f64::from(i) + 0.5) * step).map(|x| command.at(x, x)[0]).sum();
-            let [mean, slope] = command.mean_at(t, window);
+                (0..n).map(|i| t - window + (f64::from(i) + 0.5) * step).map(|x| knots.at(x, x)[0]).sum();
+            let [mean, slope] = knots.mean_at(t, window);
             assert!((mean - sum / f64::from(n)).abs() < 1e-11);
             let eps = 1e-6;
             let numeric =
-                (command.mean_at(t + eps, window)[0] - command.mean_at(t - eps, window)[0]) / (2.0 * eps);
+                (knots.mean_at(t + eps, window)[0] - knots.mean_at(t - eps, window)[0]) / (2.0 * eps);
             assert!((slope - numeric).abs() < 1e-7, "{slope} {numeric}");
         }
     }
 
     #[test]
     fn command_stands_still_outside_its_knots() {
-        let command = Command::Knots(Knots::smooth(1.0, 0.5, vec![2.0, 3.0, 5.0]));
-        assert_eq!(command.at(-4.0, -4.0), [2.0, 0.0]);
-        assert_eq!(command.at(9.0, 9.0), [5.0, 0.0]);
-        assert!((command.mean_at(20.0, 1.0)[0] - 5.0).abs() < 1e-12);
-        assert!((command.mean_at(0.9, 1.0)[0] - 2.0).abs() < 1e-12);
+        let knots = Knots::smooth(1.0, 0.5, vec![2.0, 3.0, 5.0]);
+        assert_eq!(knots.at(-4.0, -4.0), [2.0, 0.0]);
+        assert_eq!(knots.at(9.0, 9.0), [5.0, 0.0]);
+        assert!((knots.mean_at(20.0, 1.0)[0] - 5.0).abs() < 1e-12);
+        assert!((knots.mean_at(0.9, 1.0)[0] - 2.0).abs() < 1e-12);
     }
 }

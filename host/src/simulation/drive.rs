@@ -1,7 +1,7 @@
 //! The simulated machine under the set-points of an outside controller.
 use super::axis::{self, Grid};
 use super::circle::{CircleTest, Trace};
-use super::command::{Command, Knots};
+use super::command::Knots;
 use super::geometry::{self, Place};
 use super::machine::Machine;
 use std::f64::consts::TAU;
@@ -57,11 +57,11 @@ pub fn drive(machine: &Machine, set_points: &SetPoints<'_>) -> Path {
     let axes: [Vec<_>; 2] = std::array::from_fn(|axis| {
         let centre = set_points.centre_m[axis];
         let positions: Vec<f64> = set_points.position_m.iter().map(|p| p[axis] - centre).collect();
-        let (command, step_s) = command(machine, set_points.hold, dt_s, positions);
+        let (knots, step_s) = knots(machine, set_points.hold, dt_s, positions);
         let before = (machine.dead_time_s[axis] / step_s).ceil();
         let steps = before as usize + (dt_s * n as f64 / step_s).ceil() as usize;
         let grid = Grid { start_s: -before * step_s, step_s, steps };
-        axis::motion(machine, axis, &command, grid, (0..n).map(|i| dt_s * i as f64))
+        axis::motion(machine, axis, &knots, grid, (0..n).map(|i| dt_s * i as f64))
     });
     let place = Place { centre_m: set_points.centre_m };
     let tool = |i: usize| {
@@ -73,19 +73,18 @@ pub fn drive(machine: &Machine, set_points: &SetPoints<'_>) -> Path {
 }
 
 /// Command of one axis and the step that meets its corners.
-fn command(machine: &Machine, hold: Hold, dt_s: f64, positions: Vec<f64>) -> (Command, f64) {
+fn knots(machine: &Machine, hold: Hold, dt_s: f64, positions: Vec<f64>) -> (Knots, f64) {
     let own = machine.interpolation_s.filter(|own| *own > dt_s * (1.0 + 1e-9));
     match (own, hold) {
         (Some(own), _) => {
             let end_s = dt_s * positions.len() as f64;
             let fine = Knots::smooth(0.0, dt_s, positions);
-            let fine = Command::Knots(fine);
             let count = (end_s / own).ceil() as usize + 1;
             let vertices = (0..=count).map(|k| fine.at(k as f64 * own, k as f64 * own)[0]).collect();
-            (Command::Knots(Knots::chords(0.0, own, vertices)), own / (own / dt_s).ceil())
+            (Knots::chords(0.0, own, vertices), own / (own / dt_s).ceil())
         }
-        (None, Hold::Cubic) => (Command::Knots(Knots::smooth(0.0, dt_s, positions)), dt_s),
-        (None, Hold::Chord) => (Command::Knots(Knots::chords(0.0, dt_s, positions)), dt_s),
+        (None, Hold::Cubic) => (Knots::smooth(0.0, dt_s, positions), dt_s),
+        (None, Hold::Chord) => (Knots::chords(0.0, dt_s, positions), dt_s),
     }
 }
 
@@ -98,9 +97,9 @@ impl Path {
         if self.position_m.is_empty() {
             return Trace::new(test, turn_s, vec![[f64::NAN; 2]; n]);
         }
-        let axes: [Command; 2] = std::array::from_fn(|axis| {
+        let axes: [Knots; 2] = std::array::from_fn(|axis| {
             let positions = self.position_m.iter().map(|p| p[axis] - test.centre_m[axis]).collect();
-            Command::Knots(Knots::smooth(0.0, self.dt_s, positions))
+            Knots::smooth(0.0, self.dt_s, positions)
         });
         let at = |i: usize| {
             let t = start_s + turn_s * i as f64 / n as f64;

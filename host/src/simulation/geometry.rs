@@ -16,7 +16,9 @@ pub(super) fn tool(machine: &Machine, place: Place, t: f64, axes: [AxisPoint; 2]
     let [x, y] = axes.map(|a| a.drive_m);
     let half_shear = 0.5 * machine.squareness_rad;
     let growth = match machine.thermal_settling_s {
-        settling if settling > 0.0 => machine.thermal_per_s * settling * (1.0 - (-t / settling).exp()),
+        settling if settling > 0.0 && machine.thermal_per_s != 0.0 => {
+            machine.thermal_per_s * settling * (1.0 - (-t / settling).exp())
+        }
         _ => machine.thermal_per_s * t,
     };
     let half_cross = 0.5 * machine.cross_lag_s;
@@ -42,9 +44,11 @@ pub(super) fn tool(machine: &Machine, place: Place, t: f64, axes: [AxisPoint; 2]
     }
     let radial = machine.radius_offset_m
         + machine.vibration.map_or(0.0, |v| v.amplitude_m * (TAU * v.frequency_hz * t + v.phase_rad).sin());
-    let length = tool[0].hypot(tool[1]);
-    if radial != 0.0 && length > 0.0 {
-        tool = tool.map(|p| p * (1.0 + radial / length));
+    if radial != 0.0 {
+        let length = tool[0].hypot(tool[1]);
+        if length > 0.0 {
+            tool = tool.map(|p| p * (1.0 + radial / length));
+        }
     }
     tool
 }

@@ -8,8 +8,10 @@
 //! | [`campaign`] | a whole plan, read by an instrument with noise |
 //!
 //! Linear elements are stepped exactly (matrix exponential under a command that is cubic within a step), so a
-//! lap needs steps enough for its shape, not for its time constants. Backlash and friction follow the axis
-//! through its turning points. Everything is deterministic; noise comes from the instrument and its seed.
+//! lap needs steps enough for its shape, not for its time constants. On a circle at a constant rate they start in the
+//! state that these very steps reproduce, where a run-in from rest would end; only chords and set-points need one.
+//! Backlash and friction follow the axis through its turning points, from a reversal before the lap on. Everything is
+//! deterministic; noise comes from the instrument and its seed.
 mod axis;
 mod chain;
 mod circle;
@@ -21,8 +23,11 @@ mod geometry;
 mod instrument;
 pub mod machine;
 mod machine_spec;
+mod memory;
+mod orbit;
 mod plan;
 pub mod plan_file;
+mod wave;
 
 pub use circle::{CircleTest, MAX_RATE_HZ, SAMPLES_PER_TURN, Trace, ballbar_samples, circle};
 pub use drive::{Hold, Path, SetPoints, drive};

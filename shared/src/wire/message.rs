@@ -14,6 +14,10 @@ pub const SET_POINTS: usize = 6;
 /// Most set-points of a stream in one message to it.
 pub const POINTS: usize = 40;
 
+/// Bytes of requests that a host may have on their way: a controller keeps as many, and one more frame, until it has
+/// time for them.
+pub const IN_FLIGHT: usize = 768;
+
 /// A link that is silent for so long during a run counts as dead, unless the host asks otherwise, ms: four times the
 /// host's longest silence.
 pub const SUPERVISE_MS: u16 = 1000;

@@ -9,6 +9,11 @@
 //! carried out and answers a repetition from memory, so a lost answer never makes a command happen twice; a
 //! request that comes late, after a newer one of the session, is dropped. A session begins with
 //! [`Command::Hello`].
+//!
+//! Up to [`IN_FLIGHT`] bytes of requests may be on their way at once if each of them does no harm a second time:
+//! [`Command::WriteChunk`], of which the controller takes the next in order only, and [`Command::ReadBack`]. What is
+//! lost of them is sent again as a new request.
+//!
 //! Between replies the controller may send [`FromController::SetPoints`] to a subscriber.
 //!
 //! | module | holds |
@@ -32,7 +37,7 @@ pub use crate::path::{ExactArc, ExactCircle, ExactSegment, Quantity};
 pub use crc::{Crc32, crc32};
 pub use frame::{Accumulator, FrameCounts, MAX_FRAME, MAX_PAYLOAD, encode};
 pub use message::{
-    CHUNK, Chunk, Command, Counters, FaultCause, FromController, Identity, MotionState, POINTS,
+    CHUNK, Chunk, Command, Counters, FaultCause, FromController, IN_FLIGHT, Identity, MotionState, POINTS,
     PROTOCOL_VERSION, Pose, Probation, Reply, Request, SET_POINTS, SUPERVISE_MS, SetPoint, SetPoints,
     SlotState, Status, TableInfo,
 };

@@ -2,10 +2,12 @@
 //! shows again.
 use clap::Parser;
 use giotto_tests::fuzz::{TARGETS, Target};
-use rand::{Rng, RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use giotto_tests::noise::Noise;
+use std::num::NonZeroUsize;
+use std::panic::catch_unwind;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Instant;
 
 /// Fuzzes without coverage.
@@ -20,49 +22,45 @@ struct Args {
     /// Seed of the first execution; each has the next.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Threads; all cores if not given. What is found does not depend on it.
+    #[arg(long)]
+    threads: Option<NonZeroUsize>,
     /// Runs a target on the bytes of a file instead.
     #[arg(long, requires = "target")]
     replay: Option<PathBuf>,
 }
 
-/// Most bytes made up.
-const LONGEST: usize = 1500;
+/// Executions that a thread takes at once.
+const BLOCK: u64 = 256;
 
-/// The bytes of one execution: a seed of the target with some of it changed, cut, repeated, or nothing but noise.
-fn bytes(target: &Target, seeds: &[Vec<u8>], random: &mut ChaCha8Rng) -> Vec<u8> {
-    let mut bytes = match random.random_range(0..8_u8) {
-        0 => vec![0; random.random_range(0..200)],
-        _ => seeds[random.random_range(0..seeds.len())].clone(),
-    };
-    if bytes.iter().all(|byte| *byte == 0) {
-        random.fill_bytes(&mut bytes);
-    }
-    for _ in 0..random.random_range(0..6_u8) {
-        let at = random.random_range(0..=bytes.len());
-        match random.random_range(0..6_u8) {
-            0 => bytes.truncate(at),
-            1 => bytes.insert(at, random.random()),
-            2 => bytes.extend_from_within(..at),
-            3 => bytes.extend_from_slice(&seeds[random.random_range(0..seeds.len())]),
-            _ => {
-                if let Some(byte) = bytes.get_mut(at) {
-                    *byte = if random.random() {
-                        random.random()
-                    } else {
-                        *byte ^ 1 << random.random_range(0..8_u8)
-                    };
-                }
+/// The first execution in which a defect shows, if there is one.
+fn first_defect(target: &Target, args: &Args, threads: usize) -> Option<u64> {
+    let noise = Noise::new(target);
+    let (next, first) = (AtomicU64::new(0), AtomicU64::new(u64::MAX));
+    // Blocks are taken in order, and each is run until a defect before it is known.
+    let work = || loop {
+        let begin = next.fetch_add(BLOCK, Relaxed);
+        for execution in begin..(begin + BLOCK).min(args.executions) {
+            if execution >= first.load(Relaxed) {
+                break;
+            }
+            let bytes = noise.bytes(args.seed.wrapping_add(execution));
+            if catch_unwind(|| (target.run)(&bytes)).is_err() {
+                first.fetch_min(execution, Relaxed);
             }
         }
-    }
-    if target.name == "server" {
-        // Steps of a conversation are short: more of them.
-        let more = random.random_range(0..24_usize);
-        bytes.extend((0..more).map(|_| random.random::<u8>()));
-        bytes.truncate(80);
-    }
-    bytes.truncate(LONGEST);
-    bytes
+        if begin >= args.executions.min(first.load(Relaxed)) {
+            return;
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 1..threads {
+            scope.spawn(work);
+        }
+        work();
+    });
+    let first = first.into_inner();
+    (first != u64::MAX).then_some(first)
 }
 
 fn main() -> ExitCode {
@@ -73,6 +71,8 @@ fn main() -> ExitCode {
         eprintln!("error: no such target: there are frame, server, table and boot");
         return ExitCode::from(2);
     }
+    let cores = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let threads = args.threads.map_or_else(cores, NonZeroUsize::get);
     for target in targets {
         if let Some(path) = &args.replay {
             match std::fs::read(path) {
@@ -84,20 +84,15 @@ fn main() -> ExitCode {
             }
             continue;
         }
-        let seeds = (target.seeds)();
         let started = Instant::now();
-        for execution in 0..args.executions {
+        if let Some(execution) = first_defect(target, &args, threads) {
             let seed = args.seed.wrapping_add(execution);
-            let bytes = bytes(target, &seeds, &mut ChaCha8Rng::seed_from_u64(seed));
-            let outcome = std::panic::catch_unwind(|| (target.run)(&bytes));
-            if outcome.is_err() {
-                eprintln!("target {}, seed {seed}: bytes {bytes:02x?}", target.name);
-                return ExitCode::from(5);
-            }
+            eprintln!("target {}, seed {seed}: bytes {:02x?}", target.name, Noise::new(target).bytes(seed));
+            return ExitCode::from(5);
         }
         let seconds = started.elapsed().as_secs_f64();
         println!(
-            "{}: {} executions from seed {}, no defect ({seconds:.1} s)",
+            "{}: {} executions from seed {}, no defect ({seconds:.1} s, {threads} threads)",
             target.name, args.executions, args.seed
         );
     }

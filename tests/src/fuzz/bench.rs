@@ -1,10 +1,14 @@
 //! A whole controller on the host: server, store, planner and tick, as on a board.
+use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use giotto_firmware::control::{Desk, Job, Receiver, SEGMENTS, SET_POINTS, Sender, Shared, Tick};
-use giotto_firmware::engine::{Config, Executor, Planner};
+use giotto_firmware::engine::{Config, Executor, Output, Planner};
 use giotto_firmware::server::{Board, Buffers, Server, TimedSetPoint};
-use giotto_firmware::store::{Layout, ram::RamFlash};
+use giotto_firmware::store::{
+    Layout,
+    ram::{RamFlash, RamFlashError},
+};
 use giotto_shared::table::{self, MAX_IMAGE_BYTES, bounds};
-use giotto_shared::wire::{MotionState, Status};
+use giotto_shared::wire::{FromController, MAX_FRAME, MotionState, Status, crc32};
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
@@ -17,7 +21,82 @@ const LAYOUT: Layout = Layout::new([0, SLOT as u32], SLOT as u32).with_key(2 * S
 const BOARD: Board = Board { name: "fuzz", build: "0", tick_hz: 1000 };
 
 /// Its flash.
-pub type Flash = RamFlash<FLASH, ERASE>;
+pub struct Flash {
+    cells: Box<RamFlash<FLASH, ERASE>>,
+    /// How often something was erased or programmed.
+    changes: u32,
+}
+
+impl Flash {
+    /// Erased.
+    pub fn new() -> Self {
+        Self { cells: Box::default(), changes: 0 }
+    }
+
+    /// The cells, to fill.
+    pub fn bytes_mut(&mut self) -> &mut [u8; FLASH] {
+        self.cells.bytes_mut()
+    }
+}
+
+impl ErrorType for Flash {
+    type Error = RamFlashError;
+}
+
+impl ReadNorFlash for Flash {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), RamFlashError> {
+        self.cells.read(offset, bytes)
+    }
+
+    fn capacity(&self) -> usize {
+        FLASH
+    }
+}
+
+impl NorFlash for Flash {
+    const WRITE_SIZE: usize = RamFlash::<FLASH, ERASE>::WRITE_SIZE;
+    const ERASE_SIZE: usize = ERASE;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), RamFlashError> {
+        self.changes += 1;
+        self.cells.erase(from, to)
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), RamFlashError> {
+        self.changes += 1;
+        self.cells.write(offset, bytes)
+    }
+}
+
+/// The message in a frame, which must be whole and alone. Written anew, not that of the wire.
+pub fn message_in(frame: &[u8]) -> FromController {
+    let mut content = [0; MAX_FRAME];
+    let mut length = 0;
+    let (code, rest) = frame.split_first().expect("a frame is not empty");
+    assert_ne!(*code, 0, "only the end of a frame is zero");
+    let (end, rest) = rest.split_last().expect("a frame has an end");
+    assert_eq!(*end, 0, "a frame ends with zero");
+    // A code says how many bytes follow up to the next one, which stands for a zero unless the run was the longest.
+    let (mut left, mut zero) = (code - 1, *code != u8::MAX);
+    for &byte in rest {
+        assert_ne!(byte, 0, "only the end of a frame is zero");
+        if left > 0 {
+            content[length] = byte;
+            length += 1;
+            left -= 1;
+        } else {
+            // The content holds zeros already.
+            length += usize::from(zero);
+            (left, zero) = (byte - 1, byte != u8::MAX);
+        }
+    }
+    assert_eq!(left, 0, "the last run of a frame is whole");
+    let (payload, crc) = content[..length].split_last_chunk().expect("a frame has a CRC");
+    assert_eq!(u32::from_le_bytes(*crc), crc32(payload), "its CRC holds");
+    postcard::from_bytes(payload).expect("a message can be read")
+}
 
 /// A queue whose two ends are in one thread.
 struct Queue<T>(Rc<RefCell<VecDeque<T>>>, usize);
@@ -71,6 +150,10 @@ pub struct Bench {
     tick: BenchTick,
     shared: Rc<Shared>,
     last_nm: Option<[i32; 3]>,
+    /// Every tick is made, also those of a rest.
+    pub thorough: bool,
+    /// Slot and changes of the flash of the table looked at last.
+    checked: Option<(u8, u32)>,
 }
 
 impl Bench {
@@ -88,6 +171,8 @@ impl Bench {
             tick: Tick::new(executor, Rc::clone(&shared), segments_out, points_in),
             shared,
             last_nm: None,
+            thorough: false,
+            checked: None,
         }
     }
 
@@ -102,24 +187,35 @@ impl Bench {
     }
 
     /// Lets ticks pass. No set-point may be farther from the programmed one than the image allows, nor from the
-    /// one before than the fastest machine goes.
+    /// one before than the fastest machine goes. What is left of a rest in which nothing can happen any more passes
+    /// at once.
     pub fn ticks(&mut self, count: usize, late: bool) {
-        let farthest = (f64::from(bounds::OFFSET_MAX_M) * 1e9) as i64 + 16;
-        // 10 m/s, the fastest that a configuration may ask for, in a tick of 1 ms.
-        let fastest = 10_000_000;
-        for at in 0..count {
-            let output = self.tick.tick(late && at == 0);
+        let mut late = late;
+        for at in 1..=count {
+            let output = self.tick.tick(std::mem::take(&mut late));
             self.server.supervise();
-            for (nominal, corrected) in output.nominal_nm.into_iter().zip(output.corrected_nm) {
-                let apart = (i64::from(nominal) - i64::from(corrected)).abs();
-                assert!(apart <= farthest, "{output:?}");
-            }
-            if let Some(last) = self.last_nm.replace(output.corrected_nm) {
-                for (last, now) in last.into_iter().zip(output.corrected_nm) {
-                    assert!((i64::from(last) - i64::from(now)).abs() <= fastest, "{last} to {now}");
-                }
+            let still = self.look(&output) && output.flags == 0;
+            if still && !self.thorough && self.tick.rest((count - at) as u32) {
+                return;
             }
         }
+    }
+
+    /// Looks at a set-point; whether it is the same as the one before.
+    fn look(&mut self, output: &Output) -> bool {
+        const FARTHEST: u32 = (bounds::OFFSET_MAX_M as f64 * 1e9) as u32 + 16;
+        // 10 m/s, the fastest that a configuration may ask for, in a tick of 1 ms.
+        const FASTEST: u32 = 10_000_000;
+        let (nominal, corrected) = (output.nominal_nm, output.corrected_nm);
+        let apart = |a: [i32; 3], b: [i32; 3]| {
+            let [x, y, z] = [0, 1, 2].map(|axis| a[axis].abs_diff(b[axis]));
+            x.max(y).max(z)
+        };
+        assert!(apart(nominal, corrected) <= FARTHEST, "{output:?}");
+        let last = self.last_nm.replace(corrected);
+        let moved = last.map(|last| apart(last, corrected));
+        assert!(moved.is_none_or(|moved| moved <= FASTEST), "{last:?} to {output:?}");
+        moved == Some(0)
     }
 
     /// Never a correction without a whole table that this build reads.
@@ -127,10 +223,15 @@ impl Bench {
         match self.server.active() {
             None => assert!(status.bypass, "corrects without a table"),
             Some(slot) => {
-                let mut stored = [0; MAX_IMAGE_BYTES];
-                self.server.store_mut().read(slot, 0, &mut stored).expect("the slot is there");
-                let header = table::Header::check(&stored).expect("the table in use is whole");
-                table::decode(&stored[..header.length]).expect("the table in use can be read");
+                let store = self.server.store_mut();
+                let now = (slot, store.flash_mut().changes);
+                // What was looked at is what is there until the flash is changed or the other slot is in use.
+                if self.checked.replace(now) != Some(now) {
+                    let mut stored = [0; MAX_IMAGE_BYTES];
+                    store.read(slot, 0, &mut stored).expect("the slot is there");
+                    let header = table::Header::check(&stored).expect("the table in use is whole");
+                    table::decode(&stored[..header.length]).expect("the table in use can be read");
+                }
             }
         }
         // Rest is rest.
@@ -139,6 +240,7 @@ impl Bench {
 
     /// As a reset leaves it.
     pub fn reset(self) -> Self {
-        Self::boot(self.server.into_parts().0)
+        let thorough = self.thorough;
+        Self { thorough, ..Self::boot(self.server.into_parts().0) }
     }
 }

@@ -1,20 +1,18 @@
 //! The flash image at boot: whatever it holds, the controller boots, corrects with whole tables only, and can be flashed.
-use super::bench::{Bench, FLASH, Flash};
+use super::bench::{Bench, FLASH, Flash, message_in};
 use giotto_shared::wire::{
-    self, Accumulator, CHUNK, Chunk, Command, Crc32, FromController, MAX_FRAME, Reply, Request, Status, crc32,
+    self, CHUNK, Chunk, Command, Crc32, FromController, MAX_FRAME, Reply, Request, Status, crc32,
 };
 
 fn ask(bench: &mut Bench, seq: &mut u16, command: Command) -> Reply {
     *seq += 1;
     let mut frame = [0; MAX_FRAME];
     let request = Request { session: 1, seq: *seq, command };
-    let frame = wire::encode(&request, &mut frame).expect("a request fits").to_vec();
-    let reply = frame.iter().find_map(|&byte| bench.receive(byte).map(<[u8]>::to_vec)).expect("an answer");
-    let mut accumulator = Accumulator::new();
-    let payload = reply.iter().find_map(|&byte| accumulator.push(byte).map(<[u8]>::to_vec));
-    match postcard::from_bytes(&payload.expect("a whole frame")).expect("a reply can be read") {
-        FromController::Reply { reply, .. } => reply,
-        FromController::SetPoints(_) => panic!("nobody has asked for set-points"),
+    let frame = wire::encode(&request, &mut frame).expect("a request fits");
+    let mut answers = frame.iter().filter_map(|&byte| bench.receive(byte).map(message_in));
+    match answers.next() {
+        Some(FromController::Reply { reply, .. }) => reply,
+        other => panic!("no answer, or what nobody has asked for: {other:?}"),
     }
 }
 

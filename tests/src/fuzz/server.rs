@@ -1,9 +1,9 @@
 //! The server's state machine, with the engine behind it: a conversation of frames, raw bytes, time and resets.
-use super::bench::{Bench, Flash};
+use super::bench::{Bench, Flash, message_in};
 use giotto_shared::path::Segment;
 use giotto_shared::wire::{
-    self, Accumulator, CHUNK, Chunk, Command, ExactCircle, ExactSegment, FromController, MAX_FRAME, Reply,
-    Request, Status, crc32,
+    self, CHUNK, Chunk, Command, ExactCircle, ExactSegment, FromController, MAX_FRAME, POINTS, Reply,
+    Request, Status, Steps, crc32,
 };
 
 /// Reads a conversation.
@@ -26,21 +26,40 @@ impl<'a> Script<'a> {
 struct Talk {
     bench: Bench,
     seq: u16,
+    /// Set-points of a stream so far.
+    steps: Steps,
+    /// Everything the controller has said, if that is wanted.
+    transcript: Option<Vec<u8>>,
 }
 
 impl Talk {
+    fn new(thorough: bool) -> Self {
+        let transcript = None;
+        let mut talk =
+            Self { bench: Bench::boot(Flash::new()), seq: 0, steps: Steps::from([0; 3]), transcript };
+        talk.bench.thorough = thorough;
+        talk
+    }
+
+    /// Takes the power away and opens the session again.
+    fn reset(self) -> Self {
+        let mut talk = Self { bench: self.bench.reset(), seq: 0, ..self };
+        talk.ask(Command::Hello);
+        talk
+    }
+
     /// The reply in what came back.
     fn send(&mut self, bytes: &[u8]) -> Option<Reply> {
         let mut last = None;
         for &byte in bytes {
             if let Some(frame) = self.bench.receive(byte) {
-                let mut accumulator = Accumulator::new();
-                let payload = frame.iter().find_map(|&byte| accumulator.push(byte).map(<[u8]>::to_vec));
-                let payload = payload.expect("a reply is a whole frame");
-                last = match postcard::from_bytes(&payload).expect("a reply can be read") {
+                last = match message_in(frame) {
                     FromController::Reply { reply, .. } => Some(reply),
                     FromController::SetPoints(_) => None,
                 };
+                if let Some(transcript) = &mut self.transcript {
+                    transcript.extend_from_slice(frame);
+                }
             }
         }
         last
@@ -59,14 +78,13 @@ impl Talk {
         self.seq = self.seq.wrapping_add(1);
         let mut frame = [0; MAX_FRAME];
         let request = Request { session: 1, seq: self.seq, command };
-        let frame = wire::encode(&request, &mut frame).expect("a request fits").to_vec();
-        self.send(&frame)
+        self.send(wire::encode(&request, &mut frame).expect("a request fits"))
     }
 
-    fn status(&mut self) -> Status {
+    fn status(&mut self) -> Option<Status> {
         match self.ask(Command::Status) {
-            Some(Reply::Status(status)) => status,
-            other => panic!("no status: {other:?}"),
+            Some(Reply::Status(status)) => Some(status),
+            _ => None,
         }
     }
 
@@ -78,15 +96,48 @@ impl Talk {
         }
         self.ask(Command::WriteEnd);
     }
+
+    /// Opens a stream (0), or goes on with it: at a constant rate, faster, or at once somewhere else.
+    fn stream(&mut self, how: u8, places: usize) {
+        if how == 0 {
+            let here_nm = self.status().map_or([0; 3], |status| status.raw_nm);
+            self.steps = Steps::from(here_nm);
+            self.ask(Command::BeginStream { feed_m_s: 0.5, ahead: places as u16 });
+            return;
+        }
+        let mut steps = Chunk::new();
+        for _ in 0..places {
+            let Steps { place_nm: [x, y, z], .. } = self.steps;
+            let [dx, dy] = match how {
+                1..12 => [i32::from(how) * 10_000, -3_000],
+                12 => [600_000, 0],
+                13 => [i32::MAX, 0],
+                _ => [0, 0],
+            };
+            if !self.steps.write([x.wrapping_add(dx), y.wrapping_add(dy), z], &mut steps) {
+                break;
+            }
+        }
+        self.ask(Command::Points { steps });
+    }
+}
+
+/// Ticks of a wait: as many lengths of a few ticks as of a thousand, up to two thousand.
+fn wait(byte: u8) -> usize {
+    let (doublings, part) = (usize::from(byte) / 23, usize::from(byte) % 23);
+    ((23 + part) << doublings) / 23
 }
 
 /// Holds the conversation and looks at the state after each step.
 pub fn run(bytes: &[u8]) {
+    hold(Talk::new(false), bytes);
+}
+
+fn hold(mut talk: Talk, bytes: &[u8]) -> Talk {
     let mut script = Script(bytes);
-    let mut talk = Talk { bench: Bench::boot(Flash::new()), seq: 0 };
     talk.ask(Command::Hello);
     while let Some(step) = script.byte() {
-        match step % 14 {
+        match step % 16 {
             0 => drop(talk.send(script.some(usize::from(step) / 4))),
             1 => {
                 let length = script.byte().unwrap_or(0);
@@ -100,10 +151,11 @@ pub fn run(bytes: &[u8]) {
                 payload.extend(script.some(usize::from(length) % 64));
                 drop(talk.payload(&payload));
             }
-            3 => talk.bench.ticks(usize::from(script.byte().unwrap_or(1)) * 8, step > 250),
+            3 => talk.bench.ticks(wait(script.byte().unwrap_or(1)), step > 240),
             4 => {
                 let seeds = super::table::tables();
-                let mut image = seeds[usize::from(script.byte().unwrap_or(0)) % seeds.len()].clone();
+                let which = usize::from(script.byte().unwrap_or(0)) % seeds.len();
+                let mut image = seeds[which].clone();
                 if let (Some(at), Some(value)) = (script.byte(), script.byte()) {
                     // Half the time as it is.
                     if at & 1 == 0 {
@@ -134,10 +186,10 @@ pub fn run(bytes: &[u8]) {
                 };
                 drop(talk.ask(Command::RunCircle(run)));
             }
-            12 => {
+            13 => {
                 let mut coordinate = || (i32::from(script.byte().unwrap_or(9)) - 128) * 3_000_000;
                 let place = [coordinate(), coordinate(), 0];
-                let segment = match step / 14 {
+                let segment = match step / 16 {
                     0..6 => ExactSegment::Line { to_nm: place, feed_m_s: 0.5 },
                     6..8 => ExactSegment::Dwell { time_s: 0.01 },
                     // From where it stands, if nothing is in the queue.
@@ -145,36 +197,67 @@ pub fn run(bytes: &[u8]) {
                         let centre_m = place.map(|nm| f64::from(nm) * 1e-9);
                         let (normal, sweep_rad) = ([0.0, 0.0, 1.0], f64::from(step) / 40.0);
                         let arc = Segment::Arc { centre_m, normal, sweep_rad, rise_m: 0.01, feed_m_s: 0.3 };
-                        arc.exact(talk.status().raw_nm).unwrap_or(ExactSegment::Dwell { time_s: f32::NAN })
+                        let here_nm = talk.status().map_or([0; 3], |status| status.raw_nm);
+                        arc.exact(here_nm).unwrap_or(ExactSegment::Dwell { time_s: f32::NAN })
                     }
                 };
                 drop(talk.ask(Command::Append { segment, tolerance_nm: u32::from(step) << 12 }));
             }
-            13 => drop(talk.ask(if step > 100 { Command::Begin } else { Command::End })),
+            14 => drop(talk.ask(if step > 100 { Command::Begin } else { Command::End })),
+            15 => talk.stream(step / 16, usize::from(script.byte().unwrap_or(8)) % (2 * POINTS)),
             10 if step > 200 => talk.bench.set_stop_input(step > 230),
             10 => drop(talk.ask(Command::Stop)),
-            _ => {
-                talk = Talk { bench: talk.bench.reset(), seq: 0 };
-            }
+            11 => drop(talk.ask(Command::Hello)),
+            _ => talk = talk.reset(),
         }
-        // A hello opens the session again if a stranger has it, or a reset was asked for.
         talk.seq = talk.seq.wrapping_add(1);
-        talk.ask(Command::Hello);
-        if !matches!(talk.ask(Command::Status), Some(Reply::Status(_))) {
-            talk = Talk { bench: talk.bench.reset(), seq: 0 };
+        let mut status = talk.status();
+        // A stranger may have the session: a hello opens it again, or else a reset does.
+        if status.is_none() {
             talk.ask(Command::Hello);
+            status = talk.status();
         }
-        let status = talk.status();
-        talk.bench.check(&status);
+        if status.is_none() {
+            talk = talk.reset();
+            status = talk.status();
+        }
+        talk.bench.check(&status.expect("a controller that was reset says how it is"));
     }
+    talk
 }
 
 /// A flash and a run; a run, a stop and a reset; a program.
 pub fn seeds() -> Vec<Vec<u8>> {
     vec![
-        vec![4, 0, 1, 1, 5, 6, 9, 128, 100, 60, 0, 3, 255, 3, 255, 10, 3, 255, 11],
+        vec![4, 0, 1, 1, 5, 6, 9, 128, 100, 60, 0, 3, 255, 3, 255, 10, 3, 255, 12],
         vec![9, 128, 30, 20, 7, 3, 200, 10, 3, 100, 8, 3, 1, 255, 3, 9],
-        vec![111, 12, 200, 90, 12, 100, 100, 3, 255, 250, 12, 1, 3, 255, 13, 3, 255, 3, 255],
-        vec![4, 1, 1, 1, 5, 11, 4, 0, 1, 1, 5, 6, 4, 1, 1, 1, 5, 6, 7, 7, 11],
+        vec![110, 13, 200, 90, 13, 100, 100, 3, 255, 253, 13, 1, 3, 255, 14, 3, 255, 3, 255],
+        vec![
+            15, 20, 31, 25, 47, 25, 3, 100, 79, 30, 79, 30, 14, 3, 255, 3, 255, 15, 9, 31, 40, 3, 255, 3, 255,
+        ],
+        vec![4, 1, 1, 1, 5, 12, 4, 0, 1, 1, 5, 6, 4, 1, 1, 1, 5, 6, 7, 7, 12],
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fuzz::TARGETS;
+    use crate::noise::Noise;
+
+    /// A rest that passes at once is one whose ticks are all made: every byte that the controller says is the same.
+    #[test]
+    fn rests_that_are_skipped_change_nothing() {
+        let server = TARGETS.iter().find(|target| target.name == "server").unwrap();
+        let noise = Noise::new(server);
+        for seed in 0..3000 {
+            let bytes = noise.bytes(seed);
+            let transcript = |thorough| {
+                let mut talk = Talk::new(thorough);
+                talk.transcript = Some(Vec::new());
+                hold(talk, &bytes).transcript
+            };
+            assert!(transcript(true) == transcript(false), "seed {seed}: {bytes:02x?}");
+        }
+    }
 }

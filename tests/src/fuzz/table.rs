@@ -4,6 +4,7 @@ use giotto_shared::model::Cumulants;
 use giotto_shared::table::{self, Limits, MAX_IMAGE_BYTES, Table, Travel, Zone};
 use giotto_shared::term::Term;
 use giotto_shared::wire::Crc32;
+use std::sync::OnceLock;
 
 /// Makes length and CRC of a header right, so that what is behind it is reached.
 pub fn mend(image: &mut [u8]) {
@@ -38,7 +39,12 @@ pub fn run(bytes: &[u8]) {
 }
 
 /// Whole tables: the paper's robot; one zone with every kind of term.
-pub fn tables() -> [Vec<u8>; 2] {
+pub fn tables() -> &'static [Vec<u8>; 2] {
+    static TABLES: OnceLock<[Vec<u8>; 2]> = OnceLock::new();
+    TABLES.get_or_init(encoded)
+}
+
+fn encoded() -> [Vec<u8>; 2] {
     let mut zone = Zone {
         place_m: None,
         radius_m: [0.05, 0.3],

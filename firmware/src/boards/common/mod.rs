@@ -34,14 +34,16 @@ use giotto_firmware::control::{self, Desk, Job, Shared, Tick};
 use giotto_firmware::engine::{Config, Executor, Planner};
 use giotto_firmware::server::{Board, Buffers, Server, TimedSetPoint};
 use giotto_firmware::store::Layout;
+use giotto_shared::wire::{IN_FLIGHT, MAX_FRAME};
 use heapless_spsc::spsc::{Consumer, Producer, Queue};
 
 /// Ticks a second; the `fast` images show how many there can be.
 pub const TICK_HZ: u32 = if cfg!(feature = "fast") { 8000 } else { 1000 };
 /// Priority of the link's receive interrupt; the tick has 0.
 pub const LINK_PRIORITY: u8 = 0x40;
-/// Bytes that arrive while the background is busy with the flash: three requests and their repetition.
+/// Bytes that arrive while the background is busy: what a host may have on its way, one place always stays free.
 pub const RECEIVED: usize = 1024;
+const _: () = assert!(RECEIVED > IN_FLIGHT + MAX_FRAME, "no room for what a host may have on its way");
 
 /// Places in a queue; one always stays free.
 const SEGMENTS: usize = control::SEGMENTS + 1;

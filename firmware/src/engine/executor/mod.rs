@@ -209,6 +209,11 @@ impl Executor {
         !self.engage.is_on()
     }
 
+    /// Whether the correction is on its way, to be engaged or disengaged.
+    pub const fn blending(&self) -> bool {
+        self.engage.blending()
+    }
+
     /// The board saw that a tick came late or was lost: stops, and runs nothing more until [`Self::clear_fault`].
     pub fn overrun(&mut self) {
         self.counters.overruns = self.counters.overruns.wrapping_add(1);

@@ -64,6 +64,10 @@ impl Motion for Bench {
         }
     }
 
+    fn now(&self) -> u32 {
+        self.tick
+    }
+
     fn install(&mut self, image: Option<&[u8]>) -> Result<(), Refusal> {
         if self.state == MotionState::Running {
             return Err(Refusal::Motion(MotionRefusal::Busy));

@@ -158,6 +158,32 @@ fn a_repeated_request_happens_once() {
     assert_eq!(desk.correcting().as_deref(), Some("a"));
 }
 
+/// Of several requests on their way one is lost: those after it are refused, come again under new numbers, and nothing
+/// that is late counts.
+#[test]
+fn a_gap_in_a_series_is_closed_under_new_numbers() {
+    let mut desk = fresh();
+    let image = image("a");
+    let piece = |seq, from: usize, to: usize| {
+        let data = Chunk::from_slice(&image[from..to]).unwrap();
+        frame(1, seq, Command::WriteChunk { offset: from as u16, data })
+    };
+    let (first, second, third) = (20, 40, image.len());
+    assert!(desk.done(Command::WriteBegin { length: third as u16, crc: wire::crc32(&image) }));
+    assert_eq!(desk.send(&piece(11, 0, first)), Some(Reply::Done));
+    // 12 is lost.
+    assert_eq!(refused(desk.send(&piece(13, second, third))), Refusal::OutOfOrder { expected: first as u16 });
+    assert_eq!(desk.send(&piece(12, first, second)), None);
+    assert_eq!(desk.send(&piece(14, first, second)), Some(Reply::Done));
+    assert_eq!(desk.send(&piece(15, second, third)), Some(Reply::Done));
+    // Its answer is lost: what is expected next tells.
+    assert_eq!(refused(desk.send(&piece(16, second, third))), Refusal::OutOfOrder { expected: third as u16 });
+    assert_eq!(desk.send(&piece(11, 0, first)), None);
+    desk.seq = 16;
+    assert!(desk.done(Command::WriteEnd) && desk.done(Command::Commit) && desk.done(Command::Confirm));
+    assert_eq!(desk.reboot().correcting().as_deref(), Some("a"));
+}
+
 #[test]
 fn strangers_and_newer_hosts_are_told() {
     let mut desk = fresh();
