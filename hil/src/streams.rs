@@ -44,6 +44,7 @@ fn places(curve: Curve, rate: f64, tick_s: f64) -> Vec<[i32; 3]> {
 /// Streams a curve from rest at its start, again if the host was too busy to keep up with an emulator.
 fn streamed(controller: &mut Controller, places_nm: &[[i32; 3]]) -> Result<Streamed, Trouble> {
     let start_nm = places_nm.first().copied().unwrap_or_default();
+    controller.supervise(None)?;
     for last in (0..TRIES).map(|attempt| attempt + 1 == TRIES) {
         controller.move_to(start_nm, 0.3)?;
         match controller.run_stream(places_nm, 0.5, 1) {
