@@ -29,25 +29,25 @@ pub(super) struct OfRadius<'a> {
 }
 
 /// Radii ascending.
-pub(super) fn by_radius(observations: &[Observation]) -> Vec<OfRadius<'_>> {
+pub(super) fn by_radius<'a>(observations: &'a [Observation]) -> Vec<OfRadius<'a>> {
     let mut radii: Vec<f64> = Vec::new();
-    for o in observations {
-        if !radii[radii.len().saturating_sub(SEEN)..].contains(&o.radius_m) {
-            radii.push(o.radius_m);
+    // Runs of one radius mostly follow each other.
+    let stretch = |runs: &'a [Observation]| Some((runs.first()?.radius_m, runs));
+    let stretches: Vec<(f64, &[Observation])> =
+        observations.chunk_by(|a, b| a.radius_m == b.radius_m).filter_map(stretch).collect();
+    for (radius_m, _) in &stretches {
+        if !radii[radii.len().saturating_sub(SEEN)..].contains(radius_m) {
+            radii.push(*radius_m);
         }
     }
     radii.sort_by(f64::total_cmp);
     radii.dedup_by(|a, b| same_radius(*a, *b));
     let room = observations.len() / radii.len().max(1) + 1;
     let of = |&radius_m: &f64| OfRadius { radius_m, runs: Vec::with_capacity(room) };
-    let mut groups: Vec<OfRadius<'_>> = radii.iter().map(of).collect();
-    let (mut at, mut own) = (0, f64::INFINITY..f64::INFINITY);
-    for o in observations {
-        if !own.contains(&o.radius_m) {
-            at = radii.partition_point(|r| *r <= o.radius_m).saturating_sub(1);
-            own = radii[at]..radii.get(at + 1).copied().unwrap_or(f64::INFINITY);
-        }
-        groups[at].runs.push(o);
+    let mut groups: Vec<OfRadius<'a>> = radii.iter().map(of).collect();
+    for (radius_m, stretch) in stretches {
+        let at = radii.partition_point(|r| *r <= radius_m).saturating_sub(1);
+        groups[at].runs.extend(stretch);
     }
     groups
 }
@@ -83,18 +83,25 @@ pub(super) struct Reduction {
 impl Reduction {
     /// `lowest_m` is taken off each radius error.
     pub(super) fn new(group: &OfRadius<'_>, lowest_m: Option<f64>) -> Self {
-        let columns =
-            |o: &Observation| [1.0, o.f2_r(), o.f4_r3(), o.radius_error_m - lowest_m.unwrap_or(0.0)];
+        let off_m = lowest_m.unwrap_or(0.0);
         let reduce = |scales: [f64; WIDTH]| {
             let by = scales.map(f64::recip);
             let mut reduced = Reduced::new(WIDTH);
+            // Nothing stands before the first column: no reflection changes it.
+            reduced.block(0).fill(by[0]);
             for runs in group.runs.chunks(BLOCK_ROWS) {
-                let blocks = reduced.blocks::<WIDTH>();
-                for (i, o) in runs.iter().enumerate() {
-                    let row = columns(o);
-                    for j in 0..WIDTH {
-                        blocks[j][i] = row[j] * by[j];
-                    }
+                let [_, x1, x2, y] = reduced.blocks();
+                for (((o, x1), x2), y) in runs.iter().zip(&mut *x1).zip(&mut *x2).zip(y) {
+                    *x1 = o.feed_m_s * o.feed_m_s;
+                    *x2 = o.radius_m;
+                    *y = (o.radius_error_m - off_m) * by[3];
+                }
+                // f²/R and f⁴/R³ of several runs at a time.
+                for (x1, x2) in x1.iter_mut().zip(x2).take(runs.len()) {
+                    let per_m = 1.0 / *x2;
+                    let f2_r = *x1 * per_m;
+                    *x1 = f2_r * by[1];
+                    *x2 = f2_r * f2_r * per_m * by[2];
                 }
                 reduced.take(runs.len());
             }
@@ -114,7 +121,7 @@ impl Reduction {
         let largest = group
             .runs
             .iter()
-            .map(|o| columns(o))
+            .map(|o| [1.0, o.f2_r(), o.f4_r3(), o.radius_error_m - off_m])
             .fold([0.0_f64; WIDTH], |top, row| std::array::from_fn(|j| top[j].max(row[j].abs())));
         let scales = largest.map(|top| if top > 0.0 { top } else { 1.0 });
         Self { r: reduce(scales), scales, ..plain }
@@ -167,4 +174,64 @@ pub(super) fn joined(radii: &[&Reduction]) -> Triangle {
     let scales = [x1, x2].into_iter().chain(std::iter::repeat_n(1.0, constants)).chain([y]);
     let runs = radii.iter().map(|radius| radius.runs).sum();
     Triangle::of_reduced(names.map(str::to_owned).collect(), r, scales.collect(), runs)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(radius_m: f64, feed_m_s: f64, radius_error_m: f64) -> Observation {
+        Observation { radius_m, feed_m_s, radius_error_m, out_of_roundness_m: None }
+    }
+
+    /// In turns, more than a block of each radius; errors times `size`.
+    fn runs(size: f64) -> Vec<Observation> {
+        let error = |k: usize| size * (1e-6 * (k as f64 * 0.618).sin() + 1e-5 * (k % 3) as f64);
+        (0..3 * BLOCK_ROWS + 100)
+            .map(|k| run([0.3, 0.1, 0.15][k % 3], 0.02 + 0.68 * (k as f64 * 0.377).fract(), error(k)))
+            .collect()
+    }
+
+    #[test]
+    fn the_joined_triangle_solves_as_that_of_the_whole_matrix() {
+        // Squares of the last two vanish and overflow.
+        for size in [1.0, 1e-190, 1e190] {
+            let runs = runs(size);
+            let groups = by_radius(&runs);
+            let reductions: Vec<Reduction> = groups.iter().map(|group| Reduction::new(group, None)).collect();
+            let column = |of: &dyn Fn(&Observation) -> f64| runs.iter().map(of).collect::<Vec<f64>>();
+            let mut columns = vec![column(&Observation::f2_r), column(&Observation::f4_r3)];
+            for group in &groups {
+                columns.push(column(&|o| f64::from(u8::from(o.radius_m == group.radius_m))));
+            }
+            let named: Vec<(&str, &[f64])> = columns.iter().map(|c| ("x", c.as_slice())).collect();
+            let whole = Triangle::new(&named, &column(&|o| o.radius_error_m), false).unwrap();
+            let joined = joined(&reductions.iter().collect::<Vec<_>>());
+            for chosen in [&[2, 3, 4][..], &[2, 3, 4, 1], &[2, 3, 4, 0, 1]] {
+                let (got, want) = (joined.solve(chosen).unwrap(), whole.solve(chosen).unwrap());
+                assert_eq!(got.dof, want.dof);
+                for j in 0..chosen.len() {
+                    let off = got.coefficients[j] / want.coefficients[j] - 1.0;
+                    assert!(off.abs() < 1e-11, "{size} {j}: {off}");
+                    let off = got.unscaled_covariance[(j, j)] / want.unscaled_covariance[(j, j)] - 1.0;
+                    assert!(off.abs() < 1e-11, "{size} {j}: {off}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn radii_that_differ_by_rounding_are_one_whatever_their_order() {
+        let apart = 0.8e-9;
+        // The third is too far from the first, however near to the second.
+        let radii = [0.1, 0.1 + apart, 0.1 + 2.0 * apart, 0.3];
+        for order in [[0, 1, 2, 3], [3, 2, 1, 0], [1, 3, 0, 2]] {
+            let runs: Vec<Observation> = order.iter().map(|&k| run(radii[k], 0.1, k as f64)).collect();
+            let groups = by_radius(&runs);
+            assert_eq!(groups.iter().map(|g| g.radius_m).collect::<Vec<_>>(), [radii[0], radii[2], radii[3]]);
+            assert_eq!(groups.iter().map(|g| g.runs.len()).collect::<Vec<_>>(), [2, 1, 1]);
+        }
+        assert!(by_radius(&[]).is_empty());
+        assert_eq!(by_radius(&[run(f64::NAN, 0.1, 0.0), run(0.1, 0.1, 0.0)])[0].runs.len(), 2);
+    }
 }

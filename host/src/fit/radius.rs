@@ -8,6 +8,9 @@ use giotto_shared::model::{Classes, Cumulants, RadiusModel};
 /// Significance of the intervals (95 %).
 const ALPHA: f64 = 0.05;
 
+/// Runs whose squares are summed before they are added to the others: additions of one sum wait for each other.
+const SIDE_BY_SIDE: usize = 16;
+
 /// One run: a circle and its size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
@@ -306,11 +309,13 @@ impl RadiusFit {
                 None => Beside::not_fitted(group, &core.model, options.offset),
             };
             offsets_m.push((group.radius_m, beside.offset_m));
-            points.extend(group.runs.iter().map(|o| {
-                let point = beside.point(o);
-                squares += if point.part == Part::Train { point.residual_m().powi(2) } else { 0.0 };
-                point
-            }));
+            for runs in group.runs.chunks(SIDE_BY_SIDE) {
+                let first = points.len();
+                points.extend(runs.iter().map(|o| beside.point(o)));
+                if own.is_some() {
+                    squares += points[first..].iter().map(|p| p.residual_m().powi(2)).sum::<f64>();
+                }
+            }
             let predicted = match own {
                 None => Some(beside.score(group)),
                 Some(own) if options.train_radius_m.is_none() && groups.len() > 1 => {
