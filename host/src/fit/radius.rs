@@ -252,9 +252,12 @@ impl<'a> Beside<'a> {
     }
 }
 
+/// What a column holds of a run.
+type Column = fn(&Observation) -> f64;
+
 /// The first number in the columns that is none.
 fn not_finite<'a>(observations: impl Iterator<Item = &'a Observation> + Clone) -> Option<FitError> {
-    let columns: [(&str, fn(&Observation) -> f64); 3] = [
+    let columns: [(&str, Column); 3] = [
         (TERMS[0], Observation::f2_r),
         (TERMS[1], Observation::f4_r3),
         ("the observations", |o| o.radius_error_m),
@@ -290,10 +293,10 @@ impl RadiusFit {
                 None => FitError::TooFew { observations: 0, parameters: 3 },
             });
         }
-        if train.iter().any(|radius| !radius.is_finite()) {
-            if let Some(error) = not_finite(observations.iter().filter(|o| fitted(o))) {
-                return Err(error);
-            }
+        if train.iter().any(|radius| !radius.is_finite())
+            && let Some(error) = not_finite(observations.iter().filter(|o| fitted(o)))
+        {
+            return Err(error);
         }
         let core = core_of(&train, &options)?;
         let runs: usize = train.iter().map(|radius| radius.runs).sum();
