@@ -8,6 +8,7 @@
 //! | `decimal` | plain decimals, fast |
 //! | `run_file` | a run's file, own or foreign: its columns in SI |
 //! | `clock`, `thinned` | time stamps and other rows, seen once and forgotten |
+//! | `lanes` | sums and bounds of long columns, fast |
 //! | `samples` | columns → one turn of polar samples |
 //! | `check` | whether numbers can be what the campaign says they are |
 //! | `read`, `write` | whole campaigns; run by run where memory counts |
@@ -19,6 +20,7 @@ mod clock;
 mod decimal;
 mod error;
 pub mod import;
+mod lanes;
 mod manifest;
 mod read;
 mod run_file;
