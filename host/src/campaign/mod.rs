@@ -6,6 +6,7 @@
 //! | `blocks` | large files in blocks of whole lines, on all cores |
 //! | `table` | the numbers of a contract's CSV, fast |
 //! | `decimal` | plain decimals, fast |
+//! | `shape` | decimals that look like the one above, faster |
 //! | `run_file` | a run's file, own or foreign: its columns in SI |
 //! | `clock`, `thinned` | time stamps and other rows, seen once and forgotten |
 //! | `lanes` | sums and bounds of long columns, fast |
@@ -25,6 +26,7 @@ mod manifest;
 mod read;
 mod run_file;
 mod samples;
+mod shape;
 mod table;
 #[cfg(test)]
 mod tests;
