@@ -58,6 +58,7 @@ def circle_circle_fit(data):
 
 
 def stepwise_statsmodels(data):
+    """Selection by partial F, intervals of both terms and of κ4/κ2² = 6β2/β1² − 3, and each run beside the model."""
     feed, radius, y = array(data["feed"]), array(data["radius"]), array(data["error"])
     start = time.perf_counter()
     columns = {"f2_r": feed**2 / radius, "f4_r3": feed**4 / radius**3}
@@ -82,6 +83,16 @@ def stepwise_statsmodels(data):
     for name in columns:
         at = 1 + inside.index(name)
         value += [fit.params[at], interval[at][0], interval[at][1]]
+    places = [1 + inside.index(name) for name in columns]
+    b1, b2 = fit.params[places]
+    slope = np.array([-12 * b2 / b1**3, 6 / b1**2])
+    t = (interval[places[0]][1] - b1) / fit.bse[places[0]]
+    half = t * np.sqrt(slope @ fit.cov_params()[np.ix_(places, places)] @ slope)
+    ratio = 6 * b2 / b1**2 - 3
+    offset = fit.params[0]
+    predicted, residual = fit.fittedvalues - offset, fit.resid
+    rms = np.sqrt(residual @ residual / len(y))
+    value += [ratio - half, ratio + half, offset, np.sqrt(fit.scale), rms, predicted[-1], residual[-1]]
     return time.perf_counter() - start, [float(v) for v in value]
 
 

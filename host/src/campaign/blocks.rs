@@ -1,5 +1,6 @@
-//! Large text files in blocks of whole lines: the next window is read while this one is parsed on all cores, and results
-//! come in the order of the file. Memory is a window and its results, whatever the size of the file.
+//! Text files in blocks of whole lines, results in the order of the file. Of a large file the next window is read while this
+//! one is parsed on all cores; small ones go block by block, for whoever reads many has all cores at work already. Memory is a
+//! window and its results, whatever the size of the file.
 use super::CampaignError;
 use rayon::prelude::*;
 use std::fs::File;
@@ -7,9 +8,12 @@ use std::io::{Read, Seek, SeekFrom};
 use std::ops::ControlFlow;
 
 /// Bytes parsed by one task. Blocks begin at the same bytes whatever the number of threads, and so do sums over them.
-pub(super) const BLOCK: usize = 1 << 19;
-/// Blocks of a window.
-const BLOCKS: usize = 8;
+/// A block and its numbers stay in the cache of a core until they are taken.
+pub(super) const BLOCK: usize = 1 << 17;
+/// Blocks of a window of a large file.
+const BLOCKS: usize = 16;
+/// Bytes of a large file.
+const LARGE: u64 = 4 << 20;
 /// A line longer than this is no row of numbers.
 const LONGEST_LINE: usize = BLOCK * BLOCKS;
 
@@ -67,7 +71,7 @@ impl Text {
     /// Rows to expect by the length of the lines read so far, with some to spare.
     pub(super) fn rows(&self) -> usize {
         let sample = self.head();
-        let lines = sample.iter().filter(|&&b| b == b'\n').count().max(1) as u64;
+        let lines = memchr::memchr_iter(b'\n', sample).count().max(1) as u64;
         let rows = self.size * lines / (sample.len().max(1) as u64) + self.size / 64 + 16;
         usize::try_from(rows.min(self.size / 2 + 1)).unwrap_or(0)
     }
@@ -80,6 +84,8 @@ impl Text {
         mut take: impl FnMut(T) -> Result<ControlFlow<()>, CampaignError>,
     ) -> Result<(), Fault> {
         let mut body = self.skip;
+        let large = self.size - self.at.min(self.size) > LARGE;
+        let window = if large { BLOCK * BLOCKS } else { BLOCK };
         let mut next = Vec::new();
         let mut last = self.fill()?;
         loop {
@@ -102,7 +108,7 @@ impl Text {
                 })
                 .collect();
             let work = || -> Vec<T> {
-                if blocks.len() > 1 {
+                if large {
                     blocks.par_iter().map(|(at, block)| parse(*at, block)).collect()
                 } else {
                     blocks.iter().map(|(at, block)| parse(*at, block)).collect()
@@ -112,11 +118,11 @@ impl Text {
                 (work(), Ok(0))
             } else {
                 next.clear();
+                next.reserve_exact(buffer.len() - whole + window);
                 next.extend_from_slice(&buffer[whole..]);
                 let file = &mut self.file;
-                let (results, more) =
-                    rayon::join(work, || file.take((BLOCK * BLOCKS) as u64).read_to_end(&mut next));
-                (results, more)
+                let mut read = || file.take(window as u64).read_to_end(&mut next);
+                if large { rayon::join(work, read) } else { (work(), read()) }
             };
             for result in results {
                 if take(result).map_err(Fault::Taken)?.is_break() {

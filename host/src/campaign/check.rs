@@ -3,6 +3,7 @@
 use super::Note;
 use super::clock::Clock;
 use super::error::{CampaignError, Problem};
+use super::lanes::{bounds, sum};
 use super::manifest::Entry;
 use giotto_shared::Direction;
 use std::f64::consts::TAU;
@@ -53,15 +54,16 @@ pub(super) fn gaps(
     Ok(())
 }
 
-/// Deviations must be those of a circle of the programmed radius.
+/// Deviations must be those of a circle of the programmed radius. Gives their noise, m.
 pub(super) fn deviation(
     entry: &Entry,
     deviation: &[f64],
     field: usize,
     column: &str,
-) -> Result<(), CampaignError> {
+) -> Result<f64, CampaignError> {
     let radius = entry.radius_m;
-    let mean = deviation.iter().sum::<f64>() / deviation.len() as f64;
+    let mean = sum(deviation) / deviation.len() as f64;
+    let [lowest, highest] = bounds(deviation);
     let far = |v: &f64| (v - mean).abs() > LARGEST_FORM * radius;
     let refuse = |row: usize, hint: String, expected: String| {
         let value = if column == "radius_mm" {
@@ -82,43 +84,47 @@ pub(super) fn deviation(
         };
         return refuse(0, hint, format!("a mean within ±{} mm", tidy(LARGEST_SIZE_ERROR * radius * 1e3)));
     }
-    if let Some(row) = deviation.iter().position(far) {
+    if let (true, Some(row)) = (far(&lowest) || far(&highest), deviation.iter().position(far)) {
         let few = deviation.iter().filter(|v| far(v)).count() * 20 < deviation.len();
         let hint = if few { "an outlier" } else { "the unit may be wrong" };
         let expected = format!("within {} mm of the mean", tidy(LARGEST_FORM * radius * 1e3));
         return refuse(row, hint.to_owned(), expected);
     }
-    if sample_noise(deviation) > LARGEST_NOISE * radius {
-        let noise_mm = (sample_noise(deviation) * 1e5).round() / 1e2;
+    let noise_m = sample_noise(deviation);
+    if noise_m > LARGEST_NOISE * radius {
+        let noise_mm = (noise_m * 1e5).round() / 1e2;
         let hint = format!("neighbours scatter by {noise_mm} mm, the unit may be wrong");
         return refuse(0, hint, format!("noise below {} mm", tidy(LARGEST_NOISE * radius * 1e3)));
     }
     let spike = SPIKE_M.max(0.01 * radius);
     let lone = |w: &[f64]| (w[1] - w[0]).abs().min((w[1] - w[2]).abs()) > spike;
-    if let Some(k) = deviation.windows(3).position(lone).filter(|_| deviation.len() >= 90) {
+    if deviation.len() >= 90
+        && highest - lowest > spike
+        && let Some(k) = deviation.windows(3).position(lone)
+    {
         let expected = format!("within {} mm of its neighbours", tidy(spike * 1e3));
         return refuse(k + 1, "a single reading far from its neighbours".to_owned(), expected);
     }
+    if highest.max(-lowest) >= INSTRUMENT_LIMIT_M && lowest != highest {
+        at_limit(entry, deviation, field, [lowest, highest])?;
+    }
+    Ok(noise_m)
+}
+
+/// Readings that stay where none lies further out stand at the end of the instrument's range.
+fn at_limit(entry: &Entry, deviation: &[f64], field: usize, ends: [f64; 2]) -> Result<(), CampaignError> {
     let mut run = 1;
     for k in 1..deviation.len() {
-        run = if deviation[k] == deviation[k - 1] && deviation[k].abs() >= INSTRUMENT_LIMIT_M {
-            run + 1
-        } else {
-            1
-        };
-        let same_everywhere = || deviation.iter().all(|&v| v == deviation[k]);
-        if run >= ROWS_AT_LIMIT && !same_everywhere() && is_extreme(deviation, deviation[k]) {
-            let rows = run + deviation[k + 1..].iter().take_while(|&&v| v == deviation[k]).count();
-            let value_um = tidy(deviation[k] * 1e6);
+        let value = deviation[k];
+        let stays = value == deviation[k - 1] && value.abs() >= INSTRUMENT_LIMIT_M;
+        run = if stays { run + 1 } else { 1 };
+        if run >= ROWS_AT_LIMIT && value == ends[usize::from(value > 0.0)] {
+            let rows = run + deviation[k + 1..].iter().take_while(|&&v| v == value).count();
+            let value_um = tidy(value * 1e6);
             return Err(err(entry, k + 1 - run, field, Problem::OutOfInstrumentRange { value_um, rows }));
         }
     }
     Ok(())
-}
-
-/// Whether no reading lies further out on the same side.
-fn is_extreme(deviation: &[f64], value: f64) -> bool {
-    deviation.iter().all(|&v| v * value.signum() <= value.abs())
 }
 
 /// Rounds away what the conversion of units left behind.
@@ -250,23 +256,29 @@ pub fn sample_noise(values: &[f64]) -> f64 {
         return 0.0;
     }
     let stride = (values.len() - 2).div_ceil(1 << 15);
-    let mut squares: Vec<f64> = (1..values.len() - 1)
-        .step_by(stride)
-        .map(|k| (values[k + 1] - 2.0 * values[k] + values[k - 1]).powi(2))
-        .collect();
+    // The order of squares is that of their bits.
+    let mut squares: Vec<u64> =
+        values.windows(3).step_by(stride).map(|w| (w[2] - 2.0 * w[1] + w[0]).powi(2).to_bits()).collect();
     let kept = (squares.len() as f64 * SHARE).round() as usize;
-    squares.select_nth_unstable_by(kept - 1, f64::total_cmp);
+    squares.select_nth_unstable(kept - 1);
+    let smaller: Vec<f64> = squares[..kept].iter().map(|bits| f64::from_bits(*bits)).collect();
     // The second difference of white noise has variance 6σ².
-    (squares[..kept].iter().sum::<f64>() / kept as f64 / TRIMMED_VARIANCE / 6.0).sqrt()
+    (sum(&smaller) / kept as f64 / TRIMMED_VARIANCE / 6.0).sqrt()
 }
 
 /// Identity of a measurement by its noise: two runs of a machine never share it.
-pub(super) fn fingerprint(deviation: &[f64]) -> Option<u64> {
-    if sample_noise(deviation) < SMALLEST_NOISE_M {
+pub(super) fn fingerprint(deviation: &[f64], noise_m: f64) -> Option<u64> {
+    if noise_m < SMALLEST_NOISE_M {
         return None;
     }
-    let mix = |h: u64, v: &f64| (h ^ v.to_bits()).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29);
-    Some(deviation.iter().fold(deviation.len() as u64, mix))
+    let mix = |h: u64, v: u64| (h ^ v).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29);
+    // Four side by side, for one waits for itself.
+    let (chunks, rest) = deviation.as_chunks::<4>();
+    let mut prints = [deviation.len() as u64; 4];
+    for chunk in chunks {
+        prints = std::array::from_fn(|k| mix(prints[k], chunk[k].to_bits()));
+    }
+    Some(rest.iter().map(|v| v.to_bits()).chain(prints).fold(0, mix))
 }
 
 /// Unwrapped angles must make one turn (or the declared arc) in the direction of travel.

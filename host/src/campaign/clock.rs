@@ -1,5 +1,6 @@
 //! Time stamps, seen once and forgotten: order, duration, spacing, the largest hole.
 use super::error::{CampaignError, Problem};
+use super::lanes::{bounds, sum};
 use super::manifest::Entry;
 use super::thinned::Thinned;
 
@@ -29,27 +30,34 @@ pub(super) struct Stamps {
 impl Stamps {
     /// The next stamps; they are returned as time since the first one.
     pub(super) fn take(&mut self, time: &mut [f64]) {
-        for t in time {
-            if self.rows == 0 {
-                self.first_s = *t;
-            }
-            *t -= self.first_s;
-            if self.rows > 0 {
-                let hole = *t - self.last_s;
-                if hole < 0.0 && self.backwards.is_none() {
-                    self.backwards = Some((self.rows, self.last_s, *t));
-                }
-                self.spacings.push(hole);
-                if self.largest.is_none_or(|(_, largest)| hole > largest) {
-                    self.largest = Some((self.rows, hole));
-                }
-                self.distinct += usize::from(hole != 0.0);
-            } else {
-                self.distinct = 1;
-            }
-            self.last_s = *t;
-            self.rows += 1;
+        let Some((&first, &last)) = time.first().zip(time.last()) else { return };
+        // The first stamp of all has no hole before it.
+        let before = (self.rows > 0).then_some(self.last_s);
+        if before.is_none() {
+            (self.first_s, self.distinct) = (first, 1);
         }
+        let first_s = self.first_s;
+        time.iter_mut().for_each(|t| *t -= first_s);
+        let mut holes = Vec::with_capacity(time.len());
+        holes.extend(before.map(|before| time[0] - before));
+        holes.extend(time.windows(2).map(|w| w[1] - w[0]));
+        let skipped = time.len() - holes.len();
+        let [lowest, highest] = bounds(&holes);
+        if let (true, None) = (lowest < 0.0, self.backwards)
+            && let Some(k) = holes.iter().position(|hole| *hole < 0.0).map(|k| k + skipped)
+        {
+            let from_s = k.checked_sub(1).map_or(self.last_s, |k| time[k]);
+            self.backwards = Some((self.rows + k, from_s, time[k]));
+        }
+        if self.largest.is_none_or(|(_, largest)| highest > largest)
+            && let Some(k) = holes.iter().position(|hole| *hole == highest)
+        {
+            self.largest = Some((self.rows + k + skipped, highest));
+        }
+        self.distinct += holes.iter().filter(|hole| **hole != 0.0).count();
+        self.spacings.extend(holes.len(), |k| holes[k]);
+        self.last_s = last - first_s;
+        self.rows += time.len();
     }
 
     /// Stamps in whole seconds under many samples tell neither order nor feed.
@@ -68,12 +76,15 @@ impl Stamps {
             return refuse(self.rows.saturating_sub(1), Problem::TimeConstant { at_s: self.first_s });
         }
         // Stamps are rounded to the ticks of the instrument: spacings scatter by up to a tick, a lost sample adds a spacing.
-        let mut spacings = self.spacings.into_values();
-        spacings.sort_unstable_by(f64::total_cmp);
-        let at = |share: f64| spacings[((spacings.len() - 1) as f64 * share).round() as usize];
-        let central = &spacings[spacings.len() / 20..spacings.len() - spacings.len() / 20];
-        let spacing_s = central.iter().sum::<f64>() / central.len() as f64;
-        let limit = spacing_s + f64::max(1.05 * (at(0.95) - at(0.05)), 0.5 * spacing_s);
+        // None is negative, so their order is that of their bits.
+        let mut spacings: Vec<u64> = self.spacings.into_values().into_iter().map(f64::to_bits).collect();
+        let rank = |share: f64| (spacings.len().saturating_sub(1) as f64 * share).round() as usize;
+        let (low, high) = (rank(0.05), rank(0.95));
+        let longest_s = f64::from_bits(*spacings.select_nth_unstable(high).1);
+        let shortest_s = f64::from_bits(*spacings[..=high].select_nth_unstable(low).1);
+        let central: Vec<f64> = spacings[low..=high].iter().map(|bits| f64::from_bits(*bits)).collect();
+        let spacing_s = sum(&central) / central.len() as f64;
+        let limit = spacing_s + f64::max(1.05 * (longest_s - shortest_s), 0.5 * spacing_s);
         let gap = self.largest.filter(|(_, hole)| *hole > limit).map(|(row, hole)| (row, hole - spacing_s));
         let (last, n) = (self.last_s, self.rows as f64);
         let turn_s = if gap.is_some() { last + spacing_s } else { last * n / (n - 1.0) };

@@ -6,8 +6,10 @@
 //! | `blocks` | large files in blocks of whole lines, on all cores |
 //! | `table` | the numbers of a contract's CSV, fast |
 //! | `decimal` | plain decimals, fast |
+//! | `shape` | decimals that look like the one above, faster |
 //! | `run_file` | a run's file, own or foreign: its columns in SI |
 //! | `clock`, `thinned` | time stamps and other rows, seen once and forgotten |
+//! | `lanes` | sums and bounds of long columns, fast |
 //! | `samples` | columns → one turn of polar samples |
 //! | `check` | whether numbers can be what the campaign says they are |
 //! | `read`, `write` | whole campaigns; run by run where memory counts |
@@ -19,10 +21,12 @@ mod clock;
 mod decimal;
 mod error;
 pub mod import;
+mod lanes;
 mod manifest;
 mod read;
 mod run_file;
 mod samples;
+mod shape;
 mod table;
 #[cfg(test)]
 mod tests;

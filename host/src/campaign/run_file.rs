@@ -71,16 +71,7 @@ impl<'a> RunFile<'a> {
         let factors: Vec<f64> = self.fields().iter().map(|f| f.factor).collect();
         match self {
             Self::Foreign(path, slice) => slice.walk_all(&path, prepare, take),
-            Self::Own(table) => {
-                let si = |mut batch: Batch| {
-                    for (column, factor) in batch.columns.iter_mut().zip(&factors).filter(|(_, f)| **f != 1.0)
-                    {
-                        column.iter_mut().for_each(|v| *v *= factor);
-                    }
-                    prepare(batch)
-                };
-                table.walk(si, take)
-            }
+            Self::Own(table) => table.walk(&factors, prepare, take),
         }
     }
 }

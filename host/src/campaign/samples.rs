@@ -183,16 +183,18 @@ pub(super) fn load(entry: &Entry, keep_time: bool) -> Result<Loaded, CampaignErr
     };
     let mut frame = None;
     let mut covered = TAU;
-    if let Some((x, _)) = xy {
+    let noise_m = if let Some((x, _)) = xy {
         let plane = plane.map(|(view, _)| view.with_heights(rows.heights));
         frame = Some(polar(entry, x, &mut run.samples, plane, &no_circle)?);
-        check::deviation(entry, &run.samples.deviation_m, x, "the distance from the circle")?;
+        check::deviation(entry, &run.samples.deviation_m, x, "the distance from the circle")?
     } else if let Some(field) = radial_field {
         if let (Some((clock, ..)), true) = (&clock, polar_by_time) {
             check::slowness(entry, clock.turn_s)?; // a wrong radius explains more than a wrong deviation
         }
-        check::deviation(entry, &run.samples.deviation_m, field, fields[field].name)?;
-    }
+        check::deviation(entry, &run.samples.deviation_m, field, fields[field].name)?
+    } else {
+        unreachable!("the header was checked: positions or one length")
+    };
     let mut laps = None;
     let mut kept = None;
     if polar_by_time {
@@ -202,14 +204,17 @@ pub(super) fn load(entry: &Entry, keep_time: bool) -> Result<Loaded, CampaignErr
         };
         laps = check::duration(entry, clock.turn_s, &run.samples.deviation_m, &mut notes)?;
         check::gaps(entry, &clock, count, field, &mut notes)?;
+        let angle = inferred_angle(entry, &clock, count);
         if keep_time {
-            kept = Some(time.clone());
+            run.samples.angle_rad = time.iter().enumerate().map(|(k, t)| angle(k, *t)).collect();
+            kept = Some(time);
+        } else {
+            time.iter_mut().enumerate().for_each(|(k, t)| *t = angle(k, *t));
+            run.samples.angle_rad = time;
         }
-        infer_angles(&mut time, entry, &clock);
-        run.samples.angle_rad = time;
         run.samples.angle_inferred = true;
         let turn_s = Some(clock.turn_s);
-        return finish(run, frame, turn_s, kept, notes, laps);
+        return Ok(finish(run, frame, turn_s, kept, notes, laps, noise_m));
     }
     let field = index(&|q| matches!(q, Quantity::Angle | Quantity::Position(0))).unwrap_or(0);
     if !unwrapped(&run.samples.angle_rad) {
@@ -224,7 +229,7 @@ pub(super) fn load(entry: &Entry, keep_time: bool) -> Result<Loaded, CampaignErr
         turn_s = Some(turn);
         kept = keep_time.then_some(time);
     }
-    finish(run, frame, turn_s, kept, notes, laps)
+    Ok(finish(run, frame, turn_s, kept, notes, laps, noise_m))
 }
 
 fn too_few(entry: &Entry, found: usize) -> CampaignError {
@@ -256,24 +261,20 @@ fn finish(
     time: Option<Vec<f64>>,
     notes: Vec<Note>,
     laps: Option<u32>,
-) -> Result<Loaded, CampaignError> {
-    let fingerprint = check::fingerprint(&run.samples.deviation_m);
+    noise_m: f64,
+) -> Loaded {
+    let fingerprint = check::fingerprint(&run.samples.deviation_m, noise_m);
     run.samples.time_s = time;
     let rows = run.samples.deviation_m.len();
-    Ok(Loaded { rows, clocked: turn_s.is_some(), run, frame, turn_s, notes, laps, fingerprint })
+    Loaded { rows, clocked: turn_s.is_some(), run, frame, turn_s, notes, laps, fingerprint }
 }
 
-/// Time stamps into angles, in place: one turn of evenly spaced samples, whatever the rounding of the
-/// stamps; by the stamps themselves where samples were lost.
-fn infer_angles(time: &mut [f64], entry: &Entry, clock: &Clock) {
+/// The angle of sample `k` at time `t`: one turn of evenly spaced samples, whatever the rounding of the stamps; by the
+/// stamps themselves where samples were lost.
+fn inferred_angle(entry: &Entry, clock: &Clock, rows: usize) -> impl Fn(usize, f64) -> f64 {
     let (start, d) = (entry.start_angle_rad.unwrap_or(0.0), f64::from(entry.direction.sign()));
-    let n = time.len() as f64;
-    if clock.gap.is_none() {
-        time.iter_mut().enumerate().for_each(|(k, t)| *t = start + d * TAU * k as f64 / n);
-    } else {
-        let rate = d * TAU / clock.turn_s;
-        time.iter_mut().for_each(|t| *t = start + rate * *t);
-    }
+    let (n, rate, whole) = (rows as f64, d * TAU / clock.turn_s, clock.gap.is_none());
+    move |k, t| if whole { start + d * TAU * k as f64 / n } else { start + rate * t }
 }
 
 /// Points (x as angle, y as deviation) into polar samples about their least-squares circle, in place.

@@ -2,6 +2,7 @@
 use super::blocks::{BLOCK, Fault, Text};
 use super::decimal;
 use super::error::{CampaignError, Place, Problem};
+use super::shape::Shape;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -60,7 +61,7 @@ impl Column {
     }
 }
 
-/// Rows as written in the file, column by column.
+/// Rows in SI, column by column.
 #[derive(Debug)]
 pub(crate) struct Batch {
     /// One vector a field.
@@ -104,16 +105,18 @@ impl Table {
         self.text.rows()
     }
 
-    /// Walks all rows: `prepare` works on batches on all cores, `take` gets what it made in the order of the file.
+    /// Walks all rows, each column times its factor: `prepare` works on batches on all cores, `take` gets what it made in the
+    /// order of the file.
     pub(crate) fn walk<T: Send>(
         self,
+        factors: &[f64],
         prepare: impl Fn(Batch) -> T + Sync,
         mut take: impl FnMut(T) -> Result<(), CampaignError>,
     ) -> Result<(), CampaignError> {
-        let (path, header, width) = (&self.path, &self.header, self.header.len());
+        let (path, header) = (&self.path, &self.header);
         let mut blank_at: Option<u64> = None;
         let parse = |at: u64, block: &[u8]| {
-            let parsed = parse_block(block, width).map_err(|line| at + line as u64)?;
+            let parsed = parse_block(block, factors).map_err(|line| at + line as u64)?;
             let blank = parsed.blank_at.map(|blank| at + blank as u64);
             let rows = parsed.rows;
             let prepared = (rows > 0).then(|| prepare(Batch { columns: parsed.columns, rows }));
@@ -212,43 +215,58 @@ struct Parsed {
     blank_at: Option<usize>,
 }
 
-/// Parses whole lines of exactly `width` numbers; the error is the offset of the line that does not fit.
-fn parse_block(bytes: &[u8], width: usize) -> Result<Parsed, usize> {
+/// Parses whole lines of as many numbers as there are factors to SI; the error is the offset of the line that does not fit.
+fn parse_block(bytes: &[u8], factors: &[f64]) -> Result<Parsed, usize> {
+    let width = factors.len();
     let guess = bytes.len() / (6 * width) + 1;
-    let mut columns: Vec<Vec<f64>> = (0..width).map(|_| Vec::with_capacity(guess)).collect();
-    let (mut at, mut rows, mut blank_at) = (0, 0, None);
+    let mut columns: Vec<Vec<f64>> = factors.iter().map(|_| Vec::with_capacity(guess)).collect();
+    let mut above: Vec<Option<Shape>> = vec![None; width];
+    let (mut at, mut rows) = (0, 0);
     while at < bytes.len() {
         let line = at;
-        if matches!(bytes[at], b'\n' | b'\r' | b' ' | b'\t') {
-            let end = bytes[at..].iter().position(|&b| b == b'\n').map_or(bytes.len(), |p| at + p + 1);
-            if bytes[at..end].iter().all(u8::is_ascii_whitespace) {
-                blank_at = blank_at.or(Some(at));
-                at = end;
-                continue;
-            }
-        }
-        if let Some(blank) = blank_at {
-            return Err(blank); // blank lines may end a file, not divide it
-        }
-        for (field, column) in columns.iter_mut().enumerate() {
-            at = skip_blanks(bytes, at);
-            let (value, used) = decimal::parse(&bytes[at..], b'.').ok_or(line)?;
-            if !value.is_finite() {
-                return Err(line);
-            }
-            column.push(value);
-            at = skip_blanks(bytes, at + used);
-            match bytes.get(at) {
-                Some(b',') if field + 1 < width => at += 1,
-                Some(b'\n') if field + 1 == width => at += 1,
-                Some(b'\r') if field + 1 == width && bytes.get(at + 1).is_none_or(|&b| b == b'\n') => at += 2,
-                None if field + 1 == width => {}
-                _ => return Err(line),
-            }
+        for (field, ((column, above), factor)) in columns.iter_mut().zip(&mut above).zip(factors).enumerate()
+        {
+            let like_above = above.as_ref().and_then(|shape| shape.read(bytes, at));
+            let (value, next) = match like_above {
+                Some(found) => found,
+                None if field == 0 && is_blank(bytes, at) => {
+                    // Blank lines may end a file, not divide it.
+                    let rest = bytes[at..].iter().all(u8::is_ascii_whitespace);
+                    return if rest { Ok(Parsed { columns, rows, blank_at: Some(at) }) } else { Err(at) };
+                }
+                None => {
+                    let found = parse_field(bytes, at, field + 1 == width).ok_or(line)?;
+                    *above = Shape::of(&bytes[at..found.1]);
+                    found
+                }
+            };
+            column.push(value * factor);
+            at = next;
         }
         rows += 1;
     }
-    Ok(Parsed { columns, rows, blank_at })
+    Ok(Parsed { columns, rows, blank_at: None })
+}
+
+/// Whether the line at `at` is empty.
+fn is_blank(bytes: &[u8], at: usize) -> bool {
+    matches!(bytes[at], b'\n' | b'\r' | b' ' | b'\t')
+        && bytes[at..].iter().take_while(|b| **b != b'\n').all(u8::is_ascii_whitespace)
+}
+
+/// A finite number with blanks around it, and the byte behind the end of its field.
+fn parse_field(bytes: &[u8], at: usize, last: bool) -> Option<(f64, usize)> {
+    let at = skip_blanks(bytes, at);
+    let (value, used) = decimal::parse(&bytes[at..], b'.').filter(|(value, _)| value.is_finite())?;
+    let end = skip_blanks(bytes, at + used);
+    let next = match bytes.get(end) {
+        Some(b',') if !last => end + 1,
+        Some(b'\n') if last => end + 1,
+        Some(b'\r') if last && bytes.get(end + 1).is_none_or(|&b| b == b'\n') => bytes.len().min(end + 2),
+        None if last => end,
+        _ => return None,
+    };
+    Some((value, next))
 }
 
 fn skip_blanks(bytes: &[u8], mut at: usize) -> usize {

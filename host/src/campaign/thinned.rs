@@ -20,7 +20,14 @@ impl<T> Default for Thinned<T> {
 impl<T: Copy> Thinned<T> {
     /// The next value.
     pub(super) fn push(&mut self, value: T) {
-        if self.pushed.is_multiple_of(self.stride) {
+        self.extend(1, |_| value);
+    }
+
+    /// The next `count` values, of which only those are asked for that are kept.
+    pub(super) fn extend(&mut self, count: usize, value: impl Fn(usize) -> T) {
+        let end = self.pushed + count;
+        let mut next = self.pushed.next_multiple_of(self.stride);
+        while next < end {
             if self.values.len() == MOST {
                 let mut k = 0;
                 self.values.retain(|_| {
@@ -28,13 +35,14 @@ impl<T: Copy> Thinned<T> {
                     k % 2 == 1
                 });
                 self.stride *= 2;
+                // The stride may just have grown past this one.
+                next = next.next_multiple_of(self.stride);
+                continue;
             }
-            // The stride may just have grown past this one.
-            if self.pushed.is_multiple_of(self.stride) {
-                self.values.push(value);
-            }
+            self.values.push(value(next - self.pushed));
+            next += self.stride;
         }
-        self.pushed += 1;
+        self.pushed = end;
     }
 
     /// The last value kept at or before `index`, with its place.
@@ -61,8 +69,10 @@ mod tests {
     #[test]
     fn keeps_every_nth_and_knows_which() {
         for n in [1, 5, MOST, MOST + 1, 3 * MOST + 7, 40 * MOST] {
-            let mut thinned = Thinned::default();
+            let (mut thinned, mut blocks) = (Thinned::default(), Thinned::default());
             (0..n).for_each(|k| thinned.push(k));
+            (0..n).step_by(1000).for_each(|from| blocks.extend(1000.min(n - from), |k| from + k));
+            assert!(thinned.iter().eq(blocks.iter()));
             assert!(thinned.iter().all(|(place, value)| place == value));
             let kept = thinned.iter().count();
             assert!(kept <= MOST && (n < MOST || kept > MOST / 2), "{kept} of {n}");

@@ -17,19 +17,47 @@ pub struct Heldout {
 impl Heldout {
     /// From (measured without offset, predicted) pairs, m; `None` if there are none.
     pub fn of(pairs: impl Iterator<Item = (f64, f64)>) -> Option<Self> {
-        let (mut runs, mut squares, mut total, mut max_m) = (0, 0.0, 0.0, 0.0_f64);
-        for (measured, predicted) in pairs {
-            let residual = measured - predicted;
-            runs += 1;
-            squares += residual * residual;
-            total += measured * measured;
-            max_m = max_m.max(residual.abs());
-        }
-        (runs > 0).then(|| Self {
-            runs,
-            rms_m: (squares / runs as f64).sqrt(),
-            max_m,
-            explained_percent: 100.0 * (1.0 - squares / total),
+        pairs.collect::<Sums>().heldout()
+    }
+}
+
+/// What [`Heldout`] is made of, so that parts can be put together.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Sums {
+    runs: usize,
+    squares: f64,
+    total: f64,
+    max_m: f64,
+}
+
+impl FromIterator<(f64, f64)> for Sums {
+    fn from_iter<I: IntoIterator<Item = (f64, f64)>>(pairs: I) -> Self {
+        pairs.into_iter().fold(Self::default(), |sums, (measured, predicted)| {
+            let residual: f64 = measured - predicted;
+            Self {
+                runs: sums.runs + 1,
+                squares: sums.squares + residual * residual,
+                total: sums.total + measured * measured,
+                max_m: sums.max_m.max(residual.abs()),
+            }
+        })
+    }
+}
+
+impl Sums {
+    pub(super) fn merge(&mut self, other: &Self) {
+        self.runs += other.runs;
+        self.squares += other.squares;
+        self.total += other.total;
+        self.max_m = self.max_m.max(other.max_m);
+    }
+
+    pub(super) fn heldout(&self) -> Option<Heldout> {
+        (self.runs > 0).then(|| Heldout {
+            runs: self.runs,
+            rms_m: (self.squares / self.runs as f64).sqrt(),
+            max_m: self.max_m,
+            explained_percent: 100.0 * (1.0 - self.squares / self.total),
         })
     }
 }

@@ -104,8 +104,19 @@ impl Triangle {
             }
             reduced.take(rows);
         }
-        let mut r = reduced.triangle(n.min(width));
-        let mut scales = largest;
+        let names = columns.iter().map(|c| c.0.to_owned()).collect();
+        let triangle = Self::of_reduced(names, reduced.triangle(n.min(width)), largest, n);
+        Ok(Self { means: intercept.then_some(means), ..triangle })
+    }
+
+    /// From columns already reduced: `r` has the scalar products of the columns, each divided by its scale, the observations
+    /// last.
+    pub(super) fn of_reduced(
+        names: Vec<String>,
+        mut r: DMatrix<f64>,
+        mut scales: Vec<f64>,
+        observations: usize,
+    ) -> Self {
         for (mut column, scale) in r.column_iter_mut().zip(&mut scales) {
             let norm = column.norm();
             if norm > 0.0 {
@@ -115,15 +126,9 @@ impl Triangle {
                 *scale = 1.0;
             }
         }
-        let total = if r.column(width - 1).amax() > 0.0 { scales[width - 1].powi(2) } else { 0.0 };
-        Ok(Self {
-            names: columns.iter().map(|c| c.0.to_owned()).collect(),
-            r,
-            scales,
-            means: intercept.then_some(means),
-            observations: n,
-            total,
-        })
+        let last = names.len();
+        let total = if r.column(last).amax() > 0.0 { scales[last].powi(2) } else { 0.0 };
+        Self { names, r, scales, means: None, observations, total }
     }
 
     /// Number of observations.

@@ -3,6 +3,7 @@
 //! | file | holds |
 //! |---|---|
 //! | `least_squares` | [`Triangle`], [`LeastSquares`]: Householder QR on centred, scaled columns (Eq. 2–3) |
+//! | `by_radius` | runs by radius, each radius reduced once: fits on any of them are made of that |
 //! | `reduced` | tall matrices to a triangle, block by block, without allocation |
 //! | `stepwise` | [`stepwise`](stepwise()): enter and remove by partial F (Eq. 4–11, 17–19) |
 //! | `quantile` | critical values of F and t |
@@ -13,6 +14,7 @@
 //!
 //! The run is the unit of replication here: each run gives one radius error, and the spread between runs is what
 //! the intervals are made of.
+mod by_radius;
 mod circle;
 mod figures;
 mod heldout;

@@ -33,19 +33,27 @@ pub fn critical_t(alpha: f64, dof: usize) -> Result<f64, FitError> {
     Ok(refined(&t, 0.5 * alpha, dof as f64).unwrap_or_else(|| t.inverse_cdf(1.0 - 0.5 * alpha)))
 }
 
-/// t with a tail of `tail` above it: the normal quantile stretched by the expansion in 1/dof (Abramowitz and Stegun 26.7.5), then
-/// Newton on the tail; nothing where that does not settle (few degrees of freedom, extreme tails). A tenth of the time that
-/// the inverse of the beta function takes.
+/// t with a tail of `tail` above it: the normal quantile stretched by the expansion in 1/dof (Abramowitz and Stegun 26.7.5),
+/// then Halley's steps on the tail; nothing where they do not settle (few degrees of freedom, extreme tails). One step does
+/// from twenty degrees of freedom on, for a hundredth of the time that the inverse of the beta function takes.
 fn refined(t: &StudentsT, tail: f64, dof: f64) -> Option<f64> {
     let z = Normal::standard().inverse_cdf(1.0 - tail);
     let square = z * z;
-    let mut x = z
-        + z * (square + 1.0) / (4.0 * dof)
-        + z * ((5.0 * square + 16.0) * square + 3.0) / (96.0 * dof * dof);
+    let terms = [
+        (square + 1.0) / 4.0,
+        ((5.0 * square + 16.0) * square + 3.0) / 96.0,
+        (((3.0 * square + 19.0) * square + 17.0) * square - 15.0) / 384.0,
+        ((((79.0 * square + 776.0) * square + 1482.0) * square - 1920.0) * square - 945.0) / 92_160.0,
+    ];
+    let mut x = z + z * terms.iter().rev().fold(0.0, |sum, term| (sum + term) / dof);
     for _ in 0..6 {
-        let step = (t.sf(x) - tail) / t.pdf(x);
+        let newton = (t.sf(x) - tail) / t.pdf(x);
+        // −p'/p of the density p.
+        let bend = x * (dof + 1.0) / (dof + x * x);
+        let step = newton / (1.0 - 0.5 * newton * bend);
         x += step;
-        if step.abs() <= 1e-9 * x.abs() {
+        // A step leaves an error of its third power.
+        if step.abs() <= 1e-5 * x.abs() {
             return x.is_finite().then_some(x);
         }
     }

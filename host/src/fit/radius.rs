@@ -1,15 +1,15 @@
 //! The paper's model of the radius error: ΔR = β0(R) + β1 f²/R + β2 f⁴/R³ (Eq. 15–16).
-use super::heldout::Heldout;
+use super::by_radius::{OfRadius, Reduction, by_radius, joined, mean, same_radius};
+use super::heldout::{Heldout, Sums};
 use super::stepwise::{Action, PartialF, Step, StepwiseOptions, stepwise};
-use super::{FitError, LeastSquares, Triangle, critical_t};
+use super::{FitError, LeastSquares, critical_t};
 use giotto_shared::model::{Classes, Cumulants, RadiusModel};
 
-/// Programmed radii closer than this are one radius, m.
-const SAME_RADIUS_M: f64 = 1e-9;
-/// Feeds closer than this share are one feed.
-const SAME_FEED: f64 = 1e-9;
 /// Significance of the intervals (95 %).
 const ALPHA: f64 = 0.05;
+
+/// Runs whose squares are summed before they are added to the others: additions of one sum wait for each other.
+const SIDE_BY_SIDE: usize = 16;
 
 /// One run: a circle and its size.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -143,57 +143,22 @@ struct Core {
     model: RadiusModel<f64>,
     ci95: [[f64; 2]; 2],
     steps: Vec<Step>,
-    offsets_m: Vec<(f64, f64)>,
+    /// Radius by radius, m.
+    offsets_m: Vec<f64>,
     deviation_m: f64,
     ratio95: [f64; 2],
 }
 
-fn same_radius(a: f64, b: f64) -> bool {
-    (a - b).abs() <= SAME_RADIUS_M
-}
-
-fn radii(observations: &[Observation]) -> Vec<f64> {
-    let mut radii: Vec<f64> = observations.iter().map(|o| o.radius_m).collect();
-    radii.sort_by(f64::total_cmp);
-    radii.dedup_by(|a, b| same_radius(*a, *b));
-    radii
-}
-
-/// Runs at the lowest feed among those of `radius_m`.
-fn reference_runs(observations: &[Observation], radius_m: f64) -> impl Iterator<Item = &Observation> + Clone {
-    let of_radius = observations.iter().filter(move |o| same_radius(o.radius_m, radius_m));
-    let lowest = of_radius.clone().map(|o| o.feed_m_s).fold(f64::INFINITY, f64::min);
-    of_radius.filter(move |o| o.feed_m_s <= lowest * (1.0 + SAME_FEED))
-}
-
-fn mean(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, n) = values.fold((0.0, 0.0), |(sum, n), v| (sum + v, n + 1.0));
-    sum / n
-}
-
-fn core(observations: &[Observation], options: &Options) -> Result<Core, FitError> {
-    let radii = radii(observations);
-    let x1: Vec<f64> = observations.iter().map(Observation::f2_r).collect();
-    let x2: Vec<f64> = observations.iter().map(Observation::f4_r3).collect();
-    let lowest: Vec<f64> =
-        radii.iter().map(|&r| mean(reference_runs(observations, r).map(|o| o.radius_error_m))).collect();
-    let index = |o: &Observation| radii.iter().position(|&r| same_radius(r, o.radius_m)).unwrap_or(0);
-    let (y, indicators): (Vec<f64>, Vec<Vec<f64>>) = match options.offset {
-        Offset::LowestSpeed => {
-            (observations.iter().map(|o| o.radius_error_m - lowest[index(o)]).collect(), Vec::new())
-        }
-        Offset::Joint => {
-            let one_of = |k| observations.iter().map(|o| f64::from(u8::from(index(o) == k))).collect();
-            (observations.iter().map(|o| o.radius_error_m).collect(), (0..radii.len()).map(one_of).collect())
-        }
+fn core_of(radii: &[&Reduction], options: &Options) -> Result<Core, FitError> {
+    let triangle = joined(radii);
+    let observations = triangle.observations();
+    let forced: Vec<usize> = match options.offset {
+        Offset::Joint => (2..2 + radii.len()).collect(),
+        Offset::LowestSpeed => Vec::new(),
     };
-    let mut columns: Vec<(&str, &[f64])> = vec![(TERMS[0], &x1), (TERMS[1], &x2)];
-    columns.extend(indicators.iter().map(|v| ("the offset of a radius", v.as_slice())));
-    let triangle = Triangle::new(&columns, &y, false)?;
-    let forced: Vec<usize> = (2..columns.len()).collect();
     let parameters = forced.len() + 2;
-    if observations.len() <= parameters {
-        return Err(FitError::TooFew { observations: observations.len(), parameters });
+    if observations <= parameters {
+        return Err(FitError::TooFew { observations, parameters });
     }
     let rules = StepwiseOptions { enter: options.alpha, remove: options.alpha, partial_f: options.partial_f };
     let selection = stepwise(&triangle, &forced, &[0, 1], rules)?;
@@ -212,14 +177,9 @@ fn core(observations: &[Observation], options: &Options) -> Result<Core, FitErro
             ci95[term] = interval(&full, forced.len() + term, full_t);
         }
     }
-    let offsets_m = radii
-        .iter()
-        .enumerate()
-        .map(|(k, &r)| match options.offset {
-            Offset::LowestSpeed => (r, lowest[k]),
-            Offset::Joint => (r, selection.fit.coefficients[k]),
-        })
-        .collect();
+    let joint = |k: usize| selection.fit.coefficients[k];
+    let offsets_m =
+        radii.iter().enumerate().map(|(k, radius)| radius.lowest_m.unwrap_or_else(|| joint(k))).collect();
     Ok(Core {
         model: RadiusModel { beta1_s2: beta[0], beta2_s4: beta[1] },
         ci95,
@@ -251,31 +211,61 @@ fn ratio_interval(fit: &LeastSquares, first: usize, t: f64) -> [f64; 2] {
     [ratio - half, ratio + half]
 }
 
-/// Runs of one radius that had no part in `model`, beside it. Their offset is no matter of the servo and cannot be predicted:
-/// it is the one constant that comes from these runs themselves, by the same method as in the fit.
-fn predict(all: &[Observation], radius_m: f64, model: &RadiusModel<f64>, offset: Offset) -> Vec<Point> {
-    let servo = |o: &Observation| model.radius_error_m(o.radius_m, o.feed_m_s);
-    let of_radius = all.iter().filter(|o| same_radius(o.radius_m, radius_m));
-    let (offset_m, reference_m_s) = match offset {
-        Offset::Joint => (mean(of_radius.clone().map(|o| o.radius_error_m - servo(o))), 0.0),
-        Offset::LowestSpeed => {
-            let references = reference_runs(all, radius_m);
-            let fastest = references.clone().map(|o| o.feed_m_s).fold(0.0, f64::max);
-            (mean(references.map(|o| o.radius_error_m)), fastest)
-        }
-    };
-    of_radius
-        .map(|o| Point {
-            observation: *o,
-            part: if o.feed_m_s <= reference_m_s { Part::Reference } else { Part::Heldout },
-            offset_m,
-            predicted_m: servo(o),
-        })
-        .collect()
+/// Runs beside a model.
+struct Beside<'a> {
+    model: &'a RadiusModel<f64>,
+    offset_m: f64,
+    part: Part,
+    /// Runs up to this feed gave the offset of a radius that was not fitted, m/s.
+    reference_m_s: f64,
 }
 
-fn score(points: &[Point]) -> Option<Heldout> {
-    Heldout::of(points.iter().filter(|p| p.part == Part::Heldout).map(|p| (p.measured_m(), p.predicted_m)))
+impl<'a> Beside<'a> {
+    /// Runs that were fitted.
+    fn fitted(model: &'a RadiusModel<f64>, offset_m: f64) -> Self {
+        Self { model, offset_m, part: Part::Train, reference_m_s: f64::NEG_INFINITY }
+    }
+
+    /// Runs of one radius that had no part in `model`. Their offset is no matter of the servo and cannot be predicted:
+    /// it is the one constant that comes from these runs themselves, by the same method as in the fit.
+    fn not_fitted(group: &OfRadius<'_>, model: &'a RadiusModel<f64>, offset: Offset) -> Self {
+        let servo = |o: &Observation| model.radius_error_m(o.radius_m, o.feed_m_s);
+        let (offset_m, reference_m_s) = match offset {
+            Offset::Joint => (mean(group.runs.iter().map(|o| o.radius_error_m - servo(o))), 0.0),
+            Offset::LowestSpeed => (group.lowest_m(), group.reference_m_s()),
+        };
+        Self { model, offset_m, part: Part::Heldout, reference_m_s }
+    }
+
+    fn point(&self, o: &Observation) -> Point {
+        Point {
+            observation: *o,
+            part: if o.feed_m_s <= self.reference_m_s { Part::Reference } else { self.part },
+            offset_m: self.offset_m,
+            predicted_m: self.model.radius_error_m(o.radius_m, o.feed_m_s),
+        }
+    }
+
+    fn score(&self, group: &OfRadius<'_>) -> Sums {
+        let points = group.runs.iter().map(|o| self.point(o)).filter(|p| p.part == Part::Heldout);
+        points.map(|p| (p.measured_m(), p.predicted_m)).collect()
+    }
+}
+
+/// What a column holds of a run.
+type Column = fn(&Observation) -> f64;
+
+/// The first number in the columns that is none.
+fn not_finite<'a>(observations: impl Iterator<Item = &'a Observation> + Clone) -> Option<FitError> {
+    let columns: [(&str, Column); 3] = [
+        (TERMS[0], Observation::f2_r),
+        (TERMS[1], Observation::f4_r3),
+        ("the observations", |o| o.radius_error_m),
+    ];
+    columns.into_iter().find_map(|(name, of)| {
+        let index = observations.clone().position(|o| !of(o).is_finite())?;
+        Some(FitError::NonFinite { column: name.to_owned(), index })
+    })
 }
 
 impl RadiusFit {
@@ -284,61 +274,80 @@ impl RadiusFit {
     /// # Errors
     /// [`FitError`]: too few runs, values that are not finite, a training radius that is not there.
     pub fn new(observations: &[Observation], options: Options) -> Result<Self, FitError> {
-        let all_radii = radii(observations);
-        let trained = |r: f64| options.train_radius_m.is_none_or(|train| same_radius(train, r));
-        let train: Vec<Observation> = observations.iter().copied().filter(|o| trained(o.radius_m)).collect();
+        let groups = by_radius(observations);
+        let fitted =
+            |o: &Observation| options.train_radius_m.is_none_or(|train| same_radius(train, o.radius_m));
+        let reduction = |group: &OfRadius<'_>| {
+            let lowest_m = || group.lowest_m();
+            let fitted = options.train_radius_m.is_none() || group.runs.iter().any(|o| fitted(o));
+            fitted.then(|| Reduction::new(group, (options.offset == Offset::LowestSpeed).then(lowest_m)))
+        };
+        let reductions: Vec<Option<Reduction>> = groups.iter().map(reduction).collect();
+        let train: Vec<&Reduction> = reductions.iter().flatten().collect();
         if train.is_empty() {
             return Err(match options.train_radius_m {
                 Some(wanted) => FitError::NoSuchRadius {
                     wanted_mm: wanted * 1e3,
-                    present_mm: all_radii.iter().map(|r| (r * 1e9).round() / 1e6).collect(),
+                    present_mm: groups.iter().map(|g| (g.radius_m * 1e9).round() / 1e6).collect(),
                 },
                 None => FitError::TooFew { observations: 0, parameters: 3 },
             });
         }
-        let core = core(&train, &options)?;
-        let mut offsets_m = core.offsets_m.clone();
+        if train.iter().any(|radius| !radius.is_finite())
+            && let Some(error) = not_finite(observations.iter().filter(|o| fitted(o)))
+        {
+            return Err(error);
+        }
+        let core = core_of(&train, &options)?;
+        let runs: usize = train.iter().map(|radius| radius.runs).sum();
+        let mut offsets_m = Vec::with_capacity(groups.len());
         let mut points = Vec::with_capacity(observations.len());
-        let mut folds = Vec::new();
-        for &radius_m in &all_radii {
-            if let Some(&(_, offset_m)) = core.offsets_m.iter().find(|(r, _)| same_radius(*r, radius_m)) {
-                points.extend(observations.iter().filter(|o| same_radius(o.radius_m, radius_m)).map(|o| {
-                    Point {
-                        observation: *o,
-                        part: Part::Train,
-                        offset_m,
-                        predicted_m: core.model.radius_error_m(o.radius_m, o.feed_m_s),
-                    }
-                }));
-                if options.train_radius_m.is_none() && all_radii.len() > 1 {
+        let mut squares = 0.0;
+        let mut heldout = Sums::default();
+        let mut heldout_by_radius = Vec::new();
+        let mut fitted_offsets_m = core.offsets_m.iter();
+        for (group, own) in groups.iter().zip(&reductions) {
+            let beside = match own.as_ref().and(fitted_offsets_m.next()) {
+                Some(&offset_m) => Beside::fitted(&core.model, offset_m),
+                None => Beside::not_fitted(group, &core.model, options.offset),
+            };
+            offsets_m.push((group.radius_m, beside.offset_m));
+            for runs in group.runs.chunks(SIDE_BY_SIDE) {
+                let first = points.len();
+                points.extend(runs.iter().map(|o| beside.point(o)));
+                if own.is_some() {
+                    squares += points[first..].iter().map(|p| p.residual_m().powi(2)).sum::<f64>();
+                }
+            }
+            let predicted = match own {
+                None => Some(beside.score(group)),
+                Some(own) if options.train_radius_m.is_none() && groups.len() > 1 => {
+                    let others: Vec<&Reduction> =
+                        train.iter().copied().filter(|radius| !std::ptr::eq(*radius, own)).collect();
                     // What the other radii alone cannot determine is not predicted.
-                    match leave_out(observations, radius_m, &options) {
-                        Ok(predicted) => folds.push((radius_m, predicted)),
-                        Err(FitError::TooFew { .. } | FitError::Collinear { .. }) => {}
+                    match core_of(&others, &options) {
+                        Ok(fold) => Some(Beside::not_fitted(group, &fold.model, options.offset).score(group)),
+                        Err(FitError::TooFew { .. } | FitError::Collinear { .. }) => None,
                         Err(error) => return Err(error),
                     }
                 }
-            } else {
-                let predicted = predict(observations, radius_m, &core.model, options.offset);
-                offsets_m.extend(predicted.first().map(|p| (radius_m, p.offset_m)));
-                points.extend_from_slice(&predicted);
-                folds.push((radius_m, predicted));
+                Some(_) => None,
+            };
+            if let Some(sums) = predicted {
+                heldout.merge(&sums);
+                heldout_by_radius.extend(sums.heldout().map(|of_radius| (group.radius_m, of_radius)));
             }
         }
-        offsets_m.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let squares: f64 =
-            points.iter().filter(|p| p.part == Part::Train).map(|p| p.residual_m().powi(2)).sum();
-        let scored: Vec<Point> = folds.iter().flat_map(|(_, points)| points.iter().copied()).collect();
         Ok(Self {
             options,
             model: core.model,
             ci95: core.ci95,
             steps: core.steps,
             offsets_m,
-            train: (train.len(), (squares / train.len() as f64).sqrt()),
+            train: (runs, (squares / runs as f64).sqrt()),
             deviation_m: core.deviation_m,
-            heldout: score(&scored),
-            heldout_by_radius: folds.iter().filter_map(|(r, points)| Some((*r, score(points)?))).collect(),
+            heldout: heldout.heldout(),
+            heldout_by_radius,
             points,
             ratio95: core.ratio95,
             classes: Classes::of_interval(core.ratio95[0], core.ratio95[1]),
@@ -354,12 +363,4 @@ impl RadiusFit {
     pub fn entered(&self, term: usize) -> bool {
         self.steps.iter().rev().find(|s| s.column == term).is_some_and(|s| s.action == Action::Enter)
     }
-}
-
-/// All other runs fitted, selection included, and this radius predicted.
-fn leave_out(observations: &[Observation], radius_m: f64, options: &Options) -> Result<Vec<Point>, FitError> {
-    let others: Vec<Observation> =
-        observations.iter().copied().filter(|o| !same_radius(o.radius_m, radius_m)).collect();
-    let fold = core(&others, options)?;
-    Ok(predict(observations, radius_m, &fold.model, options.offset))
 }

@@ -295,3 +295,49 @@ fn figures_are_drawn_with_every_run_in_them() {
         assert!(figure.svg.contains("R 300 mm, predicted"));
     }
 }
+
+#[test]
+fn a_radius_left_out_is_predicted_by_the_fit_on_the_others() {
+    let runs = campaign(PAPER, |i| 1e-6 * ((i as f64 * 0.754877666).fract() - 0.5));
+    for offset in [Offset::Joint, Offset::LowestSpeed] {
+        let options = Options { offset, ..Options::default() };
+        let whole = RadiusFit::new(&runs, options).unwrap();
+        for (radius_m, heldout) in &whole.heldout_by_radius {
+            let others: Vec<Observation> = runs.iter().copied().filter(|o| o.radius_m != *radius_m).collect();
+            let model = RadiusFit::new(&others, options).unwrap().model;
+            let own = || runs.iter().filter(|o| o.radius_m == *radius_m);
+            let servo = |o: &Observation| model.radius_error_m(o.radius_m, o.feed_m_s);
+            let (taken, skipped): (Vec<f64>, usize) = match offset {
+                Offset::Joint => (own().map(|o| o.radius_error_m - servo(o)).collect(), 0),
+                Offset::LowestSpeed => (own().take(2).map(|o| o.radius_error_m).collect(), 2),
+            };
+            let offset_m = taken.iter().sum::<f64>() / taken.len() as f64;
+            let pairs = own().skip(skipped).map(|o| (o.radius_error_m - offset_m, servo(o)));
+            let want = Heldout::of(pairs).unwrap();
+            assert_eq!(heldout.runs, want.runs);
+            assert_close(heldout.rms_m, want.rms_m, 1e-11);
+            assert_close(heldout.explained_percent, want.explained_percent, 1e-11);
+        }
+        assert_eq!(whole.heldout_by_radius.len(), 3);
+    }
+}
+
+#[test]
+fn numbers_that_are_none_are_named_with_their_run() {
+    let good = campaign(PAPER, |_| 0.0);
+    let spoilt = |change: fn(&mut Observation)| {
+        let mut runs = good.clone();
+        change(&mut runs[40]);
+        RadiusFit::new(&runs, Options::default()).unwrap_err()
+    };
+    let named = |column: &str| FitError::NonFinite { column: column.to_owned(), index: 40 };
+    assert_eq!(spoilt(|o| o.radius_error_m = f64::NAN), named("the observations"));
+    assert_eq!(spoilt(|o| o.radius_error_m = f64::NEG_INFINITY), named("the observations"));
+    assert_eq!(spoilt(|o| o.feed_m_s = f64::INFINITY), named("f2_r"));
+    assert_eq!(spoilt(|o| o.radius_m = f64::NAN), named("f2_r"));
+    assert_eq!(spoilt(|o| o.feed_m_s = 1e90), named("f4_r3"));
+    // Those of a radius that is not fitted have no part in it.
+    let mut runs = good.clone();
+    runs[40].radius_error_m = f64::NAN;
+    assert!(RadiusFit::new(&runs, Options { train_radius_m: Some(0.1), ..Options::default() }).is_ok());
+}
