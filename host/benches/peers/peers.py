@@ -58,7 +58,7 @@ def circle_circle_fit(data):
 
 
 def stepwise_statsmodels(data):
-    """Selection by partial F, intervals of both terms and of κ4/κ2² = 6β2/β1² − 3, and each run beside the model."""
+    """Selection by partial F, intervals of both terms and of κ4/κ2² = 6β2/β1² − 3, and the scatter."""
     feed, radius, y = array(data["feed"]), array(data["radius"]), array(data["error"])
     start = time.perf_counter()
     columns = {"f2_r": feed**2 / radius, "f4_r3": feed**4 / radius**3}
@@ -90,9 +90,8 @@ def stepwise_statsmodels(data):
     half = t * np.sqrt(slope @ fit.cov_params()[np.ix_(places, places)] @ slope)
     ratio = 6 * b2 / b1**2 - 3
     offset = fit.params[0]
-    predicted, residual = fit.fittedvalues - offset, fit.resid
-    rms = np.sqrt(residual @ residual / len(y))
-    value += [ratio - half, ratio + half, offset, np.sqrt(fit.scale), rms, predicted[-1], residual[-1]]
+    rms = np.sqrt(fit.ssr / len(y))
+    value += [ratio - half, ratio + half, offset, np.sqrt(fit.scale), rms]
     return time.perf_counter() - start, [float(v) for v in value]
 
 

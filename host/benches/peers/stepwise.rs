@@ -51,11 +51,10 @@ pub(crate) fn run(peers: &mut Peers) -> Result<Table, Error> {
             let (seconds, found) = peers.run("statsmodels", &data)?;
             theirs.push(seconds);
             let [b1, b2] = [fit.model.beta1_s2, fit.model.beta2_s4];
-            let last = fit.points.last().ok_or("no run")?;
             let value = [
                 [b1, fit.ci95[0][0], fit.ci95[0][1], b2].as_slice(),
-                &[fit.ci95[1][0], fit.ci95[1][1], fit.ratio95[0], fit.ratio95[1], last.offset_m],
-                &[fit.deviation_m, fit.train.1, last.predicted_m, last.residual_m()],
+                &[fit.ci95[1][0], fit.ci95[1][1], fit.ratio95[0], fit.ratio95[1], fit.offsets_m[0].1],
+                &[fit.deviation_m, fit.train.1],
             ]
             .concat();
             if value.len() != found.len() || value.iter().zip(&found).any(|(a, b)| (a / b - 1.0).abs() > SAME)
@@ -66,7 +65,7 @@ pub(crate) fn run(peers: &mut Peers) -> Result<Table, Error> {
         table.row(n, &[&ours, &theirs], &[theirs.median() / ours.median()]);
     }
     table.remark(
-        "one radius with its offset; β1, β2, κ4/κ2², their 95 % intervals, offset, scatter and each run beside the model agree to 1e-6; bar 50×".to_owned(),
+        "one radius with its offset; β1, β2, κ4/κ2², their 95 % intervals, offset and scatter agree to 1e-6; bar 50×".to_owned(),
     );
     Ok(table)
 }

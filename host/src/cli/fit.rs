@@ -118,17 +118,17 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     };
     let fit = RadiusFit::new(&observations, options)?;
     if let Some(path) = &args.output {
-        model_file(&fit, &report.name, &report.machine)
+        model_file(&fit, &observations, &report.name, &report.machine)
             .save(path)
             .map_err(|e| Failure::input(e).help("choose another path with -o, or make room there"))?;
     }
     if let Some(directory) = &args.figures {
-        draw(&fit, directory)?;
+        draw(&fit, &observations, directory)?;
     }
     if out.json {
         return out.document(&document(&fit));
     }
-    show(&fit, &report.name, out);
+    show(&fit, &observations, &report.name, out);
     if let Some(path) = &args.output {
         out.say(format_args!("\nmodel written to {}", path.display()));
     }
@@ -138,18 +138,18 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     Ok(())
 }
 
-fn draw(fit: &RadiusFit, directory: &Path) -> Result<(), Failure> {
+fn draw(fit: &RadiusFit, runs: &[Observation], directory: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(directory).map_err(|e| cannot_write(directory, &e))?;
-    for figure in fit::figures(&fit.points, &fit.model).map_err(Failure::input)? {
+    for figure in fit::figures(&fit.points(runs), &fit.model).map_err(Failure::input)? {
         let path = directory.join(figure.file);
         std::fs::write(&path, figure.svg).map_err(|e| cannot_write(&path, &e))?;
     }
     Ok(())
 }
 
-fn model_file(fit: &RadiusFit, campaign: &str, machine: &str) -> ModelFile {
+fn model_file(fit: &RadiusFit, runs: &[Observation], campaign: &str, machine: &str) -> ModelFile {
     let range = |of: fn(&Observation) -> f64| {
-        let values = fit.points.iter().map(|p| of(&p.observation) * 1e3);
+        let values = runs.iter().map(|run| of(run) * 1e3);
         let rounded = |v: f64| (v * 1e6).round() / 1e6;
         [rounded(values.clone().fold(f64::INFINITY, f64::min)), rounded(values.fold(0.0, f64::max))]
     };
@@ -229,7 +229,7 @@ fn table(header: &[&str]) -> Table {
     table
 }
 
-fn show(fit: &RadiusFit, campaign: &str, out: Output) {
+fn show(fit: &RadiusFit, runs: &[Observation], campaign: &str, out: Output) {
     out.say(format_args!("{campaign}: ΔR = β0(R) + β1 f²/R + β2 f⁴/R³"));
     out.say(match fit.options.offset {
         Offset::Joint => "offsets β0: one per radius, fitted together with β",
@@ -278,7 +278,7 @@ fn show(fit: &RadiusFit, campaign: &str, out: Output) {
                 format!("{:.3}", h.explained_percent),
             ]),
             None => row.extend([
-                fit.points.iter().filter(|p| of_radius(&p.observation.radius_m)).count().to_string(),
+                runs.iter().filter(|run| of_radius(&run.radius_m)).count().to_string(),
                 "–".to_owned(),
                 "–".to_owned(),
                 "–".to_owned(),

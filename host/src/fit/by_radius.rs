@@ -24,8 +24,8 @@ pub(super) fn same_radius(a: f64, b: f64) -> bool {
 pub(super) struct OfRadius<'a> {
     /// The smallest of its radii, which differ by rounding at most, m.
     pub radius_m: f64,
-    /// In the order given.
-    pub runs: Vec<&'a Observation>,
+    /// Neighbours among the runs given, in their order.
+    stretches: Vec<&'a [Observation]>,
 }
 
 /// Radii ascending.
@@ -42,26 +42,35 @@ pub(super) fn by_radius<'a>(observations: &'a [Observation]) -> Vec<OfRadius<'a>
     }
     radii.sort_by(f64::total_cmp);
     radii.dedup_by(|a, b| same_radius(*a, *b));
-    let room = observations.len() / radii.len().max(1) + 1;
-    let of = |&radius_m: &f64| OfRadius { radius_m, runs: Vec::with_capacity(room) };
+    let of = |&radius_m: &f64| OfRadius { radius_m, stretches: Vec::new() };
     let mut groups: Vec<OfRadius<'a>> = radii.iter().map(of).collect();
     for (radius_m, stretch) in stretches {
         let at = radii.partition_point(|r| *r <= radius_m).saturating_sub(1);
-        groups[at].runs.extend(stretch);
+        groups[at].stretches.push(stretch);
     }
     groups
 }
 
-impl OfRadius<'_> {
+impl<'a> OfRadius<'a> {
+    /// In the order given.
+    pub(super) fn runs(&self) -> impl Iterator<Item = &'a Observation> + Clone {
+        self.stretches.iter().copied().flatten()
+    }
+
+    /// How many they are.
+    pub(super) fn count(&self) -> usize {
+        self.stretches.iter().map(|stretch| stretch.len()).sum()
+    }
+
     /// Highest of the feeds that count as the lowest, m/s.
     pub(super) fn reference_m_s(&self) -> f64 {
-        self.runs.iter().map(|o| o.feed_m_s).fold(f64::INFINITY, f64::min) * (1.0 + SAME_FEED)
+        self.runs().map(|o| o.feed_m_s).fold(f64::INFINITY, f64::min) * (1.0 + SAME_FEED)
     }
 
     /// Mean radius error at the lowest feed, m.
     pub(super) fn lowest_m(&self) -> f64 {
         let highest = self.reference_m_s();
-        mean(self.runs.iter().filter(|o| o.feed_m_s <= highest).map(|o| o.radius_error_m))
+        mean(self.runs().filter(|o| o.feed_m_s <= highest).map(|o| o.radius_error_m))
     }
 }
 
@@ -83,34 +92,35 @@ pub(super) struct Reduction {
 impl Reduction {
     /// `lowest_m` is taken off each radius error.
     pub(super) fn new(group: &OfRadius<'_>, lowest_m: Option<f64>) -> Self {
-        let off_m = lowest_m.unwrap_or(0.0);
+        let (off_m, count) = (lowest_m.unwrap_or(0.0), group.count());
         let reduce = |scales: [f64; WIDTH]| {
             let by = scales.map(f64::recip);
             let mut reduced = Reduced::new(WIDTH);
             // Nothing stands before the first column: no reflection changes it.
             reduced.block(0).fill(by[0]);
-            for runs in group.runs.chunks(BLOCK_ROWS) {
+            let mut runs = group.runs();
+            for first in (0..count).step_by(BLOCK_ROWS) {
+                let rows = BLOCK_ROWS.min(count - first);
                 let [_, x1, x2, y] = reduced.blocks();
-                for (((o, x1), x2), y) in runs.iter().zip(&mut *x1).zip(&mut *x2).zip(y) {
+                // A row comes before its run, so that none is taken for which there is no row.
+                for (((x1, x2), y), o) in x1.iter_mut().zip(&mut *x2).zip(y).zip(&mut runs) {
                     *x1 = o.feed_m_s * o.feed_m_s;
                     *x2 = o.radius_m;
                     *y = (o.radius_error_m - off_m) * by[3];
                 }
                 // f²/R and f⁴/R³ of several runs at a time.
-                for (x1, x2) in x1.iter_mut().zip(x2).take(runs.len()) {
+                for (x1, x2) in x1.iter_mut().zip(x2).take(rows) {
                     let per_m = 1.0 / *x2;
                     let f2_r = *x1 * per_m;
                     *x1 = f2_r * by[1];
                     *x2 = f2_r * f2_r * per_m * by[2];
                 }
-                reduced.take(runs.len());
+                reduced.take(rows);
             }
             // Further rows are rounding.
-            std::array::from_fn(|i| {
-                std::array::from_fn(|j| if i < group.runs.len() { reduced.at(i, j) } else { 0.0 })
-            })
+            std::array::from_fn(|i| std::array::from_fn(|j| if i < count { reduced.at(i, j) } else { 0.0 }))
         };
-        let plain = Self { r: reduce([1.0; WIDTH]), scales: [1.0; WIDTH], lowest_m, runs: group.runs.len() };
+        let plain = Self { r: reduce([1.0; WIDTH]), scales: [1.0; WIDTH], lowest_m, runs: count };
         let safe = |j| {
             let norm = plain.r.iter().map(|row| row[j] * row[j]).sum::<f64>().sqrt();
             SAFE_NORMS.contains(&norm)
@@ -119,8 +129,7 @@ impl Reduction {
             return plain;
         }
         let largest = group
-            .runs
-            .iter()
+            .runs()
             .map(|o| [1.0, o.f2_r(), o.f4_r3(), o.radius_error_m - off_m])
             .fold([0.0_f64; WIDTH], |top, row| std::array::from_fn(|j| top[j].max(row[j].abs())));
         let scales = largest.map(|top| if top > 0.0 { top } else { 1.0 });
@@ -229,9 +238,9 @@ mod tests {
             let runs: Vec<Observation> = order.iter().map(|&k| run(radii[k], 0.1, k as f64)).collect();
             let groups = by_radius(&runs);
             assert_eq!(groups.iter().map(|g| g.radius_m).collect::<Vec<_>>(), [radii[0], radii[2], radii[3]]);
-            assert_eq!(groups.iter().map(|g| g.runs.len()).collect::<Vec<_>>(), [2, 1, 1]);
+            assert_eq!(groups.iter().map(|g| g.count()).collect::<Vec<_>>(), [2, 1, 1]);
         }
         assert!(by_radius(&[]).is_empty());
-        assert_eq!(by_radius(&[run(f64::NAN, 0.1, 0.0), run(0.1, 0.1, 0.0)])[0].runs.len(), 2);
+        assert_eq!(by_radius(&[run(f64::NAN, 0.1, 0.0), run(0.1, 0.1, 0.0)])[0].count(), 2);
     }
 }

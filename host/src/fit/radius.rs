@@ -8,9 +8,6 @@ use giotto_shared::model::{Classes, Cumulants, RadiusModel};
 /// Significance of the intervals (95 %).
 const ALPHA: f64 = 0.05;
 
-/// Runs whose squares are summed before they are added to the others: additions of one sum wait for each other.
-const SIDE_BY_SIDE: usize = 16;
-
 /// One run: a circle and its size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
@@ -119,8 +116,6 @@ pub struct RadiusFit {
     pub steps: Vec<Step>,
     /// Offset of each radius in the campaign, (radius, offset), m, radius ascending.
     pub offsets_m: Vec<(f64, f64)>,
-    /// Every run beside the model.
-    pub points: Vec<Point>,
     /// Runs fitted and root mean square of their residuals, m.
     pub train: (usize, f64),
     /// Residual standard deviation with its degrees of freedom, m: the scatter between runs (Eq. 21).
@@ -146,6 +141,8 @@ struct Core {
     /// Radius by radius, m.
     offsets_m: Vec<f64>,
     deviation_m: f64,
+    /// Sum of squared residuals, m².
+    squares_m2: f64,
     ratio95: [f64; 2],
 }
 
@@ -186,6 +183,7 @@ fn core_of(radii: &[&Reduction], options: &Options) -> Result<Core, FitError> {
         steps: selection.steps,
         offsets_m,
         deviation_m: selection.fit.deviation(),
+        squares_m2: selection.fit.rss,
         ratio95: ratio_interval(&full, forced.len(), full_t),
     })
 }
@@ -231,7 +229,7 @@ impl<'a> Beside<'a> {
     fn not_fitted(group: &OfRadius<'_>, model: &'a RadiusModel<f64>, offset: Offset) -> Self {
         let servo = |o: &Observation| model.radius_error_m(o.radius_m, o.feed_m_s);
         let (offset_m, reference_m_s) = match offset {
-            Offset::Joint => (mean(group.runs.iter().map(|o| o.radius_error_m - servo(o))), 0.0),
+            Offset::Joint => (mean(group.runs().map(|o| o.radius_error_m - servo(o))), 0.0),
             Offset::LowestSpeed => (group.lowest_m(), group.reference_m_s()),
         };
         Self { model, offset_m, part: Part::Heldout, reference_m_s }
@@ -247,7 +245,7 @@ impl<'a> Beside<'a> {
     }
 
     fn score(&self, group: &OfRadius<'_>) -> Sums {
-        let points = group.runs.iter().map(|o| self.point(o)).filter(|p| p.part == Part::Heldout);
+        let points = group.runs().map(|o| self.point(o)).filter(|p| p.part == Part::Heldout);
         points.map(|p| (p.measured_m(), p.predicted_m)).collect()
     }
 }
@@ -279,7 +277,7 @@ impl RadiusFit {
             |o: &Observation| options.train_radius_m.is_none_or(|train| same_radius(train, o.radius_m));
         let reduction = |group: &OfRadius<'_>| {
             let lowest_m = || group.lowest_m();
-            let fitted = options.train_radius_m.is_none() || group.runs.iter().any(|o| fitted(o));
+            let fitted = options.train_radius_m.is_none() || group.runs().any(fitted);
             fitted.then(|| Reduction::new(group, (options.offset == Offset::LowestSpeed).then(lowest_m)))
         };
         let reductions: Vec<Option<Reduction>> = groups.iter().map(reduction).collect();
@@ -301,8 +299,6 @@ impl RadiusFit {
         let core = core_of(&train, &options)?;
         let runs: usize = train.iter().map(|radius| radius.runs).sum();
         let mut offsets_m = Vec::with_capacity(groups.len());
-        let mut points = Vec::with_capacity(observations.len());
-        let mut squares = 0.0;
         let mut heldout = Sums::default();
         let mut heldout_by_radius = Vec::new();
         let mut fitted_offsets_m = core.offsets_m.iter();
@@ -312,13 +308,6 @@ impl RadiusFit {
                 None => Beside::not_fitted(group, &core.model, options.offset),
             };
             offsets_m.push((group.radius_m, beside.offset_m));
-            for runs in group.runs.chunks(SIDE_BY_SIDE) {
-                let first = points.len();
-                points.extend(runs.iter().map(|o| beside.point(o)));
-                if own.is_some() {
-                    squares += points[first..].iter().map(|p| p.residual_m().powi(2)).sum::<f64>();
-                }
-            }
             let predicted = match own {
                 None => Some(beside.score(group)),
                 Some(own) if options.train_radius_m.is_none() && groups.len() > 1 => {
@@ -344,14 +333,29 @@ impl RadiusFit {
             ci95: core.ci95,
             steps: core.steps,
             offsets_m,
-            train: (runs, (squares / runs as f64).sqrt()),
+            train: (runs, (core.squares_m2 / runs as f64).sqrt()),
             deviation_m: core.deviation_m,
             heldout: heldout.heldout(),
             heldout_by_radius,
-            points,
             ratio95: core.ratio95,
             classes: Classes::of_interval(core.ratio95[0], core.ratio95[1]),
         })
+    }
+
+    /// Every run beside the model, radius by radius: of the runs that this was fitted to.
+    pub fn points(&self, observations: &[Observation]) -> Vec<Point> {
+        let Options { train_radius_m, offset, .. } = self.options;
+        let beside = |(group, &(_, offset_m)): (&OfRadius<'_>, &(f64, f64))| {
+            let fitted =
+                train_radius_m.is_none_or(|train| group.runs().any(|o| same_radius(train, o.radius_m)));
+            let beside = if fitted {
+                Beside::fitted(&self.model, offset_m)
+            } else {
+                Beside::not_fitted(group, &self.model, offset)
+            };
+            group.runs().map(|o| beside.point(o)).collect::<Vec<_>>()
+        };
+        by_radius(observations).iter().zip(&self.offsets_m).flat_map(beside).collect()
     }
 
     /// κ2, κ4 of the model.

@@ -287,7 +287,7 @@ fn figures_are_drawn_with_every_run_in_them() {
     let mut runs = campaign(PAPER, |_| 0.0);
     runs.iter_mut().for_each(|r| r.out_of_roundness_m = Some(20e-6));
     let fit = RadiusFit::new(&runs, Options { train_radius_m: Some(0.1), ..Options::default() }).unwrap();
-    let figures = figures(&fit.points, &fit.model).unwrap();
+    let figures = figures(&fit.points(&runs), &fit.model).unwrap();
     assert_eq!(figures.len(), 4);
     for figure in figures {
         // A mark for each run and one for each radius in the key.
