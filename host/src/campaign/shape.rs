@@ -77,7 +77,7 @@ impl Shape {
             return None;
         }
         // The digits of both parts at the high ends of their words. No shift is of 64 bits or more: the masks say so.
-        let decimals = (word(self.decimals_at & 15) ^ (0x30 * EACH)) << (64 - self.decimals & 63);
+        let decimals = (word(self.decimals_at & 15) ^ (0x30 * EACH)) << ((64 - self.decimals) & 63);
         let whole = difference[0] >> (self.before & 63) << (self.spare & 63);
         let digits = if self.carry == 0 {
             together(whole >> (self.decimals & 63) | decimals)
