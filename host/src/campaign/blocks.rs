@@ -1,6 +1,6 @@
 //! Text files in blocks of whole lines, results in the order of the file. Of a large file the next window is read while this
 //! one is parsed on all cores; small ones go block by block, for whoever reads many has all cores at work already. Memory is a
-//! window and its results, whatever the size of the file.
+//! window and its results, whatever the size of the file; a small file is one window.
 use super::CampaignError;
 use rayon::prelude::*;
 use std::fs::File;
@@ -41,10 +41,11 @@ pub(super) enum Fault {
 }
 
 impl Text {
-    /// A file with its first bytes, at most `head` of them, read.
-    pub(super) fn open(file: File, head: usize) -> std::io::Result<Self> {
+    /// A file with all of its bytes read if it is small, else the first.
+    pub(super) fn open(file: File) -> std::io::Result<Self> {
         let size = file.metadata()?.len();
-        let head = head.min(usize::try_from(size).unwrap_or(head).saturating_add(1));
+        // One byte more than there are shows the end.
+        let head = if size > LARGE { BLOCK } else { size as usize + 1 };
         let mut buffer = Vec::with_capacity(head);
         let mut file = file.take(u64::MAX);
         file.by_ref().take(head as u64).read_to_end(&mut buffer)?;
@@ -68,10 +69,13 @@ impl Text {
         self.skip = (self.skip + bytes).min(self.buffer.len());
     }
 
-    /// Rows to expect by the length of the lines read so far, with some to spare.
+    /// Rows to expect: no more than there are lines of a small file, else by the length of those read so far, with some to spare.
     pub(super) fn rows(&self) -> usize {
         let sample = self.head();
         let lines = memchr::memchr_iter(b'\n', sample).count().max(1) as u64;
+        if self.at + self.buffer.len() as u64 >= self.size {
+            return lines as usize + 1; // the last may have no end
+        }
         let rows = self.size * lines / (sample.len().max(1) as u64) + self.size / 64 + 16;
         usize::try_from(rows.min(self.size / 2 + 1)).unwrap_or(0)
     }
@@ -84,8 +88,9 @@ impl Text {
         mut take: impl FnMut(T) -> Result<ControlFlow<()>, CampaignError>,
     ) -> Result<(), Fault> {
         let mut body = self.skip;
-        let large = self.size - self.at.min(self.size) > LARGE;
-        let window = if large { BLOCK * BLOCKS } else { BLOCK };
+        let rest = self.size.saturating_sub(self.at);
+        let large = rest > LARGE;
+        let window = if large { BLOCK * BLOCKS } else { BLOCK.max(rest as usize) };
         let mut next = Vec::new();
         let mut last = self.fill()?;
         loop {
@@ -107,27 +112,29 @@ impl Text {
                     (at, block)
                 })
                 .collect();
-            let work = || -> Vec<T> {
-                if large {
-                    blocks.par_iter().map(|(at, block)| parse(*at, block)).collect()
-                } else {
-                    blocks.iter().map(|(at, block)| parse(*at, block)).collect()
+            let mut more = Ok(0);
+            let mut read = || {
+                if !last {
+                    next.clear();
+                    next.reserve_exact(buffer.len() - whole + window);
+                    next.extend_from_slice(&buffer[whole..]);
+                    more = self.file.by_ref().take(window as u64).read_to_end(&mut next);
                 }
             };
-            let (results, more) = if last {
-                (work(), Ok(0))
+            if large {
+                let work = || blocks.par_iter().map(|(at, block)| parse(*at, block)).collect::<Vec<T>>();
+                for result in rayon::join(work, read).0 {
+                    if take(result).map_err(Fault::Taken)?.is_break() {
+                        return Ok(());
+                    }
+                }
             } else {
-                next.clear();
-                next.reserve_exact(buffer.len() - whole + window);
-                next.extend_from_slice(&buffer[whole..]);
-                let file = &mut self.file;
-                let mut read = || file.take(window as u64).read_to_end(&mut next);
-                if large { rayon::join(work, read) } else { (work(), read()) }
-            };
-            for result in results {
-                if take(result).map_err(Fault::Taken)?.is_break() {
-                    return Ok(());
+                for (at, block) in blocks {
+                    if take(parse(at, block)).map_err(Fault::Taken)?.is_break() {
+                        return Ok(());
+                    }
                 }
+                read();
             }
             if last {
                 return Ok(());

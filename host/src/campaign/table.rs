@@ -88,7 +88,7 @@ impl Table {
                 Problem::IsDirectory { expected: EXPECTED_RUN },
             ));
         }
-        let mut text = Text::open(std::fs::File::open(path).map_err(io)?, BLOCK).map_err(io)?;
+        let mut text = Text::open(std::fs::File::open(path).map_err(io)?).map_err(io)?;
         let head = text.head();
         if head.is_empty() {
             return Err(CampaignError::new(Place::file(path), Problem::Empty { expected: EXPECTED_RUN }));
@@ -219,20 +219,22 @@ struct Parsed {
 fn parse_block(bytes: &[u8], factors: &[f64]) -> Result<Parsed, usize> {
     let width = factors.len();
     let guess = bytes.len() / (6 * width) + 1;
-    let mut columns: Vec<Vec<f64>> = factors.iter().map(|_| Vec::with_capacity(guess)).collect();
-    let mut above: Vec<Option<Shape>> = vec![None; width];
-    let (mut at, mut rows) = (0, 0);
-    while at < bytes.len() {
+    let new = |factor: &f64| (Vec::with_capacity(guess), None::<Shape>, *factor);
+    let mut columns: Vec<(Vec<f64>, Option<Shape>, f64)> = factors.iter().map(new).collect();
+    let (mut at, mut rows, mut blank_at) = (0, 0, None);
+    'rows: while at < bytes.len() {
         let line = at;
-        for (field, ((column, above), factor)) in columns.iter_mut().zip(&mut above).zip(factors).enumerate()
-        {
+        for (field, (column, above, factor)) in columns.iter_mut().enumerate() {
             let like_above = above.as_ref().and_then(|shape| shape.read(bytes, at));
             let (value, next) = match like_above {
                 Some(found) => found,
                 None if field == 0 && is_blank(bytes, at) => {
                     // Blank lines may end a file, not divide it.
-                    let rest = bytes[at..].iter().all(u8::is_ascii_whitespace);
-                    return if rest { Ok(Parsed { columns, rows, blank_at: Some(at) }) } else { Err(at) };
+                    if !bytes[at..].iter().all(u8::is_ascii_whitespace) {
+                        return Err(at);
+                    }
+                    blank_at = Some(at);
+                    break 'rows;
                 }
                 None => {
                     let found = parse_field(bytes, at, field + 1 == width).ok_or(line)?;
@@ -240,12 +242,12 @@ fn parse_block(bytes: &[u8], factors: &[f64]) -> Result<Parsed, usize> {
                     found
                 }
             };
-            column.push(value * factor);
+            column.push(value * *factor);
             at = next;
         }
         rows += 1;
     }
-    Ok(Parsed { columns, rows, blank_at: None })
+    Ok(Parsed { columns: columns.into_iter().map(|column| column.0).collect(), rows, blank_at })
 }
 
 /// Whether the line at `at` is empty.
