@@ -77,12 +77,12 @@ impl Controller {
         Ok(segments.iter().fold(from_nm, |at, (segment, _)| segment.end_nm(at)))
     }
 
-    /// Moves in a straight line to a place, nm, and returns when the machine stands there.
+    /// Moves in a straight line to a place, nm, once what runs has come to its end, and returns when the machine stands there.
     ///
     /// # Errors
     /// As [`Controller::run_program`].
     pub fn move_to(&mut self, to_nm: [i32; 3], feed_m_s: f64) -> Result<(), ControllerError> {
-        if self.status()?.raw_nm == to_nm {
+        if self.at_rest()?.raw_nm == to_nm {
             return Ok(());
         }
         let to_m = to_nm.map(|nm| f64::from(nm) * 1e-9);

@@ -59,6 +59,8 @@ impl Controller {
 
     /// Set-points are put away from now on.
     pub(super) fn begin_recording(&mut self, every: u16) -> Result<(), ControllerError> {
+        // What is left of another run comes before the second answer.
+        self.command(Command::Subscribe { every: 0, on_link: true })?;
         self.command(Command::Subscribe { every: every.max(1), on_link: true })?;
         self.set_points.clear();
         Ok(())
