@@ -174,7 +174,7 @@ fn run_scenarios(
     let emulated = matches!(port, Port::Qemu | Port::QemuBoard(_));
     for (at, scenario) in scenarios::ALL.iter().chain(&streams::ALL).enumerate() {
         if at == scenarios::ALL.len() && emulated {
-            // In the emulator time would run away from whoever streams.
+            // In the emulator time would run away from whoever sends or records every set-point.
             controller = open(&port, &OpenOptions { pace: Pace::Slow, ..options.clone() }, &mut note)?;
         }
         let outcome = scenarios::run(scenario, &mut controller);

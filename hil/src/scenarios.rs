@@ -40,18 +40,16 @@ impl From<ControllerError> for Trouble {
     }
 }
 
-/// All of them, in the order they run in.
-pub const ALL: [Scenario; 11] = [
+/// Those that no busy host can spoil, in the order they run in; the others are in [`streams`](crate::streams::ALL).
+pub const ALL: [Scenario; 9] = [
     ("says who it is", identity),
     ("a circle bypassed is the programmed one", bypassed_circle),
     ("a stop command ends a run within the limits", stop),
     ("a silent host: the segment in hand finishes, nothing else starts", silent_host),
     ("runs out of bounds are refused", out_of_bounds),
-    ("a program ends where its segments do, to the nanometre", programs::ends_exactly),
     ("a silent host in a program: the segment in hand finishes, nothing else starts", programs::silent_host),
     ("a broken table is refused and changes nothing", broken_table),
     ("flash, verify, reset, verify; the circle is corrected", flash_and_run),
-    ("flash, programs: contour of arcs between lines, through a machine", programs::contour),
     ("a table that is not confirmed is gone after a reset", unconfirmed),
 ];
 

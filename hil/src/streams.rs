@@ -1,6 +1,6 @@
 //! Scenarios of streams: set-points sent one a tick, and the contour that comes of them.
 use crate::contour;
-use crate::programs::TRIES;
+use crate::programs::{self, TRIES};
 use crate::scenarios::{Scenario, Trouble, ensure, holds};
 use giotto::controller::streaming::Streamed;
 use giotto::controller::{Controller, ControllerError};
@@ -8,8 +8,10 @@ use giotto_shared::path::smoothstep;
 use giotto_shared::wire::{Command, FaultCause, MotionState};
 use std::f64::consts::TAU;
 
-/// All of them. A controller whose time waits for no host is to be opened for them.
-pub const ALL: [Scenario; 3] = [
+/// Every set-point is sent or recorded. In an emulator they need a time that a busy host can keep up with.
+pub const ALL: [Scenario; 5] = [
+    ("a program ends where its segments do, to the nanometre", programs::ends_exactly),
+    ("flash, programs: contour of arcs between lines, through a machine", programs::contour),
     ("a stream is followed set-point by set-point", followed),
     ("flash, streams: contour of an ellipse and a figure of eight, through a machine", contour),
     ("a stream that dries up comes to rest and faults until a reset", dries_up),

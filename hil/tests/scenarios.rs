@@ -16,7 +16,7 @@ fn outcomes(port: &Port) -> Vec<(&'static str, Outcome)> {
         scenarios.iter().map(|s| (s.0, scenarios::run(s, &mut controller))).collect::<Vec<_>>()
     };
     let all = run(Pace::Fast, &scenarios::ALL);
-    // In the emulator time would run away from whoever streams.
+    // In the emulator time would run away from whoever sends or records every set-point.
     [all, run(Pace::Slow, &streams::ALL)].concat()
 }
 
