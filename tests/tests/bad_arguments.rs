@@ -173,9 +173,10 @@ fn what_cannot_be_written_is_said_with_its_path() {
         "table model.toml -o folder",
         "compensate part.nc --model model.toml -o folder",
         "man -o empty",
-        "run circle --radius 50 --feed 100 --direction ccw --port sim -o folder",
-        "run program part.nc --port sim -o folder",
-        "run stream path.csv --port sim -o folder",
+        // Before anything moves: no controller was asked.
+        "run circle --radius 50 --feed 100 --direction ccw --port /dev/nowhere -o folder",
+        "run program part.nc --port /dev/nowhere -o folder",
+        "run stream path.csv --port /dev/nowhere -o folder",
     ] {
         refused(folder, line, 3, line.rsplit(' ').next().unwrap());
     }

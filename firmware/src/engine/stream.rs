@@ -10,14 +10,16 @@
 //! at the last velocity and acceleration, for [`StreamPlan::hold_ticks`] at most ("hold"); a set-point that comes in that time is
 //! joined without a step. After that the path comes to rest along its tangent within the acceleration limit while
 //! the correction is ramped out, and [`StreamState::Fault`] is latched. Nothing jumps at any time.
-use super::config::whole_above;
+mod plan;
+
 use super::engage::Engage;
 use super::guard::Guard;
 use super::ramp::{Clock, POLYNOMIAL, clock_step, shapes};
 use super::{Counters, Output, flag};
 use core::sync::atomic::{Ordering, compiler_fence};
-use giotto_shared::fixed::{mulh, mulh_add, single_to_fixed};
-use giotto_shared::law::Operator;
+
+pub(super) use plan::StreamNeeds;
+pub use plan::StreamPlan;
 
 /// Places of a [`Stream`] that is told nothing else.
 pub const PLACES: usize = 32;
@@ -48,125 +50,8 @@ pub enum StreamState {
     Ended,
 }
 
-/// A stream in the form that the tick runs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub struct StreamPlan {
-    /// Streams planned before a stop carry an older one.
-    pub(crate) epoch: u8,
-    /// Ticks between the places.
-    stride: u32,
-    /// Weights of the inner and outer second difference, Q28.
-    inner: i32,
-    outer: i32,
-    /// Largest step of a set-point on one axis, nm.
-    step_nm: u32,
-    hold_ticks: u32,
-    /// Velocity falls by 2⁻ᵏ of itself each tick when coming to rest.
-    brake_shift: u32,
-    engage_ticks: u32,
-    offset_nm: i32,
-    slew_nm: i32,
-    corrected: bool,
-}
-
-/// Fraction bits of the weights: they may reach 128 in size.
-const WEIGHT_BITS: u32 = 24;
-/// What a product of a weight and a difference lacks.
-const SCALE: i32 = 1 << (32 - WEIGHT_BITS);
 /// Not the number of any set-point: the next one is taken with care.
 const CARE: u32 = u32::MAX;
-
-/// What a plan is made from.
-pub(crate) struct StreamNeeds {
-    pub(crate) epoch: u8,
-    pub(crate) operator: Option<Operator<f32>>,
-    pub(crate) rate_hz: f32,
-    /// Distance of the places wanted, s.
-    pub(crate) window_s: f32,
-    /// Longest distance of the places that the stream has memory for, ticks.
-    pub(crate) longest: u32,
-    pub(crate) feed_m_s: f32,
-    pub(crate) acceleration_m_s2: f32,
-    pub(crate) hold_ticks: u32,
-    pub(crate) engage_ticks: u32,
-    /// Of the offset, and of its change per tick.
-    pub(crate) bounds_nm: [i32; 2],
-}
-
-impl StreamPlan {
-    /// `None` if the operator is too strong for so short a window.
-    pub(crate) fn build(n: &StreamNeeds) -> Option<Self> {
-        let stride = ((n.window_s * n.rate_hz + 0.5) as u32).clamp(1, n.longest);
-        let h = stride as f32 / n.rate_hz;
-        let operator = n.operator.unwrap_or_default();
-        // p(−h) − 2p + p(h) is s²h² + s⁴h⁴/12 + …, with 2h it is 4 s²h² + 16 s⁴h⁴/12 + …
-        let second = operator.second_s2 / (h * h);
-        let fourth = 12.0 * operator.fourth_s4 / (h * h * h * h);
-        let outer = (fourth - second) / 12.0;
-        let inner = second - 4.0 * outer;
-        let most = 0.99 * (1u32 << (31 - WEIGHT_BITS)) as f32;
-        if !(inner.abs() < most && outer.abs() < most) {
-            return None;
-        }
-        // v/2ᵏ per tick must be within the acceleration: 2ᵏ ≥ v/(a·T).
-        let ratio = n.feed_m_s / n.acceleration_m_s2 * n.rate_hz;
-        let brake_shift = u32::BITS - whole_above(ratio).saturating_sub(1).leading_zeros();
-        let [offset_nm, slew_nm] = n.bounds_nm;
-        Some(Self {
-            epoch: n.epoch,
-            stride,
-            inner: single_to_fixed(inner, WEIGHT_BITS),
-            outer: single_to_fixed(outer, WEIGHT_BITS),
-            step_nm: single_to_fixed(n.feed_m_s / n.rate_hz * 1.05e9, 0) as u32,
-            hold_ticks: n.hold_ticks,
-            brake_shift: brake_shift.min(20),
-            engage_ticks: n.engage_ticks,
-            offset_nm,
-            slew_nm,
-            corrected: n.operator.is_some(),
-        })
-    }
-
-    /// Takes one axis' set-point in, in place of the oldest of those that are whole strides old; its correction, nm.
-    #[inline(always)]
-    fn axis(&self, kept: &mut [i32; 4], p0: i32) -> i32 {
-        let [p1, p2, p3, p4] = *kept;
-        *kept = [p0, p1, p2, p3];
-        let twice = p2.wrapping_mul(2);
-        // Differences beyond 8 mm wrap; the bounds catch what comes of it.
-        let inner = p1.wrapping_add(p3).wrapping_sub(twice).wrapping_mul(SCALE);
-        let outer = p0.wrapping_add(p4).wrapping_sub(twice).wrapping_mul(SCALE);
-        mulh_add(mulh(outer, self.outer), inner, self.inner)
-    }
-
-    /// The epoch it was planned in.
-    pub(crate) const fn epoch(&self) -> u8 {
-        self.epoch
-    }
-
-    /// Ticks from a set-point in to the same one out.
-    pub const fn latency(&self) -> u32 {
-        2 * self.stride
-    }
-
-    /// White noise of the set-points, root mean square, comes out in the correction so many times.
-    pub fn noise_gain(&self) -> f64 {
-        let weight = |w: i32| f64::from(w) / f64::from(1u32 << WEIGHT_BITS);
-        let (inner, outer) = (weight(self.inner), weight(self.outer));
-        let middle = -2.0 * (inner + outer);
-        libm::sqrt(2.0 * (inner * inner + outer * outer) + middle * middle)
-    }
-
-    /// Ticks that a missing set-point is bridged.
-    pub const fn hold_ticks(&self) -> u32 {
-        self.hold_ticks
-    }
-
-    /// Whether a zone of the table applies.
-    pub const fn corrected(&self) -> bool {
-        self.corrected
-    }
-}
 
 /// What is kept of a tick and of those that were whole strides before it, nm.
 #[repr(C)]
@@ -208,7 +93,7 @@ pub struct Stream<const N: usize = PLACES> {
     counters: StreamCounters,
 }
 
-/// Counts since the stream began; they wrap.
+/// Counts of all streams since it was made; they wrap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct StreamCounters {
     /// Ticks without a usable set-point.

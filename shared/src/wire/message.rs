@@ -112,7 +112,8 @@ pub enum Command {
     Append {
         /// The segment.
         segment: ExactSegment,
-        /// How far the path may leave its joint with the segment before, nm; 0: exact stop.
+        /// How far the path may leave its joint with the segment before, nm; 0: exact stop. This firmware always stops
+        /// exactly, which is within any tolerance.
         tolerance_nm: u32,
     },
     /// The program has no more segments, the stream no more set-points.

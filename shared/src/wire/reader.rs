@@ -17,16 +17,9 @@ struct Reader<'de> {
 }
 
 /// A value that its type does not have.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("a value that its type does not have")]
 struct Unknown;
-
-impl core::fmt::Display for Unknown {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str("a value that its type does not have")
-    }
-}
-
-impl core::error::Error for Unknown {}
 
 impl de::Error for Unknown {
     fn custom<T: core::fmt::Display>(_: T) -> Self {

@@ -11,16 +11,9 @@ pub(super) struct Writer<'a> {
 }
 
 /// A type that messages do not have.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("a type that messages do not have")]
 pub(super) struct Unsupported;
-
-impl core::fmt::Display for Unsupported {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str("a type that messages do not have")
-    }
-}
-
-impl core::error::Error for Unsupported {}
 
 impl ser::Error for Unsupported {
     fn custom<T: core::fmt::Display>(_: T) -> Self {

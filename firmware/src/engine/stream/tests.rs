@@ -1,6 +1,7 @@
 //! Streams: law, latency, bypass, gaps.
 extern crate std;
 use super::*;
+use giotto_shared::law::Operator;
 use giotto_shared::path::smoothstep;
 use std::vec::Vec;
 

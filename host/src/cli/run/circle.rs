@@ -47,6 +47,7 @@ pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
     let (radius_m, feed_m_s) = (args.radius * 1e-3, args.feed * 1e-3);
     let centre_m = centre.map(|mm| mm * 1e-3);
     let wanted = CircleRun { centre_m, radius_m, feed_m_s, direction, laps: args.laps, start_rad: 0.0 };
+    args.record.ready()?;
     let mut controller = args.port.open(out)?;
     let recording = controller.run_circle(&wanted, args.record.every)?;
     args.record.report(&controller, &recording, &[], out)

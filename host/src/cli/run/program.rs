@@ -15,7 +15,8 @@ pub(super) struct Args {
     /// NC program, RS-274 as LinuxCNC and Grbl speak it; its origin is the machine's.
     #[arg(value_name = "FILE.nc")]
     program: PathBuf,
-    /// How far the path may leave a joint where the program says neither G61 nor G64 P, mm; 0: exact stop.
+    /// How far the path may leave a joint where the program says neither G61 nor G64 P, mm. Sent with each segment; the
+    /// firmware of today stops exactly at every joint, whatever the tolerance.
     #[arg(long, value_name = "MM", default_value_t = 0.0, value_parser = tolerance)]
     tolerance_mm: f64,
     /// Feed of G0, mm/s.
@@ -40,6 +41,7 @@ fn tolerance(text: &str) -> Result<f64, String> {
 /// Runs the command.
 pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
     let text = read(&args.program, Kind::GCode)?;
+    args.record.ready()?;
     // Read once without the machine: what is wrong is said before a port is opened.
     let running = Running {
         start_mm: [0.0; 3],

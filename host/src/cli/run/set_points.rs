@@ -3,6 +3,7 @@ use crate::cli::failure::cannot_write;
 use crate::cli::{Failure, Output};
 use crate::controller::{Controller, Recording};
 use serde_json::{Value, json};
+use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
 
 /// What is recorded of a run.
@@ -17,6 +18,18 @@ pub(super) struct Record {
 }
 
 impl Record {
+    /// Says before anything moves that the file cannot be written.
+    pub(super) fn ready(&self) -> Result<(), Failure> {
+        let Some(path) = &self.output else { return Ok(()) };
+        let new = !path.exists();
+        let open = OpenOptions::new().append(true).create(true).open(path);
+        open.map_err(|error| cannot_write(path, &error))?;
+        if new {
+            std::fs::remove_file(path).map_err(|error| cannot_write(path, &error))?;
+        }
+        Ok(())
+    }
+
     /// Writes the set-points and says what they were; `more` goes into the document.
     pub(super) fn report(
         &self,

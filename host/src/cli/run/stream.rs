@@ -30,6 +30,7 @@ const SLACK: f64 = 0.1;
 /// Runs the command.
 pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
     let rows = read(&args.file)?;
+    args.record.ready()?;
     // A stream does not wait: in the emulator its time must not run away from us.
     let mut controller = args.port.connect_at(Pace::Slow, out)?;
     let tick_s = 1.0 / f64::from(controller.identity().tick_hz);

@@ -1,0 +1,202 @@
+//! Streams: set-points appended while the machine moves.
+use super::*;
+
+/// A circle of 50 mm that starts and ends smoothly at the machine's origin; `n` beyond its end stays there.
+fn streamed(n: usize) -> [i32; 3] {
+    let (t, start, turn) = (n as f64 * 1e-3, 0.6, 2.0);
+    let s = |t: f64| start * smoothstep(t / start).integral + (t - start).max(0.0);
+    let angle = 2.0 * PI / turn * (s(t.max(0.0)) - s((t - turn).max(0.0)));
+    [0.05 * (angle.cos() - 1.0), 0.05 * angle.sin(), 0.0].map(|m| (m * 1e9).round() as i32)
+}
+
+/// Ticks of that stream.
+const STREAMED: usize = 2700;
+
+/// A host that sends as many set-points as there is room for.
+struct Source {
+    steps: Steps,
+    sent: usize,
+    ended: bool,
+}
+
+impl Source {
+    fn new(place_nm: [i32; 3]) -> Self {
+        Self { steps: Steps::from(place_nm), sent: 0, ended: false }
+    }
+
+    fn feed(&mut self, bench: &mut Bench, up_to: usize) {
+        while self.sent < up_to {
+            let mut chunk = Chunk::new();
+            let (before, mut count) = (self.steps, 0);
+            while count < BATCH
+                && self.sent + count < up_to
+                && self.steps.write(streamed(self.sent + count), &mut chunk)
+            {
+                count += 1;
+            }
+            match bench.desk.points(&chunk) {
+                Ok(()) => self.sent += count,
+                Err(MotionRefusal::QueueFull) => {
+                    self.steps = before;
+                    return;
+                }
+                Err(other) => panic!("{other}"),
+            }
+        }
+        if up_to >= STREAMED && !self.ended {
+            self.ended = bench.desk.end().is_ok();
+        }
+    }
+}
+
+#[test]
+fn a_stream_is_followed_to_its_end_and_a_program_goes_on_from_there() {
+    let mut bench = bench();
+    assert_eq!(bench.desk.points(&[]), Err(MotionRefusal::NoProgram));
+    bench.desk.begin_stream(1.0, 60).unwrap();
+    assert_eq!(bench.desk.begin(), Err(MotionRefusal::Busy));
+    let nothing = line([0.1; 3]).exact([0; 3]).unwrap();
+    assert_eq!(bench.desk.append(&nothing, 0), Err(MotionRefusal::NoProgram));
+    let mut source = Source::new([0; 3]);
+    // Not yet so many as were asked for: nothing moves.
+    source.feed(&mut bench, 50);
+    bench.ticks(100);
+    assert_eq!((bench.now().state, bench.now().missing_set_points), (MotionState::Running, 0));
+    let mut begun = None;
+    while bench.now().state == MotionState::Running {
+        source.feed(&mut bench, STREAMED);
+        bench.ticks(7);
+        assert!(bench.path.len() < 10_000);
+        begun = begun.or((bench.now().raw_nm != [0; 3]).then_some(bench.path.len()));
+    }
+    bench.until_at_rest();
+    let now = bench.now();
+    assert_eq!((now.state, now.raw_nm), (MotionState::Idle, streamed(STREAMED)));
+    assert_eq!((now.missing_set_points, now.late_set_points, now.rejected_set_points), (0, 0, 0));
+    // The set-points themselves, one a tick.
+    let first = bench.path.iter().position(|place| *place != [0; 3]).unwrap();
+    let offset = (0..STREAMED).position(|n| streamed(n) != [0; 3]).unwrap();
+    for n in 0..STREAMED - offset {
+        assert_eq!(bench.path[first + n], streamed(offset + n));
+    }
+    bench.desk.begin().unwrap();
+    let mut at = now.raw_nm;
+    append(&mut bench, &mut at, line([0.01, 0.0, 0.0]));
+    bench.desk.end().unwrap();
+    bench.until_at_rest();
+    assert_eq!((bench.now().state, bench.now().raw_nm), (MotionState::Idle, [10_000_000, 0, 0]));
+}
+
+/// Largest change of speed between ticks, m/s².
+fn roughest(bench: &Bench) -> f64 {
+    let velocity = |i: usize, n: usize| f64::from(bench.path[n + 1][i] - bench.path[n][i]) * 1e-6;
+    let change = |n: usize| (0..3).map(|i| (velocity(i, n + 1) - velocity(i, n)).powi(2)).sum::<f64>().sqrt();
+    (0..bench.path.len() - 2).map(change).fold(0.0, f64::max) * 1e3
+}
+
+#[test]
+fn a_stream_that_dries_up_comes_to_rest_and_faults() {
+    let mut bench = bench();
+    bench.desk.begin_stream(1.0, 60).unwrap();
+    let mut source = Source::new([0; 3]);
+    for _ in 0..100 {
+        source.feed(&mut bench, 1000);
+        bench.ticks(10);
+    }
+    assert_eq!(bench.now().state, MotionState::Running);
+    bench.ticks(1100);
+    assert_eq!(bench.now().state, MotionState::Stopping);
+    bench.until_at_rest();
+    let now = bench.now();
+    assert_eq!((now.state, now.fault), (MotionState::Fault, Some(FaultCause::Starved)));
+    assert_eq!((now.missing_set_points, now.late_set_points, now.raw_nm), (6, 0, now.corrected_nm));
+    assert!(roughest(&bench) < 6.0, "{}", roughest(&bench));
+    assert_eq!(bench.desk.begin(), Err(MotionRefusal::Fault));
+}
+
+#[test]
+fn set_points_that_come_late_are_left_out_and_the_stream_keeps_its_time() {
+    let mut bench = bench();
+    bench.desk.begin_stream(1.0, 60).unwrap();
+    let mut source = Source::new([0; 3]);
+    while source.sent < 1000 {
+        source.feed(&mut bench, 1000);
+        bench.ticks(1);
+    }
+    // Until the last one has been taken, and four ticks of nothing.
+    while bench.now().missing_set_points < 4 {
+        bench.ticks(1);
+    }
+    while bench.now().state == MotionState::Running {
+        source.feed(&mut bench, STREAMED);
+        bench.ticks(1);
+    }
+    bench.until_at_rest();
+    let now = bench.now();
+    assert_eq!((now.state, now.raw_nm), (MotionState::Idle, streamed(STREAMED)));
+    // They came in batches, and one that holds any that is still to come is used from there on.
+    assert_eq!((now.missing_set_points, now.late_set_points, now.rejected_set_points), (4, 0, 0));
+    assert!(roughest(&bench) < 6.0, "{}", roughest(&bench));
+}
+
+#[test]
+fn whatever_stops_a_stream_slows_it_down_within_limits() {
+    let stops: [(&str, Stop); 4] = [
+        ("stop", |bench| bench.desk.stop()),
+        ("input", |bench| bench.shared.set_stop_input(true)),
+        ("late", late),
+        ("hold", |bench| bench.desk.hold()),
+    ];
+    for (name, stop) in stops {
+        let mut bench = bench();
+        bench.desk.begin_stream(1.0, 60).unwrap();
+        let mut source = Source::new([0; 3]);
+        for _ in 0..100 {
+            source.feed(&mut bench, STREAMED);
+            bench.ticks(10);
+        }
+        stop(&mut bench);
+        bench.ticks(1);
+        assert_eq!(bench.desk.points(&[]), Err(MotionRefusal::NoProgram), "{name}");
+        bench.until_at_rest();
+        let now = bench.now();
+        // A dead link sends nothing: what has come is followed, and then there is no more.
+        let fault = match name {
+            "late" => Some(FaultCause::Overrun),
+            "hold" => Some(FaultCause::Starved),
+            _ => None,
+        };
+        assert_eq!(now.fault, fault, "{name}");
+        assert_eq!(now.stops, u32::from(name != "hold"), "{name}");
+        assert!(roughest(&bench) < 6.0, "{name}: {}", roughest(&bench));
+        // What was still in the queue moves nothing.
+        let stood = now.raw_nm;
+        bench.ticks(200);
+        assert_eq!((bench.now().raw_nm, bench.now().queued), (stood, 0), "{name}");
+        if fault.is_none() {
+            bench.shared.set_stop_input(false);
+            bench.ticks(1);
+            bench.desk.begin_stream(1.0, 1).unwrap();
+            bench.desk.end().unwrap();
+            bench.until_at_rest();
+            assert_eq!((bench.now().state, bench.now().raw_nm), (MotionState::Idle, stood));
+        }
+    }
+}
+
+#[test]
+fn bytes_that_are_no_set_points_are_refused_and_the_stream_goes_on() {
+    let mut bench = bench();
+    bench.desk.begin_stream(1.0, 1000).unwrap();
+    let far = [0xfe, 0xff, 0xff, 0xff, 0x0f, 0, 0];
+    for bytes in [&[1][..], &[1, 2, 0x80], &[0; 3 * BATCH + 3], &[0xff; 6], &far] {
+        assert_eq!(bench.desk.points(bytes), Err(MotionRefusal::Path(Quantity::Position)), "{bytes:02x?}");
+    }
+    let mut source = Source::new([0; 3]);
+    while bench.now().state == MotionState::Running {
+        source.feed(&mut bench, STREAMED);
+        bench.ticks(5);
+    }
+    bench.until_at_rest();
+    assert_eq!((bench.now().state, bench.now().raw_nm), (MotionState::Idle, streamed(STREAMED)));
+}
