@@ -376,9 +376,12 @@ impl<const N: usize> Stream<N> {
         taken
     }
 
-    /// Near enough to where the path was going: as far as the feed allows, each tick of the gap.
+    /// Near enough to where the path was going: as far as the feed allows, each tick of the gap. While a gap is bridged or
+    /// joined the path is not quite where the set-points are: a tick more.
     fn plausible(&self, s: &StreamSample) -> bool {
-        let most = self.plan.step_nm.saturating_mul(self.missing.saturating_add(2));
+        let apart = self.missing > 0 || self.joining;
+        let ticks = if apart { self.missing.saturating_add(2) } else { 1 };
+        let most = self.plan.step_nm.saturating_mul(ticks);
         let last = self.last_nm();
         s.position_nm.iter().zip(last).all(|(p, last)| p.wrapping_sub(last).unsigned_abs() <= most)
     }

@@ -282,6 +282,32 @@ fn a_radius_that_is_not_there_is_named() {
     assert!(matches!(RadiusFit::new(&few, Options::default()).unwrap_err(), FitError::TooFew { .. }));
 }
 
+/// The scatter comes of the reduction; the points of the runs themselves.
+#[test]
+fn scatter_is_that_of_the_points() {
+    let noise = |k: usize| ((k * 7919) % 41) as f64 * 1e-7;
+    let runs = campaign(PAPER, noise);
+    for train_radius_m in [None, Some(0.15)] {
+        for offset in [Offset::Joint, Offset::LowestSpeed] {
+            let fit =
+                RadiusFit::new(&runs, Options { train_radius_m, offset, ..Options::default() }).unwrap();
+            let points = fit.points(&runs);
+            assert_eq!(points.len(), runs.len());
+            let squares: Vec<f64> =
+                points.iter().filter(|p| p.part == Part::Train).map(|p| p.residual_m().powi(2)).collect();
+            let rms_m = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+            assert_eq!(squares.len(), fit.train.0);
+            assert_close(fit.train.1, rms_m, 1e-9);
+            let (is, wanted): (Vec<_>, _) =
+                (points.iter().filter(|p| p.part == Part::Heldout).collect(), fit.heldout);
+            if train_radius_m.is_some() {
+                let pairs = is.iter().map(|p| (p.measured_m(), p.predicted_m));
+                assert_eq!(Heldout::of(pairs).unwrap().runs, wanted.unwrap().runs);
+            }
+        }
+    }
+}
+
 #[test]
 fn figures_are_drawn_with_every_run_in_them() {
     let mut runs = campaign(PAPER, |_| 0.0);

@@ -148,6 +148,18 @@ fn late_doubled_and_wild_set_points_are_counted_and_do_no_harm() {
     assert!(v < 0.5 && a < 10.0, "{v} {a}");
 }
 
+/// The feed, 1 mm a tick, and 5 % for the rounding of whoever planned it.
+#[test]
+fn a_set_point_may_be_as_far_as_the_feed_and_no_farther() {
+    for (share, rejected) in [(1.0, 0), (1.04, 0), (1.06, 1), (2.0, 1)] {
+        let mut stream: Stream = Stream::new(&plan(), [0; 3], 0, false);
+        for (sequence, x) in [(0, 0.0), (1, share * 1e6)] {
+            stream.tick(Some(StreamSample { sequence, position_nm: [x as i32, 0, 0] }));
+        }
+        assert_eq!(stream.counters().rejected, rejected, "{share} of the feed");
+    }
+}
+
 #[test]
 fn a_lost_stream_comes_to_rest_ramps_out_and_faults() {
     let plan = plan();
