@@ -18,7 +18,8 @@ const ERASE: usize = 512;
 /// Bytes of the flash.
 pub const FLASH: usize = 2 * SLOT + ERASE;
 const LAYOUT: Layout = Layout::new([0, SLOT as u32], SLOT as u32).with_key(2 * SLOT as u32);
-const BOARD: Board = Board { name: "fuzz", build: "0", tick_hz: 1000 };
+/// Slow ticks: a move is as long in seconds, and takes a fourth of the ticks of the boards.
+const BOARD: Board = Board { name: "fuzz", build: "0", tick_hz: 250 };
 
 /// Its flash.
 pub struct Flash {
@@ -204,8 +205,8 @@ impl Bench {
     /// Looks at a set-point; whether it is the same as the one before.
     fn look(&mut self, output: &Output) -> bool {
         const FARTHEST: u32 = (bounds::OFFSET_MAX_M as f64 * 1e9) as u32 + 16;
-        // 10 m/s, the fastest that a configuration may ask for, in a tick of 1 ms.
-        const FASTEST: u32 = 10_000_000;
+        // 10 m/s, the fastest that a configuration may ask for, in a tick.
+        const FASTEST: u32 = (10_000_000_000 / BOARD.tick_hz as u64) as u32;
         let (nominal, corrected) = (output.nominal_nm, output.corrected_nm);
         let apart = |a: [i32; 3], b: [i32; 3]| {
             let [x, y, z] = [0, 1, 2].map(|axis| a[axis].abs_diff(b[axis]));

@@ -122,10 +122,10 @@ impl Talk {
     }
 }
 
-/// Ticks of a wait: as many lengths of a few ticks as of a thousand, up to two thousand.
+/// Ticks of a wait: as many lengths of a few ticks as of hundreds, up to 566, which is 2.3 s.
 fn wait(byte: u8) -> usize {
-    let (doublings, part) = (usize::from(byte) / 23, usize::from(byte) % 23);
-    ((23 + part) << doublings) / 23
+    let (doublings, part) = (usize::from(byte) / 28, usize::from(byte) % 28);
+    ((28 + part) << doublings) / 28
 }
 
 /// Holds the conversation and looks at the state after each step.
