@@ -3,7 +3,7 @@ use super::basis::Basis;
 use super::column::Column;
 use super::item::{Item, Kind};
 use super::ledger::Ledger;
-use super::linear::{Solution, solve};
+use super::linear::{Factor, Solution, solve};
 use super::roughness::Teeth;
 use super::search::columns_of;
 use super::spread::Spread;
@@ -78,8 +78,8 @@ pub fn energies(found: &Explained, weights: &[f64]) -> (Vec<f64>, f64) {
 pub fn energies_of(found: &Explained, weights: &[f64], set: &[usize]) -> (Vec<f64>, f64) {
     let products = found.ledger.plain(weights);
     let gain = |set: &[usize]| {
-        solve(&products, &columns_of(&found.nuisance, &found.items, set))
-            .map_or(0.0, |solution| solution.gain)
+        Factor::new(&products, &columns_of(&found.nuisance, &found.items, set))
+            .map_or(0.0, |factor| factor.gain())
     };
     let whole = gain(set);
     let each = (0..set.len())

@@ -44,15 +44,24 @@ pub fn solve(products: &Products, set: &[usize]) -> Option<Solution> {
 pub struct Factor<'a> {
     products: &'a Products,
     set: Vec<usize>,
-    /// Rows of L of the scaled normal matrix, one behind the other, each followed by its forward solution.
-    rows: Vec<Vec<f64>>,
+    /// Rows of L of the scaled normal matrix, one behind the other.
+    rows: Vec<f64>,
+    /// Of each member: the inverse of its length and of its pivot, and the forward solution.
+    members: Vec<Member>,
     gain: f64,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Member {
+    per_length: f64,
+    per_pivot: f64,
+    forward: f64,
 }
 
 impl<'a> Factor<'a> {
     /// The columns `set` of the summed products (column 0 is the data). `None`: they are not independent.
     pub fn new(products: &'a Products, set: &[usize]) -> Option<Self> {
-        let mut factor = Self { products, set: Vec::new(), rows: Vec::new(), gain: 0.0 };
+        let mut factor = Self { products, set: Vec::new(), rows: Vec::new(), members: Vec::new(), gain: 0.0 };
         set.iter().all(|&column| factor.push(column)).then_some(factor)
     }
 
@@ -63,12 +72,18 @@ impl<'a> Factor<'a> {
 
     /// The gain with further columns. `None`: they are not independent of the set.
     pub fn gain_with(&mut self, further: &[usize]) -> Option<f64> {
+        self.with(further, |factor| factor.gain)
+    }
+
+    /// What is said about the set with further columns, which then leave it. `None`: they are not independent of the set.
+    pub fn with<T>(&mut self, further: &[usize], say: impl FnOnce(&mut Self) -> T) -> Option<T> {
         let (size, gain) = (self.set.len(), self.gain);
-        let whole = further.iter().all(|&column| self.push(column)).then_some(self.gain);
+        let said = further.iter().all(|&column| self.push(column)).then(|| say(self));
         self.set.truncate(size);
-        self.rows.truncate(size);
+        self.members.truncate(size);
+        self.rows.truncate(size * (size + 1) / 2);
         self.gain = gain;
-        whole
+        said
     }
 
     fn push(&mut self, column: usize) -> bool {
@@ -77,24 +92,30 @@ impl<'a> Factor<'a> {
         if !own.is_finite() || own <= 0.0 {
             return false;
         }
-        let n = self.set.len();
-        let mut row = Vec::with_capacity(n + 2);
-        for (i, (&other, earlier)) in self.set.iter().zip(&self.rows).enumerate() {
-            let along: f64 = row.iter().zip(&earlier[..i]).map(|(a, b): (&f64, &f64)| a * b).sum();
-            row.push((p.at(column, other) / (own * p.at(other, other)).sqrt() - along) / earlier[i]);
+        let per_length = 1.0 / own.sqrt();
+        let begin = self.rows.len();
+        let (mut square, mut forward) = (0.0, p.at(column, 0) * per_length);
+        for (i, (&other, member)) in self.set.iter().zip(&self.members).enumerate() {
+            let (earlier, row) = self.rows.split_at(begin);
+            let along: f64 = row.iter().zip(&earlier[i * (i + 1) / 2..]).map(|(a, b)| a * b).sum();
+            let scaled = p.at(column, other) * (per_length * member.per_length);
+            let entry = (scaled - along) * member.per_pivot;
+            self.rows.push(entry);
+            square += entry * entry;
+            forward -= entry * member.forward;
         }
-        let pivot = 1.0 - row.iter().map(|l| l * l).sum::<f64>();
+        let pivot = 1.0 - square;
         // The same bound as in `solve`; not a number fails it too.
         if pivot.is_nan() || pivot < 1e-9 {
+            self.rows.truncate(begin);
             return false;
         }
-        let along: f64 = row.iter().zip(&self.rows).map(|(l, earlier)| l * earlier[earlier.len() - 1]).sum();
-        let forward = (p.at(column, 0) / own.sqrt() - along) / pivot.sqrt();
-        row.push(pivot.sqrt());
-        row.push(forward);
+        let per_pivot = 1.0 / pivot.sqrt();
+        forward *= per_pivot;
+        self.rows.push(pivot.sqrt());
         self.gain += forward * forward;
         self.set.push(column);
-        self.rows.push(row);
+        self.members.push(Member { per_length, per_pivot, forward });
         true
     }
 }

@@ -131,6 +131,11 @@ const FEWEST_RUNS: usize = 6;
 /// # Errors
 /// No runs, or a given model that cannot be simulated.
 pub fn diagnose(campaign: &Campaign, options: &Options) -> Result<Diagnosis, DiagnosisError> {
+    // From within the pool: who stands outside waits for a thread to wake up each time that work is shared.
+    rayon::scope(|_| within_pool(campaign, options))
+}
+
+fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, DiagnosisError> {
     if !campaign.runs.iter().any(|run| run.samples.deviation_m.len() >= 16) {
         return Err(DiagnosisError::Empty);
     }

@@ -5,6 +5,7 @@ use super::item::Kind;
 use super::misfit::of_baseline;
 use super::search::columns_of;
 use crate::campaign::Campaign;
+use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// Sectors of a turn that a profile is averaged over: 2° each.
@@ -34,7 +35,7 @@ pub fn draw(campaign: &Campaign, seen: &Campaign, found: &Explained) -> Vec<RunP
     let left = left_by_simulation(found);
     found
         .runs
-        .iter()
+        .par_iter()
         .enumerate()
         .map(|(at, run)| {
             let theta = &seen.runs[run.index].samples.angle_rad;

@@ -73,14 +73,15 @@ pub fn select(
                 let Some(mut factor) = factor(&base).filter(|_| base.len() + 2 <= MOST) else { continue };
                 let paid = price(&base);
                 for (i, &one) in listed.iter().enumerate() {
-                    for &other in &listed[i + 1..] {
-                        let columns: Vec<usize> =
-                            items[one].columns.iter().chain(&items[other].columns).copied().collect();
-                        if let Some(gain) = factor.gain_with(&columns) {
-                            let value = gain - paid - items[one].price - items[other].price;
-                            consider(value, &base, &[one, other]);
+                    let paid = paid + items[one].price;
+                    let beside = |factor: &mut Factor<'_>| {
+                        for &other in &listed[i + 1..] {
+                            if let Some(gain) = factor.gain_with(&items[other].columns) {
+                                consider(gain - paid - items[other].price, &base, &[one, other]);
+                            }
                         }
-                    }
+                    };
+                    factor.with(&items[one].columns, beside);
                 }
             }
         }

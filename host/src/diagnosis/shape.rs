@@ -272,10 +272,14 @@ impl<'a> Fit<'a> {
     fn products(&self, trials: &[Kind], with: &[usize], over: &[usize]) -> (Products, usize) {
         let base: Vec<usize> = std::iter::once(0).chain(with.iter().copied()).collect();
         let wide: usize = trials.iter().map(Kind::columns).sum();
-        let mut products = Products::zeros(base.len() + wide);
-        for &run in over {
+        let of_run = |&run: &usize| {
+            let mut products = Products::zeros(base.len() + wide);
             self.add_run(trials, &base, run, &mut products);
-        }
+            products
+        };
+        let each: Vec<Products> = over.par_iter().map(of_run).collect();
+        let mut products = Products::zeros(base.len() + wide);
+        each.iter().for_each(|of_run| products.add(1.0, of_run));
         (products, base.len())
     }
 

@@ -10,6 +10,7 @@ use super::tangent;
 use super::tone::{Amplitude, Tone};
 use crate::causes::{Cause, Effect};
 use giotto_shared::Axis;
+use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::collections::BTreeMap;
 
@@ -31,15 +32,14 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
         + clamp.map_or(0.0, |(_, energy)| energy);
     let share = |energy: f64| if total > 0.0 { 100.0 * energy / total } else { 0.0 };
     let rms = |energy: f64| (energy / samples).sqrt() * 1e6;
-    let mut out = Vec::new();
-    for (at, &item) in found.chosen.iter().enumerate() {
-        let Kind::Cause { cause, axis, .. } = &found.items[item].kind else { continue };
+    let stated = |(at, &item): (usize, &usize)| {
+        let Kind::Cause { cause, axis, .. } = &found.items[item].kind else { return None };
         let words = cause.model().words();
         let (value, half) = estimate(found, item);
         let params = parameters(found, item);
         let ci95 = [value - half, value + half];
         let effect = Effect { cause: *cause, axis: *axis, value, ci95, params: params.clone() };
-        out.push(Finding {
+        Some(Finding {
             cause: *cause,
             axis: *axis,
             probability: probability(found, &weights, at),
@@ -52,8 +52,9 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
             note: (*cause == Cause::HigherOrderDynamics).then(|| dynamics_note(found, &weights, at)),
             params,
             effects: vec![effect],
-        });
-    }
+        })
+    };
+    let out = found.chosen.par_iter().enumerate().filter_map(stated).collect();
     let out = without_bent(out, unexplained_energy(found, &each), found);
     let mut out = join_axes(out);
     if let Some((clamp, energy)) = clamp {
