@@ -4,6 +4,9 @@ use super::lanes::{bounds, sum};
 use super::manifest::Entry;
 use super::thinned::Thinned;
 
+/// So many spacings tell what is typical.
+const SPACINGS: usize = 1 << 13;
+
 /// What the time stamps of a run say.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Clock {
@@ -23,7 +26,7 @@ pub(super) struct Stamps {
     last_s: f64,
     distinct: usize,
     backwards: Option<(usize, f64, f64)>,
-    spacings: Thinned<f64>,
+    spacings: Thinned<f64, SPACINGS>,
     largest: Option<(usize, f64)>,
 }
 

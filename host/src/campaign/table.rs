@@ -215,39 +215,52 @@ struct Parsed {
     blank_at: Option<usize>,
 }
 
+/// A column that grows row by row.
+struct Growing {
+    values: Vec<f64>,
+    /// Of the field above.
+    shape: Option<Shape>,
+    factor: f64,
+}
+
 /// Parses whole lines of as many numbers as there are factors to SI; the error is the offset of the line that does not fit.
 fn parse_block(bytes: &[u8], factors: &[f64]) -> Result<Parsed, usize> {
     let width = factors.len();
     let guess = bytes.len() / (6 * width) + 1;
-    let new = |factor: &f64| (Vec::with_capacity(guess), None::<Shape>, *factor);
-    let mut columns: Vec<(Vec<f64>, Option<Shape>, f64)> = factors.iter().map(new).collect();
+    let new = |&factor: &f64| Growing { values: Vec::with_capacity(guess), shape: None, factor };
+    let mut columns: Vec<Growing> = factors.iter().map(new).collect();
     let (mut at, mut rows, mut blank_at) = (0, 0, None);
     'rows: while at < bytes.len() {
         let line = at;
-        for (field, (column, above, factor)) in columns.iter_mut().enumerate() {
-            let like_above = above.as_ref().and_then(|shape| shape.read(bytes, at));
-            let (value, next) = match like_above {
-                Some(found) => found,
-                None if field == 0 && is_blank(bytes, at) => {
-                    // Blank lines may end a file, not divide it.
-                    if !bytes[at..].iter().all(u8::is_ascii_whitespace) {
-                        return Err(at);
-                    }
-                    blank_at = Some(at);
-                    break 'rows;
+        for (field, column) in columns.iter_mut().enumerate() {
+            let like_above = column.shape.as_ref().and_then(|shape| shape.read(bytes, at));
+            if let Some((value, next)) = like_above {
+                column.values.push(value * column.factor);
+                at = next;
+                continue;
+            }
+            if field == 0 && is_blank(bytes, at) {
+                // Blank lines may end a file, not divide it.
+                if !bytes[at..].iter().all(u8::is_ascii_whitespace) {
+                    return Err(at);
                 }
-                None => {
-                    let found = parse_field(bytes, at, field + 1 == width).ok_or(line)?;
-                    *above = Shape::of(&bytes[at..found.1]);
-                    found
-                }
-            };
-            column.push(value * *factor);
-            at = next;
+                blank_at = Some(at);
+                break 'rows;
+            }
+            at = parse_unlike(column, bytes, at, field + 1 == width).ok_or(line)?;
         }
         rows += 1;
     }
-    Ok(Parsed { columns: columns.into_iter().map(|column| column.0).collect(), rows, blank_at })
+    Ok(Parsed { columns: columns.into_iter().map(|column| column.values).collect(), rows, blank_at })
+}
+
+/// A field of any shape into its column; the byte behind its end.
+#[cold]
+fn parse_unlike(column: &mut Growing, bytes: &[u8], at: usize, last: bool) -> Option<usize> {
+    let (value, next) = parse_field(bytes, at, last)?;
+    column.shape = Shape::of(&bytes[at..next]);
+    column.values.push(value * column.factor);
+    Some(next)
 }
 
 /// Whether the line at `at` is empty.

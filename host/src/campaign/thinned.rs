@@ -1,23 +1,20 @@
 //! Every n-th of a sequence whose length is not known before its end.
 
-/// Most values kept.
-const MOST: usize = 1 << 16;
-
-/// Keeps value 0, s, 2s, … of what is pushed, s the smallest power of two for which they are no more than 65 536.
+/// Keeps value 0, s, 2s, … of what is pushed, s the smallest power of two for which they are no more than `MOST`.
 #[derive(Clone, Debug)]
-pub(super) struct Thinned<T> {
+pub(super) struct Thinned<T, const MOST: usize = 65_536> {
     values: Vec<T>,
     stride: usize,
     pushed: usize,
 }
 
-impl<T> Default for Thinned<T> {
+impl<T, const MOST: usize> Default for Thinned<T, MOST> {
     fn default() -> Self {
         Self { values: Vec::new(), stride: 1, pushed: 0 }
     }
 }
 
-impl<T: Copy> Thinned<T> {
+impl<T: Copy, const MOST: usize> Thinned<T, MOST> {
     /// The next value.
     pub(super) fn push(&mut self, value: T) {
         self.extend(1, |_| value);
@@ -66,10 +63,12 @@ impl<T: Copy> Thinned<T> {
 mod tests {
     use super::*;
 
+    const MOST: usize = 1024;
+
     #[test]
     fn keeps_every_nth_and_knows_which() {
         for n in [1, 5, MOST, MOST + 1, 3 * MOST + 7, 40 * MOST] {
-            let (mut thinned, mut blocks) = (Thinned::default(), Thinned::default());
+            let (mut thinned, mut blocks) = (Thinned::<_, MOST>::default(), Thinned::<_, MOST>::default());
             (0..n).for_each(|k| thinned.push(k));
             (0..n).step_by(1000).for_each(|from| blocks.extend(1000.min(n - from), |k| from + k));
             assert!(thinned.iter().eq(blocks.iter()));
