@@ -99,6 +99,16 @@ fn what_has_no_name_is_left_unexplained() {
     all_exact(&[effects(&["unknown_third"]), effects(&["unknown_bump"]), effects(&["unknown_four_lobes"])]);
 }
 
+/// What comes and goes in time takes many patterns, and a small bow of a guide would fit beside them.
+#[test]
+fn a_piece_of_what_has_no_name_gets_none() {
+    for seed in [1_910_744_070_355_028_229, 1_910_744_070_355_028_237] {
+        let case = Case::new(&effects(&["unknown_transient"]), 3.0, seed, Variety::Usual).unwrap();
+        let verdict = judge(&case, &answer(&case));
+        assert!(verdict.exact && verdict.false_findings.is_empty(), "seed {seed}: {}", verdict.said);
+    }
+}
+
 #[test]
 fn the_papers_machine_shows_its_higher_order() {
     let (case, v) = ask(&effects(&["higher_order_dynamics"]), 30.0, 3);

@@ -9,8 +9,9 @@ from signatures import CAUSES, SHAPED
 
 # No probability is certain; one of even odds, give or take rounding, is none.
 HIGHEST, EVEN = 0.999, 0.5 - 1e-6
-# So many patterns side by side are pieces of one thing that none of them describes.
-PIECES = 3
+# So many patterns side by side are pieces of one thing that none of them describes; what a cause beside them, without and with
+# shapes, must have of their rms.
+PIECES, LARGER_THAN_PIECES = 3, (1 / 3, 3)
 # Ratio of variances, by the runs and by the model, above which the former is believed.
 ROBUST = 1.5
 # Evidence within which another cause would explain the data nearly as well.
@@ -56,12 +57,12 @@ def findings(found, clamp, clamp_energy_m2):
     def bent(finding):
         """Whether the best set does without it, or it may be a piece of something unlisted, or of teeth."""
         flexible = finding.cause in SHAPED or finding.cause == "lateral_play"
-        piece = pieces >= PIECES and finding.rms_um < 3 * rms(unexplained)
+        piece = pieces >= PIECES and finding.rms_um < LARGER_THAN_PIECES[flexible] * rms(unexplained)
         smear = any(
             teeth.axis == finding.axis and finding.rms_um < 0.25 * rms(energy)
             for teeth, energy in zip(found.teeth, teeth_energies)
         )
-        return finding.probability < EVEN or (flexible and (piece or smear))
+        return finding.probability < EVEN or piece or (flexible and smear)
 
     out = joined([finding for finding in out if not bent(finding)])
     if clamp:

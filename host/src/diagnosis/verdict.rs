@@ -102,9 +102,12 @@ const PIECES: usize = 3;
 /// A look-alike that explains these data to the last digit leaves even odds, give or take rounding.
 const EVEN: f64 = 0.5 - 1e-6;
 
-/// Takes out findings that the best set does without, and flexible ones that may be pieces of something
-/// unlisted: where three patterns or more were needed, a cause with shape parameters counts only if it is far larger
-/// than all of them.
+/// Against all patterns, rms: below, a cause beside so many of them may be a further piece. One with shape parameters fits more.
+const LARGER_THAN_PIECES: [f64; 2] = [1.0 / 3.0, 3.0];
+
+/// Takes out findings that the best set does without, and those that may be pieces of something unlisted: where three
+/// patterns or more were needed, a cause counts only if it is not far smaller than all of them, and one with shape parameters
+/// only if it is far larger.
 fn without_bent(findings: Vec<Finding>, (pieces, energy): (usize, f64), found: &Explained) -> Vec<Finding> {
     let samples: f64 = found.runs.iter().map(|run| run.deviation_m.len() as f64).sum();
     let unexplained_um = (energy / samples).sqrt() * 1e6;
@@ -112,7 +115,8 @@ fn without_bent(findings: Vec<Finding>, (pieces, energy): (usize, f64), found: &
         .into_iter()
         .filter(|f| {
             let flexible = !f.cause.model().shape_names().is_empty() || f.cause == Cause::LateralPlay;
-            let piece = flexible && pieces >= PIECES && f.rms_um < 3.0 * unexplained_um;
+            let larger = LARGER_THAN_PIECES[usize::from(flexible)];
+            let piece = pieces >= PIECES && f.rms_um < larger * unexplained_um;
             // Teeth smear out of the zone in which they are hidden.
             let smear = flexible
                 && found.teeth.iter().filter(|teeth| f.axis == Some(teeth.axis)).any(|teeth| {
