@@ -99,6 +99,16 @@ fn what_has_no_name_is_left_unexplained() {
     all_exact(&[effects(&["unknown_third"]), effects(&["unknown_bump"]), effects(&["unknown_four_lobes"])]);
 }
 
+/// A loud tone is found where teeth make everything rough: its own leakage does not hide it.
+#[test]
+fn a_loud_vibration_beside_teeth_is_named() {
+    for seed in [13_665_450_784_219_763_352, 13_665_450_784_219_763_345] {
+        let case = Case::new(&effects(&["vibration", "stick_slip"]), 3.0, seed, Variety::Broad).unwrap();
+        let verdict = judge(&case, &answer(&case));
+        assert!(verdict.exact && verdict.false_findings.is_empty(), "seed {seed}: {}", verdict.said);
+    }
+}
+
 /// What comes and goes in time takes many patterns, and a small bow of a guide would fit beside them.
 #[test]
 fn a_piece_of_what_has_no_name_gets_none() {

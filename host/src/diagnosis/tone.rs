@@ -55,6 +55,9 @@ const PAD: usize = 4;
 const SAME: f64 = 0.03;
 /// Standard errors above both noise and floor that make a tone.
 const SIGNIFICANT: f64 = 8.0;
+/// Share of the runs that is nearly every one; waves a turn to the side of a tone where nothing of it is left.
+const NEARLY_EVERY: f64 = 0.8;
+const ASIDE_WAVES: f64 = 4.0;
 
 struct Spectrum {
     turn_s: f64,
@@ -107,7 +110,7 @@ pub fn find(runs: &[Prepared], residual: &Column, spread: &Spread) -> Option<Ton
             let frequency = i as f64 * step;
             let (mut sum, mut count, mut loud) = (0.0, 0usize, 0usize);
             for s in &spectra {
-                if frequency < 0.95 * s.nyquist_hz && frequency * s.turn_s > FEWEST_WAVES {
+                if s.sees(frequency) {
                     let power = s.at(frequency);
                     sum += power.min(CAP);
                     count += 1;
@@ -124,13 +127,19 @@ pub fn find(runs: &[Prepared], residual: &Column, spread: &Spread) -> Option<Ton
     levels.sort_by(f64::total_cmp);
     let floor = levels[levels.len() / 2];
     let width = (levels[levels.len() * 84 / 100] - floor).max(1e-9);
+    // Where much else is rough, a capped mean is never far above it: a tone that nearly every run shows is one all the same.
+    let shown = |hz: f64, count: usize| {
+        let those = spectra.iter().filter(|s| s.sees(hz) && s.stands_out(hz)).count();
+        those as f64 > NEARLY_EVERY * count as f64
+    };
     let best = grid
         .iter()
-        .filter(|(_, mean, count, loud)| {
+        .filter(|(frequency, mean, count, loud)| {
             let expected = 2.0 / (*count as f64).sqrt();
             (mean - 2.0) / expected > SIGNIFICANT
-                && (mean - floor) / width > SIGNIFICANT
                 && *loud >= 4.max(count / 6)
+                && ((mean - floor) / width > SIGNIFICANT
+                    || (*mean > NEARLY_EVERY * CAP && shown(*frequency, *count)))
         })
         .max_by(|a, b| (a.1 * (a.2 as f64).sqrt()).total_cmp(&(b.1 * (b.2 as f64).sqrt())))?;
     refine(runs, &clean, spread, best.0, step, residual)
@@ -321,12 +330,17 @@ fn padded(samples: usize) -> usize {
     (PAD * samples).next_power_of_two()
 }
 
+/// Through a Hann window, or a loud tone hides in its own leakage: a run is no whole number of its waves.
 fn spectrum(clean: &Clean<'_>, transform: &Arc<dyn Fft<f64>>, noise_m2: f64) -> Spectrum {
     let (n, length) = (clean.samples.len(), transform.len());
-    let mut buffer: Vec<Complex<f64>> = clean.samples.iter().map(|&x| Complex::new(x, 0.0)).collect();
+    let step_rad = std::f64::consts::TAU / n as f64;
+    let hann = |i: usize| 1.0 - (step_rad * (i as f64 + 0.5)).cos();
+    let mut buffer: Vec<Complex<f64>> =
+        clean.samples.iter().enumerate().map(|(i, &x)| Complex::new(x * hann(i), 0.0)).collect();
     buffer.resize(length, Complex::default());
     transform.process(&mut buffer);
-    let scale = 2.0 / (n as f64 * noise_m2);
+    // The mean square of the window is 3/2.
+    let scale = 2.0 / (1.5 * n as f64 * noise_m2);
     Spectrum {
         turn_s: clean.turn_s,
         nyquist_hz: 0.5 * n as f64 / clean.turn_s,
@@ -336,6 +350,17 @@ fn spectrum(clean: &Clean<'_>, transform: &Arc<dyn Fft<f64>>, noise_m2: f64) -> 
 }
 
 impl Spectrum {
+    /// Whether a tone of this frequency is faster than the low orders, and slow enough for the sampling.
+    fn sees(&self, hz: f64) -> bool {
+        hz < 0.95 * self.nyquist_hz && hz * self.turn_s > FEWEST_WAVES
+    }
+
+    /// Whether there is far more here than a few waves a turn to either side.
+    fn stands_out(&self, hz: f64) -> bool {
+        let aside = ASIDE_WAVES / self.turn_s;
+        self.at(hz) > 4.0 * (1.0 + self.at(hz - aside) + self.at(hz + aside))
+    }
+
     fn at(&self, hz: f64) -> f64 {
         self.power.get((hz / self.step_hz).round() as usize).copied().unwrap_or(0.0)
     }
