@@ -330,23 +330,28 @@ fn padded(samples: usize) -> usize {
     (PAD * samples).next_power_of_two()
 }
 
-/// Through a Hann window, or a loud tone hides in its own leakage: a run is no whole number of its waves.
 fn spectrum(clean: &Clean<'_>, transform: &Arc<dyn Fft<f64>>, noise_m2: f64) -> Spectrum {
     let (n, length) = (clean.samples.len(), transform.len());
-    let step_rad = std::f64::consts::TAU / n as f64;
-    let hann = |i: usize| 1.0 - (step_rad * (i as f64 + 0.5)).cos();
-    let mut buffer: Vec<Complex<f64>> =
-        clean.samples.iter().enumerate().map(|(i, &x)| Complex::new(x * hann(i), 0.0)).collect();
-    buffer.resize(length, Complex::default());
-    transform.process(&mut buffer);
-    // The mean square of the window is 3/2.
-    let scale = 2.0 / (1.5 * n as f64 * noise_m2);
     Spectrum {
         turn_s: clean.turn_s,
         nyquist_hz: 0.5 * n as f64 / clean.turn_s,
-        power: buffer[..length / 2].iter().map(|x| scale * x.norm_sqr()).collect(),
+        power: powers(clean.samples, transform, noise_m2),
         step_hz: n as f64 / (clean.turn_s * length as f64),
     }
+}
+
+/// Powers of the transformed samples in units of χ²₂. Through a Hann window, or a loud tone hides in its own leakage: a run
+/// is no whole number of its waves.
+fn powers(samples: &[f64], transform: &Arc<dyn Fft<f64>>, noise_m2: f64) -> Vec<f64> {
+    let n = samples.len() as f64;
+    let hann = |i: usize| 1.0 - (std::f64::consts::TAU / n * (i as f64 + 0.5)).cos();
+    let mut buffer: Vec<Complex<f64>> =
+        samples.iter().enumerate().map(|(i, &x)| Complex::new(x * hann(i), 0.0)).collect();
+    buffer.resize(transform.len(), Complex::default());
+    transform.process(&mut buffer);
+    // The mean square of the window is 3/2.
+    let scale = 2.0 / (1.5 * n * noise_m2);
+    buffer[..transform.len() / 2].iter().map(|x| scale * x.norm_sqr()).collect()
 }
 
 impl Spectrum {
@@ -385,4 +390,55 @@ fn loudness(axis: Option<Axis>) -> f64 {
 fn power(samples: &[f64], turn_s: f64, hz: f64, noise_m2: f64) -> f64 {
     let [re, im] = wave_sum(samples, std::f64::consts::TAU * hz * turn_s / samples.len() as f64);
     2.0 * (re * re + im * im) / (samples.len() as f64 * noise_m2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    /// A run of 400 samples in 2 s with this spectrum at multiples of 1/8 Hz.
+    fn spectrum_of(power: impl Fn(f64) -> f64) -> Spectrum {
+        let step_hz = 0.125;
+        let power = (0..800).map(|line| power(f64::from(line) * step_hz)).collect();
+        Spectrum { turn_s: 2.0, nyquist_hz: 100.0, power, step_hz }
+    }
+
+    #[test]
+    fn noise_has_power_two_and_a_loud_tone_does_not_leak() {
+        let transform = FftPlanner::new().plan_fft_forward(padded(1000));
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let noise: Vec<f64> = (0..1000).map(|_| 3.0 * random.sample::<f64, _>(StandardNormal)).collect();
+        let powers_of = |samples: &[f64]| powers(samples, &transform, 9.0);
+        let levels = powers_of(&noise);
+        let mean = levels.iter().sum::<f64>() / levels.len() as f64;
+        assert!((mean - 2.0).abs() < 0.2, "{mean}");
+        // Thirty waves and a half: n·A²/2σ² = 5556 without a window, two thirds of it with one.
+        let tone: Vec<f64> =
+            (0..1000).map(|i| 10.0 * (std::f64::consts::TAU * 30.5e-3 * f64::from(i)).sin()).collect();
+        let levels = powers_of(&tone);
+        let line = |waves: f64| levels[(waves * transform.len() as f64 * 1e-3).round() as usize];
+        assert!((line(30.5) / (5555.6 * 2.0 / 3.0) - 1.0).abs() < 0.02, "{}", line(30.5));
+        assert!((12..200).filter(|k| !(24..=37).contains(k)).all(|k| line(f64::from(k)) < 1.0));
+    }
+
+    #[test]
+    fn a_tone_stands_out_from_beside_it_and_a_slope_does_not() {
+        // The main lobe of a Hann window is two waves a turn wide to either side: 1 Hz.
+        let tone = |loud: f64| spectrum_of(move |hz| if (hz - 30.0).abs() < 1.0 { loud } else { 0.5 });
+        assert!(tone(9.0).stands_out(30.0));
+        // Four times what is beside it and the noise, 1 + 0.5 + 0.5.
+        assert!(tone(8.5).stands_out(30.0) && !tone(7.5).stands_out(30.0));
+        assert!(!tone(1e6).stands_out(32.0), "two hertz beside it");
+        assert!(!spectrum_of(|hz| 1e6 / (hz * hz + 1.0)).stands_out(30.0), "the foot of something slow");
+        assert!(!spectrum_of(|_| 1e6).stands_out(30.0), "loud everywhere");
+    }
+
+    #[test]
+    fn a_tone_is_seen_between_the_low_orders_and_the_sampling() {
+        let run = spectrum_of(|_| 2.0);
+        assert!(!run.sees(4.5) && run.sees(5.0) && run.sees(94.0) && !run.sees(96.0));
+    }
 }

@@ -115,8 +115,7 @@ fn without_bent(findings: Vec<Finding>, (pieces, energy): (usize, f64), found: &
         .into_iter()
         .filter(|f| {
             let flexible = !f.cause.model().shape_names().is_empty() || f.cause == Cause::LateralPlay;
-            let larger = LARGER_THAN_PIECES[usize::from(flexible)];
-            let piece = pieces >= PIECES && f.rms_um < larger * unexplained_um;
+            let piece = is_piece(f.rms_um, flexible, pieces, unexplained_um);
             // Teeth smear out of the zone in which they are hidden.
             let smear = flexible
                 && found.teeth.iter().filter(|teeth| f.axis == Some(teeth.axis)).any(|teeth| {
@@ -126,6 +125,11 @@ fn without_bent(findings: Vec<Finding>, (pieces, energy): (usize, f64), found: &
             f.probability >= EVEN && !piece && !smear
         })
         .collect()
+}
+
+/// Whether a cause of so much rms may be one more piece of what so many patterns describe.
+fn is_piece(rms_um: f64, flexible: bool, pieces: usize, unexplained_um: f64) -> bool {
+    pieces >= PIECES && rms_um < LARGER_THAN_PIECES[usize::from(flexible)] * unexplained_um
 }
 
 #[allow(clippy::too_many_arguments, reason = "one line a field")]
@@ -413,4 +417,19 @@ fn alike(a: &Finding, b: &Finding) -> bool {
     let width = |f: &Finding| f.estimate.ci95[1] - f.estimate.ci95[0];
     let off = (a.estimate.value - b.estimate.value).abs();
     off < width(a) + width(b) || off < 0.1 * a.estimate.value.abs()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_are_small_beside_many_patterns() {
+        // A third of the patterns' rms without shapes, three times with.
+        for (flexible, bound_um) in [(false, 0.5), (true, 4.5)] {
+            assert!(is_piece(0.95 * bound_um, flexible, 3, 1.5));
+            assert!(!is_piece(1.05 * bound_um, flexible, 3, 1.5));
+            assert!(!is_piece(0.01 * bound_um, flexible, 2, 1.5), "two patterns are no pieces");
+        }
+    }
 }

@@ -28,6 +28,7 @@ pub struct StreamPlan {
 const WEIGHT_BITS: u32 = 24;
 /// What a product of a weight and a difference lacks.
 const SCALE: i32 = 1 << (32 - WEIGHT_BITS);
+
 /// What a plan is made from.
 pub(crate) struct StreamNeeds {
     pub(crate) epoch: u8,
