@@ -426,12 +426,16 @@ mod tests {
 
     #[test]
     fn a_tone_stands_out_from_beside_it_and_a_slope_does_not() {
-        // The main lobe of a Hann window is two waves a turn wide to either side: 1 Hz.
-        let tone = |loud: f64| spectrum_of(move |hz| if (hz - 30.0).abs() < 1.0 { loud } else { 0.5 });
+        let around = |waves: f64, loud: f64| {
+            spectrum_of(move |hz| if (hz - 30.0).abs() <= waves / 2.0 { loud } else { 0.5 })
+        };
+        // The main lobe of a Hann window, two waves a turn to either side, and the sidebands of a swing along an axis.
+        let tone = |loud: f64| around(3.0, loud);
         assert!(tone(9.0).stands_out(30.0));
         // Four times what is beside it and the noise, 1 + 0.5 + 0.5.
         assert!(tone(8.5).stands_out(30.0) && !tone(7.5).stands_out(30.0));
-        assert!(!tone(1e6).stands_out(32.0), "two hertz beside it");
+        assert!(!tone(1e6).stands_out(32.0), "four waves beside it");
+        assert!(!around(5.0, 1e6).stands_out(30.0), "wider than any tone");
         assert!(!spectrum_of(|hz| 1e6 / (hz * hz + 1.0)).stands_out(30.0), "the foot of something slow");
         assert!(!spectrum_of(|_| 1e6).stands_out(30.0), "loud everywhere");
     }
