@@ -41,6 +41,23 @@ fn read(x: &[f64], y: &[f64]) -> f64 {
     x.par_chunks(32768).zip(y.par_chunks(32768)).map(|(x, y)| sum(x) + sum(y)).sum()
 }
 
+/// How often a work of this size is repeated within a round, by every contender: a clock has a grain, and the first time
+/// after a wait is that of a cold machine.
+pub(crate) fn repeats(size: usize) -> usize {
+    (100_000 / size).clamp(1, 20)
+}
+
+/// As [`timed`], the mean of several times in a row.
+pub(crate) fn timed_again<T>(times: usize, mut work: impl FnMut() -> T) -> (f64, T) {
+    let (seconds, value) = timed(|| {
+        (1..times).for_each(|_| {
+            black_box(work());
+        });
+        work()
+    });
+    (seconds / times as f64, value)
+}
+
 pub(crate) fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
     let start = Instant::now();
     let value = black_box(work());
@@ -72,22 +89,14 @@ pub(crate) fn run(peers: &mut Peers) -> Result<Table, Error> {
         let mut times: [Times; 4] = std::array::from_fn(|_| Times::default());
         let rounds = if n > LARGEST_FOR_PEERS { 25 } else { 11 };
         for _ in 0..rounds {
-            // Small works are repeated within a round: a clock has a grain.
-            let repeats = (100_000 / n).clamp(1, 20);
-            let (seconds, fit) = timed(|| {
-                (1..repeats).for_each(|_| {
-                    let _ = black_box(fit_circle(&x, &y));
-                });
-                fit_circle(&x, &y)
-            });
+            let repeats = repeats(n);
+            let (seconds, fit) = timed_again(repeats, || fit_circle(&x, &y));
             let radius = fit?.circle.radius;
-            times[0].push(seconds / repeats as f64);
-            times[1].push(
-                timed(|| (0..repeats).map(|_| read(black_box(&x), &y)).sum::<f64>()).0 / repeats as f64,
-            );
+            times[0].push(seconds);
+            times[1].push(timed_again(repeats, || read(black_box(&x), &y)).0);
             if n <= LARGEST_FOR_PEERS {
                 for (k, peer) in ["circle-fit", "scipy"].into_iter().enumerate() {
-                    let (seconds, found) = peers.run(peer, &data)?;
+                    let (seconds, found) = peers.repeat(peer, repeats, &data)?;
                     if (found[2] / radius - 1.0).abs() > SAME {
                         return Err(format!(
                             "{peer} finds a radius of {} where giotto finds {radius}",

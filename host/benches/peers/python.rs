@@ -70,7 +70,17 @@ impl Peers {
 
     /// Runs one peer once: seconds that it took, and what it found.
     pub(crate) fn run(&mut self, peer: &str, data: &Value) -> Result<(f64, Vec<f64>), Error> {
-        writeln!(self.input, "{}", json!({ "peer": peer, "data": data }))?;
+        self.repeat(peer, 1, data)
+    }
+
+    /// Runs one peer several times in a row: seconds that it took on average, and what it found last.
+    pub(crate) fn repeat(
+        &mut self,
+        peer: &str,
+        times: usize,
+        data: &Value,
+    ) -> Result<(f64, Vec<f64>), Error> {
+        writeln!(self.input, "{}", json!({ "peer": peer, "times": times, "data": data }))?;
         let answer = self.answer()?;
         let seconds = answer["seconds"].as_f64().ok_or("no time in the answer")?;
         let value = answer["value"].as_array().ok_or("no value in the answer")?;

@@ -1,6 +1,6 @@
 //! Stepwise fit with intervals: statsmodels.
 use crate::Error;
-use crate::circle::{store, timed};
+use crate::circle::{repeats, store, timed_again};
 use crate::python::Peers;
 use crate::table::{Table, Times};
 use giotto::fit::{Observation, Options, RadiusFit};
@@ -45,10 +45,10 @@ pub(crate) fn run(peers: &mut Peers) -> Result<Table, Error> {
         });
         let (mut ours, mut theirs) = (Times::default(), Times::default());
         for _ in 0..ROUNDS {
-            let (seconds, fit) = timed(|| RadiusFit::new(&runs, Options::default()));
+            let (seconds, fit) = timed_again(repeats(n), || RadiusFit::new(&runs, Options::default()));
             let fit = fit?;
             ours.push(seconds);
-            let (seconds, found) = peers.run("statsmodels", &data)?;
+            let (seconds, found) = peers.repeat("statsmodels", repeats(n), &data)?;
             theirs.push(seconds);
             let [b1, b2] = [fit.model.beta1_s2, fit.model.beta2_s4];
             let value = [

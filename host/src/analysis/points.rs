@@ -1,5 +1,6 @@
 //! Polar samples as points of the plane, computed on each walk.
-use giotto_shared::circle::{BLOCK, Merge, Points};
+use crate::fit::lanes;
+use giotto_shared::circle::{BLOCK, Merge, Part, Points, Walk};
 use rayon::prelude::*;
 
 /// Blocks that one task sums: long runs are walked in parallel, in the same order of summation whatever
@@ -33,26 +34,30 @@ impl<'a> Polar<'a> {
         Some((means(angle), means(deviation)))
     }
 
-    fn block<S>(&self, angle: &[f64], deviation: &[f64], part: &impl Fn(&[f64], &[f64]) -> S) -> S {
+    fn block<P: Part>(&self, angle: &[f64], deviation: &[f64], part: &P) -> P::Sum {
         let (mut x, mut y) = ([0.0; BLOCK], [0.0; BLOCK]);
         let n = angle.len();
         for (k, (a, v)) in angle.iter().zip(deviation).enumerate() {
             let ((sin, cos), r) = (a.sin_cos(), self.radius_m + v);
             (x[k], y[k]) = (r * cos, r * sin);
         }
-        part(&x[..n], &y[..n])
+        lanes::sum(part, Walk::ALL, &x[..n], &y[..n])
     }
 
     /// Sums over blocks of (angle, deviation), in order.
     pub fn fold<S: Merge>(&self, part: impl Fn(&[f64], &[f64]) -> S + Sync) -> S {
+        self.fold_walk(Walk::ALL, part)
+    }
+
+    fn fold_walk<S: Merge>(&self, walk: Walk, part: impl Fn(&[f64], &[f64]) -> S + Sync) -> S {
         let mut total = S::default();
         for (angle, deviation) in &self.parts {
             let task = |(a, v): (&[f64], &[f64])| {
                 let mut sum = S::default();
-                a.chunks(BLOCK).zip(v.chunks(BLOCK)).for_each(|(a, v)| sum.merge(&part(a, v)));
+                walk.blocks(a, v).for_each(|(a, v)| sum.merge(&part(a, v)));
                 sum
             };
-            let size = BLOCK * BLOCKS_A_TASK;
+            let size = BLOCKS_A_TASK * walk.of;
             if angle.len() <= size {
                 total.merge(&task((angle, deviation)));
             } else {
@@ -69,19 +74,7 @@ impl Points for Polar<'_> {
         self.parts.iter().map(|(a, _)| a.len()).sum()
     }
 
-    fn sum<S: Merge>(&self, part: impl Fn(&[f64], &[f64]) -> S + Sync) -> S {
-        self.fold(|angle, deviation| self.block(angle, deviation, &part))
-    }
-
-    fn at(&self, index: usize) -> Option<[f64; 2]> {
-        let mut index = index;
-        for (angle, deviation) in &self.parts {
-            if let (Some(a), Some(v)) = (angle.get(index), deviation.get(index)) {
-                let ((sin, cos), r) = (a.sin_cos(), self.radius_m + v);
-                return Some([r * cos, r * sin]);
-            }
-            index -= angle.len();
-        }
-        None
+    fn sum<P: Part>(&self, walk: Walk, part: &P) -> P::Sum {
+        self.fold_walk(walk, |angle, deviation| self.block(angle, deviation, part))
     }
 }

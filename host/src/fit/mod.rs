@@ -8,6 +8,7 @@
 //! | `stepwise` | [`stepwise`](stepwise()): enter and remove by partial F (Eq. 4–11, 17–19) |
 //! | `quantile` | critical values of F and t |
 //! | `circle` | the geometric circle fit on all cores |
+//! | `lanes` | sums over points with the vectors that this processor has |
 //! | `radius` | [`RadiusFit`]: β1, β2 with intervals (Eq. 15–16, 20–21), offsets, prediction of radii not used |
 //! | `heldout` | how well circles that were not fitted are predicted |
 //! | `figures` | the paper's Figures 8–11 as SVG |
@@ -18,6 +19,7 @@ mod by_radius;
 mod circle;
 mod figures;
 mod heldout;
+pub(crate) mod lanes;
 mod least_squares;
 mod quantile;
 mod radius;
@@ -27,7 +29,7 @@ mod stepwise;
 #[allow(clippy::excessive_precision, reason = "reference numbers are quoted as published")]
 mod tests;
 
-pub use circle::{PARALLEL_CHUNK, Parallel, fit_circle};
+pub use circle::{Parallel, fit_circle};
 pub use figures::{Figure, FigureError, figures};
 pub use heldout::Heldout;
 pub use least_squares::{LeastSquares, Triangle};

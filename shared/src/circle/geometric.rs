@@ -6,12 +6,11 @@
 //!
 //! ∇f = −Σ e n,  ∇²f = N·1 − d̄ Σ(1/d)(1 − nnᵀ) − (Σn)(Σn)ᵀ/N.
 use super::algebraic::hyper;
-use super::lanes::sums;
+use super::lanes::{Four, Lanes, Terms, sums};
 use super::moments::Moments;
-use super::points::{Merge, Points};
+use super::points::{Merge, Part, Points, Walk};
 use super::{Circle, CircleError};
 use num_traits::Float;
-use wide::f64x4;
 
 /// Most passes over the points.
 const MAX_PASSES: usize = 100;
@@ -62,13 +61,47 @@ impl CircleFit {
 
 /// Sums of one pass: e = d − r, n = (p, q), w = 1/d.
 #[derive(Clone, Copy, Default)]
-struct Sums([f64; 9]);
+struct Sums {
+    count: usize,
+    of: [f64; 9],
+}
 
 impl Merge for Sums {
     fn merge(&mut self, other: &Self) {
-        for (a, b) in self.0.iter_mut().zip(&other.0) {
+        self.count += other.count;
+        for (a, b) in self.of.iter_mut().zip(&other.of) {
             *a += b;
         }
+    }
+}
+
+/// A pass about a circle whose centre is given from `origin`.
+struct About {
+    origin: [f64; 2],
+    centre: [f64; 2],
+    radius: f64,
+}
+
+impl Part for About {
+    type Sum = Sums;
+
+    #[inline(always)]
+    fn of<L: Lanes>(&self, lanes: L, x: &[f64], y: &[f64]) -> Sums {
+        Sums { count: x.len(), of: sums(lanes, x, y, self) }
+    }
+}
+
+impl Terms<9> for About {
+    #[inline(always)]
+    fn of<L: Lanes>(&self, lanes: L, x: L::Four, y: L::Four) -> [L::Four; 9] {
+        let u = (x - lanes.splat(self.origin[0])) - lanes.splat(self.centre[0]);
+        let v = (y - lanes.splat(self.origin[1])) - lanes.splat(self.centre[1]);
+        let d = (u * u + v * v).sqrt();
+        // A point on the centre has no direction; keep its 1/d finite.
+        let w = lanes.splat(1.0) / d.max(lanes.splat(1e-9 * self.radius));
+        let (p, q, e) = (u * w, v * w, d - lanes.splat(self.radius));
+        let wp = w * p;
+        [e, e * e, p, q, e * p, e * q, w, wp * p, wp * q]
     }
 }
 
@@ -83,7 +116,7 @@ struct Step {
 /// What one pass tells about f at a centre.
 #[derive(Clone, Copy)]
 struct Surface {
-    n: f64,
+    count: usize,
     /// Best radius, d̄.
     radius: f64,
     /// Σ(d − d̄)².
@@ -96,33 +129,24 @@ struct Surface {
 }
 
 impl Surface {
-    fn at(points: &(impl Points + ?Sized), origin: [f64; 2], centre: [f64; 2], radius: f64) -> Self {
-        // A point on the centre has no direction; keep its 1/d finite.
-        let nearest = 1e-9 * radius;
-        let [origin_x, origin_y] = origin.map(f64x4::splat);
-        let [centre_x, centre_y] = centre.map(f64x4::splat);
-        let (guess, nearest, one) = (f64x4::splat(radius), f64x4::splat(nearest), f64x4::splat(1.0));
-        let Sums([e, ee, p, q, ep, eq, w, wpp, wpq]) = points.sum(|x, y| {
-            Sums(sums(x, y, |x, y| {
-                let (u, v) = ((x - origin_x) - centre_x, (y - origin_y) - centre_y);
-                let d = (u * u + v * v).sqrt();
-                let w = one / d.fast_max(nearest);
-                let (p, q, e) = (u * w, v * w, d - guess);
-                let wp = w * p;
-                [e, e * e, p, q, e * p, e * q, w, wp * p, wp * q]
-            }))
-        });
-        let n = points.count() as f64;
+    fn at(points: &(impl Points + ?Sized), walk: Walk, about: &About) -> Self {
+        let Sums { count, of: [e, ee, p, q, ep, eq, w, wpp, wpq] } = points.sum(walk, about);
+        let n = count as f64;
         let mean_e = e / n;
-        let best = radius + mean_e;
+        let best = about.radius + mean_e;
         Self {
-            n,
+            count,
             radius: best,
             rss: (ee - mean_e * e).max(0.0),
             mean_normal: [p / n, q / n],
             gradient: [mean_e * p - ep, mean_e * q - eq],
             hessian: [n - best * (w - wpp) - p * p / n, best * wpq - p * q / n, n - best * wpp - q * q / n],
         }
+    }
+
+    /// Number of points as a number.
+    fn n(&self) -> f64 {
+        self.count as f64
     }
 
     /// Eigenvalues of the Hessian, the smaller first.
@@ -136,10 +160,10 @@ impl Surface {
     /// Step that minimises the quadratic model, its Hessian raised by `shift`·N and by what makes it positive.
     fn step(&self, shift: f64) -> Step {
         let [smallest, largest] = self.curvatures();
-        let floor = 1e-14 * self.n;
+        let floor = 1e-14 * self.n();
         let convex = smallest > floor;
         let positive = Float::abs(smallest) + 0.05 * (largest - smallest) - smallest + floor;
-        let raise = shift * self.n + if convex { 0.0 } else { positive };
+        let raise = shift * self.n() + if convex { 0.0 } else { positive };
         let [xx, xy, yy] = self.hessian;
         let (xx, yy) = (xx + raise, yy + raise);
         let determinant = xx * yy - xy * xy;
@@ -157,11 +181,11 @@ impl Surface {
     /// Bound on the next Newton step after one of `length`: |f‴| ≤ 3N/d of each point, so the gradient left is below
     /// 3N·length²/2r, here with room for points at half the radius and twice as much again.
     fn next_step(&self, length: f64) -> f64 {
-        6.0 * self.n * length * length / (self.radius * self.curvatures()[0])
+        6.0 * self.n() * length * length / (self.radius * self.curvatures()[0])
     }
 
     fn covariance(&self, rss: f64) -> Option<[[f64; 3]; 3]> {
-        let free = self.n - 3.0;
+        let free = self.n() - 3.0;
         if free < 0.5 {
             return None;
         }
@@ -171,7 +195,7 @@ impl Surface {
         let inverse = [[yy / determinant, -xy / determinant], [-xy / determinant, xx / determinant]];
         let m = self.mean_normal;
         let cross: [f64; 2] = core::array::from_fn(|i| -(inverse[i][0] * m[0] + inverse[i][1] * m[1]));
-        let radius = 1.0 / self.n - (cross[0] * m[0] + cross[1] * m[1]);
+        let radius = 1.0 / self.n() - (cross[0] * m[0] + cross[1] * m[1]);
         Some([
             [variance * inverse[0][0], variance * inverse[0][1], variance * cross[0]],
             [variance * inverse[1][0], variance * inverse[1][1], variance * cross[1]],
@@ -191,21 +215,32 @@ pub fn refine(
     moments: &Moments,
     start: Circle,
 ) -> Result<CircleFit, CircleError> {
+    refine_walk(Walk::ALL, points, moments, start)
+}
+
+/// [`refine`] by some of the points.
+pub(super) fn refine_walk(
+    walk: Walk,
+    points: &(impl Points + ?Sized),
+    moments: &Moments,
+    start: Circle,
+) -> Result<CircleFit, CircleError> {
     // Tells degenerate sets by their own error, whatever the start.
     hyper(moments)?;
     let origin = moments.mean;
-    let n = points.count() as f64;
     let spread = Float::sqrt((moments.xx + moments.yy) / moments.count as f64);
+    let surface =
+        |centre: [f64; 2], radius: f64| Surface::at(points, walk, &About { origin, centre, radius });
     let mut centre = [start.centre[0] - origin[0], start.centre[1] - origin[1]];
-    let mut here = Surface::at(points, origin, centre, start.radius);
+    let mut here = surface(centre, start.radius);
     let (mut passes, mut shift) = (1, 0.0);
     let report =
         |centre: [f64; 2], at: &Surface, radius: f64, rss: f64, passes: usize, stopped: Stop| CircleFit {
             circle: Circle { centre: [origin[0] + centre[0], origin[1] + centre[1]], radius },
             covariance: at.covariance(rss),
             rss,
-            rms: Float::sqrt(rss / n),
-            points: points.count(),
+            rms: Float::sqrt(rss / at.n()),
+            points: at.count,
             passes,
             stopped,
         };
@@ -228,7 +263,7 @@ pub fn refine(
         if passes >= MAX_PASSES {
             return Ok(report(centre, &here, here.radius, here.rss, passes, Stop::PassLimit));
         }
-        let there = Surface::at(points, origin, to, here.radius);
+        let there = surface(to, here.radius);
         passes += 1;
         if there.rss <= here.rss {
             (centre, here) = (to, there);

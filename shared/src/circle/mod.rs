@@ -7,7 +7,7 @@
 //! | file | holds |
 //! |---|---|
 //! | `points` | [`Points`]: what can be walked again and again, in blocks |
-//! | `lanes` | sums over points, four at a time |
+//! | `lanes` | sums over points, four at a time; [`Lanes`]: what a processor has for that |
 //! | `moments` | [`Moments`]: centred, mergeable, one pass |
 //! | `algebraic` | [`kasa`] and [`hyper`]: closed circles from moments |
 //! | `geometric` | [`refine`]: least squares of the distances, with a report |
@@ -24,10 +24,12 @@ mod scatter;
 mod tests;
 
 pub use algebraic::{hyper, kasa};
+use geometric::refine_walk;
 pub use geometric::{CircleFit, Stop, refine};
+pub use lanes::{Four, Lanes, Portable};
 pub use moments::Moments;
 pub use plane::Plane;
-pub use points::{BLOCK, Merge, Points, Sampled, Xy};
+pub use points::{BLOCK, Merge, Part, Points, Sampled, Walk, Xy, sum_blocks};
 pub use scatter::Scatter;
 
 use core::fmt;
@@ -81,38 +83,33 @@ impl core::error::Error for CircleError {}
 
 /// Points that are enough for a start: at a noise of 1e-5 of the radius one Newton step from their circle is the end.
 const FEW: usize = 131_072;
-/// The few are taken in runs of this length, for memory comes in lines and pages.
+/// The few are taken in runs of this length: memory comes in lines and pages, while the form of a circle wants many runs.
 const RUN: usize = 64;
-/// From this many points on a fit starts from [`FEW`] of them instead of the algebraic circle of all: two passes over
-/// all points are saved out of three.
-const MANY: usize = 16 * FEW;
+/// From this many points on a fit starts from some [`FEW`] of them instead of the algebraic circle of all: two passes
+/// over all points are saved out of three.
+const MANY: usize = 6 * FEW;
 
 /// Least-squares circle: minimises the sum of squared distances between points and circle.
 ///
 /// # Errors
 /// [`CircleError`] for fewer than three points, coincident or collinear points, or a coordinate that is not finite.
 pub fn fit(points: &(impl Points + ?Sized)) -> Result<CircleFit, CircleError> {
-    if let Some(few) = thinned(points) {
-        let moments = Moments::of(&few);
+    if points.count() >= MANY {
+        let few = Walk { run: RUN, of: points.count() / (FEW / RUN) };
+        let moments = Moments::of_walk(few, points);
         // Whatever is odd about the few is left to all of them to show.
-        if let Ok(start) = hyper(&moments).and_then(|start| refine(&few, &moments, start))
+        if let Ok(start) = hyper(&moments).and_then(|start| refine_walk(few, points, &moments, start))
             && let Ok(fit) = refine(points, &moments, start.circle)
         {
             return Ok(fit);
         }
     }
+    fit_all(points)
+}
+
+/// As [`fit`], from the algebraic circle of all points.
+fn fit_all(points: &(impl Points + ?Sized)) -> Result<CircleFit, CircleError> {
     let moments = Moments::of(points);
     let start = hyper(&moments)?;
     refine(points, &moments, start)
-}
-
-/// [`FEW`] points out of many, in runs spread evenly over them.
-fn thinned(points: &(impl Points + ?Sized)) -> Option<Sampled<impl Fn(usize) -> [f64; 2]>> {
-    let count = points.count();
-    if count < MANY || points.at(0).is_none() {
-        return None;
-    }
-    let stride = count / (FEW / RUN);
-    let at = move |i: usize| points.at(i / RUN * stride + i % RUN).unwrap_or([f64::NAN; 2]);
-    Some(Sampled::new(FEW, at))
 }

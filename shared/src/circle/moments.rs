@@ -4,9 +4,8 @@
 //! under a change of origin, so parts can be merged exactly (the pairwise update of Chan, Golub and
 //! LeVeque, doi 10.1080/00031305.1983.10483115, carried on to fourth order). Nothing is ever accumulated
 //! about a far origin.
-use super::lanes::sums;
-use super::points::{Merge, Points};
-use wide::f64x4;
+use super::lanes::{Lanes, Terms, sums};
+use super::points::{Merge, Part, Points, Walk};
 
 /// Count, mean and centred moment sums of a point set. One pass, mergeable.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -34,30 +33,12 @@ pub struct Moments {
 impl Moments {
     /// Moments of all points of a source, in one pass.
     pub fn of(points: &(impl Points + ?Sized)) -> Self {
-        points.sum(Self::of_block)
+        Self::of_walk(Walk::ALL, points)
     }
 
-    /// Moments of one block of points; `x` and `y` of equal length, short enough to stay in cache, for they are read twice.
-    #[inline]
-    pub fn of_block(x: &[f64], y: &[f64]) -> Self {
-        let count = x.len().min(y.len());
-        if count == 0 {
-            return Self::default();
-        }
-        let n = count as f64;
-        let (x0, y0) = (x[0], y[0]);
-        let first = [f64x4::splat(x0), f64x4::splat(y0)];
-        let [dx, dy] = sums(x, y, |x, y| [x - first[0], y - first[1]]).map(|sum| sum / n);
-        let (mx, my) = (x0 + dx, y0 + dy);
-        let mean = [f64x4::splat(mx), f64x4::splat(my)];
-        let [sx, sy, xx, xy, yy, xz, yz, zz] = sums(x, y, |x, y| {
-            let (x, y) = (x - mean[0], y - mean[1]);
-            let z = x * x + y * y;
-            [x, y, x * x, x * y, y * y, x * z, y * z, z * z]
-        });
-        // The mean is rounded: at 100 m its last digit is 1e-14 m. Move the origin by what is left.
-        let (rx, ry) = (sx / n, sy / n);
-        Self { count, mean: [mx, my], rest: [0.0; 2], xx, xy, yy, xz, yz, zz }.recentred(n, rx, ry)
+    /// Moments of some points of a source.
+    pub(super) fn of_walk(walk: Walk, points: &(impl Points + ?Sized)) -> Self {
+        points.sum(walk, &OfBlock)
     }
 
     /// Sums about an origin at (`rx`, `ry`), the true mean, where they were taken about 0. The residue of
@@ -92,6 +73,55 @@ impl Moments {
                 + 4.0 * (along_x * dx + along_y * dy)
                 + s * (2.0 * z + n * s),
         ]
+    }
+}
+
+/// Moments of a block.
+struct OfBlock;
+
+impl Part for OfBlock {
+    type Sum = Moments;
+
+    #[inline(always)]
+    fn of<L: Lanes>(&self, lanes: L, x: &[f64], y: &[f64]) -> Moments {
+        let count = x.len().min(y.len());
+        if count == 0 {
+            return Moments::default();
+        }
+        let n = count as f64;
+        let (x0, y0) = (x[0], y[0]);
+        let [dx, dy] = sums(lanes, x, y, &SeenFrom([x0, y0])).map(|sum| sum / n);
+        let (mx, my) = (x0 + dx, y0 + dy);
+        let [sx, sy, xx, xy, yy, xz, yz, zz] = sums(lanes, x, y, &SeenFrom([mx, my]));
+        // The mean is rounded: at 100 m its last digit is 1e-14 m. Move the origin by what is left.
+        let (rx, ry) = (sx / n, sy / n);
+        Moments { count, mean: [mx, my], rest: [0.0; 2], xx, xy, yy, xz, yz, zz }.recentred(n, rx, ry)
+    }
+}
+
+/// Points as seen from this one.
+struct SeenFrom([f64; 2]);
+
+impl SeenFrom {
+    #[inline(always)]
+    fn point<L: Lanes>(&self, lanes: L, x: L::Four, y: L::Four) -> [L::Four; 2] {
+        [x - lanes.splat(self.0[0]), y - lanes.splat(self.0[1])]
+    }
+}
+
+impl Terms<2> for SeenFrom {
+    #[inline(always)]
+    fn of<L: Lanes>(&self, lanes: L, x: L::Four, y: L::Four) -> [L::Four; 2] {
+        self.point(lanes, x, y)
+    }
+}
+
+impl Terms<8> for SeenFrom {
+    #[inline(always)]
+    fn of<L: Lanes>(&self, lanes: L, x: L::Four, y: L::Four) -> [L::Four; 8] {
+        let [x, y] = self.point(lanes, x, y);
+        let z = x * x + y * y;
+        [x, y, x * x, x * y, y * y, x * z, y * z, z * z]
     }
 }
 

@@ -1,5 +1,6 @@
 //! Point sets that can be walked again and again.
 use super::CircleError;
+use super::lanes::{Lanes, Portable};
 
 /// Number of points that a source hands out at a time: two arrays of it sit in the L1 cache.
 pub const BLOCK: usize = 512;
@@ -11,20 +12,56 @@ pub trait Merge: Default + Send {
     fn merge(&mut self, other: &Self);
 }
 
+/// Which points are walked over: the first `run` of each `of`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Walk {
+    /// Points of a block that are handed out, 1 ≤ `run` ≤ [`BLOCK`].
+    pub run: usize,
+    /// Points from one block to the next, at least `run`.
+    pub of: usize,
+}
+
+impl Walk {
+    /// All points.
+    pub const ALL: Self = Self { run: BLOCK, of: BLOCK };
+
+    /// The blocks of the points (`x`, `y`), x and y of equal length.
+    #[inline(always)]
+    pub fn blocks<'a>(self, x: &'a [f64], y: &'a [f64]) -> impl Iterator<Item = (&'a [f64], &'a [f64])> {
+        x.chunks(self.of).zip(y.chunks(self.of)).map(move |(x, y)| {
+            let run = self.run.min(x.len());
+            (&x[..run], &y[..run])
+        })
+    }
+}
+
+/// What is summed over points.
+pub trait Part: Sync {
+    /// Its sum.
+    type Sum: Merge;
+
+    /// The sum over one block of points, x and y of equal length. Has to be inlined always: what a processor can do
+    /// beyond the least of its kind holds only within the function that asked it.
+    fn of<L: Lanes>(&self, lanes: L, x: &[f64], y: &[f64]) -> Self::Sum;
+}
+
+/// The sum over the blocks of a walk over the points (`x`, `y`), in order.
+#[inline(always)]
+pub fn sum_blocks<P: Part, L: Lanes>(part: &P, lanes: L, walk: Walk, x: &[f64], y: &[f64]) -> P::Sum {
+    let mut total = P::Sum::default();
+    for (x, y) in walk.blocks(x, y) {
+        total.merge(&part.of(lanes, x, y));
+    }
+    total
+}
+
 /// A finite sequence of points in the plane that may be walked more than once.
 pub trait Points {
     /// Number of points.
     fn count(&self) -> usize;
 
-    /// Calls `part` on consecutive blocks (x and y of equal length, at most [`BLOCK`]) and merges the results in order.
-    fn sum<S: Merge>(&self, part: impl Fn(&[f64], &[f64]) -> S + Sync) -> S;
-
-    /// The point at `index` (< [`count`](Self::count)), where it can be had without walking; `None` otherwise. Lets a fit
-    /// of very many points start from a few of them.
-    fn at(&self, index: usize) -> Option<[f64; 2]> {
-        let _ = index;
-        None
-    }
+    /// Sums `part` over the blocks of a walk and merges the results in order.
+    fn sum<P: Part>(&self, walk: Walk, part: &P) -> P::Sum;
 }
 
 /// Points as two slices of equal length. The fastest source.
@@ -63,16 +100,8 @@ impl Points for Xy<'_> {
         self.x.len()
     }
 
-    fn sum<S: Merge>(&self, part: impl Fn(&[f64], &[f64]) -> S + Sync) -> S {
-        let mut total = S::default();
-        for (x, y) in self.x.chunks(BLOCK).zip(self.y.chunks(BLOCK)) {
-            total.merge(&part(x, y));
-        }
-        total
-    }
-
-    fn at(&self, index: usize) -> Option<[f64; 2]> {
-        Some([*self.x.get(index)?, *self.y.get(index)?])
+    fn sum<P: Part>(&self, walk: Walk, part: &P) -> P::Sum {
+        sum_blocks(part, Portable, walk, self.x, self.y)
     }
 }
 
@@ -81,8 +110,8 @@ impl Points for [[f64; 2]] {
         self.len()
     }
 
-    fn sum<S: Merge>(&self, part: impl Fn(&[f64], &[f64]) -> S + Sync) -> S {
-        Sampled::new(self.len(), |i| self[i]).sum(part)
+    fn sum<P: Part>(&self, walk: Walk, part: &P) -> P::Sum {
+        Sampled::new(self.len(), |i| self[i]).sum(walk, part)
     }
 }
 
@@ -105,20 +134,16 @@ impl<F: Fn(usize) -> [f64; 2]> Points for Sampled<F> {
         self.count
     }
 
-    fn sum<S: Merge>(&self, part: impl Fn(&[f64], &[f64]) -> S + Sync) -> S {
-        let mut total = S::default();
+    fn sum<P: Part>(&self, walk: Walk, part: &P) -> P::Sum {
+        let mut total = P::Sum::default();
         let (mut x, mut y) = ([0.0; BLOCK], [0.0; BLOCK]);
-        for start in (0..self.count).step_by(BLOCK) {
-            let len = BLOCK.min(self.count - start);
+        for start in (0..self.count).step_by(walk.of) {
+            let len = walk.run.min(self.count - start);
             for (i, (x, y)) in x[..len].iter_mut().zip(&mut y[..len]).enumerate() {
                 [*x, *y] = (self.at)(start + i);
             }
-            total.merge(&part(&x[..len], &y[..len]));
+            total.merge(&part.of(Portable, &x[..len], &y[..len]));
         }
         total
-    }
-
-    fn at(&self, index: usize) -> Option<[f64; 2]> {
-        Some((self.at)(index))
     }
 }
