@@ -2,10 +2,9 @@
 //!
 //! The difference between more and fewer times is the kernel alone; what it costs to start cancels.
 use giotto::campaign::{Direction, Manifest};
-use giotto::fit::{Observation, Options, RadiusFit};
+use giotto::fit::{Observation, Options, RadiusFit, fit_circle};
 use giotto::simulation::machine::{Machine, PositionLoop, SecondOrder};
 use giotto::simulation::{CircleTest, circle};
-use giotto_shared::circle::{Xy, fit};
 use std::error::Error;
 use std::fmt::Write as _;
 use std::hint::black_box;
@@ -34,7 +33,7 @@ fn circle_fit() -> Result<Box<dyn Fn()>, Box<dyn Error>> {
     };
     let (x, y): (Vec<f64>, Vec<f64>) = (0..20_000).map(point).unzip();
     Ok(Box::new(move || {
-        let _ = black_box(Xy::new(&x, &y).and_then(|points| fit(&points)));
+        let _ = black_box(fit_circle(&x, &y));
     }))
 }
 
