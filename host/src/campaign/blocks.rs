@@ -1,6 +1,6 @@
 //! Text files in blocks of whole lines, results in the order of the file. Of a large file the next window is read while this
-//! one is parsed on all cores; small ones go block by block, for whoever reads many has all cores at work already. Memory is a
-//! window and its results, whatever the size of the file; a small file is one window.
+//! one is parsed on all cores; a small one is a block, for whoever reads many has all cores at work already. Memory is a
+//! window and its results, whatever the size of the file.
 use super::CampaignError;
 use rayon::prelude::*;
 use std::fs::File;
@@ -69,15 +69,16 @@ impl Text {
         self.skip = (self.skip + bytes).min(self.buffer.len());
     }
 
-    /// Rows to expect: no more than there are lines of a small file, else by the length of those read so far, with some to spare.
-    pub(super) fn rows(&self) -> usize {
+    /// Rows to expect of a large file, by the length of those read so far, with some to spare. Those of a small one come at
+    /// once.
+    pub(super) fn rows(&self) -> Option<usize> {
+        if self.size <= LARGE {
+            return None;
+        }
         let sample = self.head();
         let lines = memchr::memchr_iter(b'\n', sample).count().max(1) as u64;
-        if self.at + self.buffer.len() as u64 >= self.size {
-            return lines as usize + 1; // the last may have no end
-        }
         let rows = self.size * lines / (sample.len().max(1) as u64) + self.size / 64 + 16;
-        usize::try_from(rows.min(self.size / 2 + 1)).unwrap_or(0)
+        Some(usize::try_from(rows.min(self.size / 2 + 1)).unwrap_or(0))
     }
 
     /// Parses the rest block by block. `parse` is given the byte at which a block begins; `take` gets the results in order
@@ -91,6 +92,7 @@ impl Text {
         let rest = self.size.saturating_sub(self.at);
         let large = rest > LARGE;
         let window = if large { BLOCK * BLOCKS } else { BLOCK.max(rest as usize) };
+        let block = if large { BLOCK } else { usize::MAX };
         let mut next = Vec::new();
         let mut last = self.fill()?;
         loop {
@@ -104,7 +106,7 @@ impl Text {
                 return Err(Fault::Endless(self.at + body as u64));
             }
             let mut from = self.at + body as u64;
-            let blocks: Vec<(u64, &[u8])> = split_at_lines(&buffer[body..whole])
+            let blocks: Vec<(u64, &[u8])> = split_at_lines(&buffer[body..whole], block)
                 .into_iter()
                 .map(|block| {
                     let at = from;
@@ -158,11 +160,11 @@ impl Text {
     }
 }
 
-/// Cuts at line ends into blocks of at least [`BLOCK`] bytes (the last may be shorter).
-fn split_at_lines(mut bytes: &[u8]) -> Vec<&[u8]> {
+/// Cuts at line ends into blocks of at least `least` bytes (the last may be shorter).
+fn split_at_lines(mut bytes: &[u8], least: usize) -> Vec<&[u8]> {
     let mut blocks = Vec::new();
-    while bytes.len() > BLOCK {
-        let cut = memchr::memchr(b'\n', &bytes[BLOCK..]).map_or(bytes.len(), |p| BLOCK + p + 1);
+    while bytes.len() > least {
+        let cut = memchr::memchr(b'\n', &bytes[least..]).map_or(bytes.len(), |p| least + p + 1);
         let (block, rest) = bytes.split_at(cut);
         blocks.push(block);
         bytes = rest;

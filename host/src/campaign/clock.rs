@@ -94,3 +94,32 @@ impl Stamps {
         Ok(Clock { turn_s, spacing_s, gap })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn stamps_say_the_same_in_whatever_pieces_they_come(
+            steps in prop::collection::vec(prop_oneof![6 => Just(10), 2 => 8..13, 1 => -3..40], 1..200),
+            piece in 1..200_usize,
+        ) {
+            let mut at = 7;
+            let times: Vec<f64> = steps
+                .iter()
+                .map(|step| {
+                    at += step;
+                    f64::from(at) / 1024.0
+                })
+                .collect();
+            let (mut whole, mut pieces) = (Stamps::default(), Stamps::default());
+            let (mut at_once, mut one_by_one) = (times.clone(), times);
+            whole.take(&mut at_once);
+            one_by_one.chunks_mut(piece).for_each(|part| pieces.take(part));
+            prop_assert_eq!(at_once, one_by_one);
+            prop_assert_eq!(format!("{whole:?}"), format!("{pieces:?}"));
+        }
+    }
+}

@@ -54,11 +54,11 @@ impl<'a> RunFile<'a> {
         }
     }
 
-    /// Rows to expect; for a slice, those that there are.
-    pub(super) fn rows(&self) -> usize {
+    /// Rows to expect, unless they come at once; for a slice, those that there are.
+    pub(super) fn rows(&self) -> Option<usize> {
         match self {
             Self::Own(table) => table.rows(),
-            Self::Foreign(_, slice) => slice.rows,
+            Self::Foreign(_, slice) => Some(slice.rows),
         }
     }
 

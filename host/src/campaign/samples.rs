@@ -14,6 +14,9 @@ use std::f64::consts::TAU;
 /// Fewest samples of a run.
 pub(super) const FEWEST: usize = 8;
 
+/// Stamps that are looked at together: what is made of them stays in the cache.
+const STAMPS: usize = 1 << 13;
+
 /// A run with what its file says beyond polar samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loaded {
@@ -79,13 +82,23 @@ struct Part {
 impl Rows {
     fn take(&mut self, part: Part, keep_time: bool) {
         let mut time = part.time;
-        self.stamps.take(&mut time);
+        time.chunks_mut(STAMPS).for_each(|stamps| self.stamps.take(stamps));
         if keep_time {
-            self.time.extend_from_slice(&time);
+            append(&mut self.time, time);
         }
-        self.first.extend_from_slice(&part.first);
-        self.second.extend_from_slice(&part.second);
+        append(&mut self.first, part.first);
+        append(&mut self.second, part.second);
         self.heights = [self.heights[0].min(part.heights[0]), self.heights[1].max(part.heights[1])];
+    }
+}
+
+/// Adds numbers behind others; those that come at once are not copied.
+fn append(numbers: &mut Vec<f64>, mut more: Vec<f64>) {
+    if numbers.capacity() > 0 {
+        numbers.extend_from_slice(&more);
+    } else {
+        more.shrink_to_fit();
+        *numbers = more;
     }
 }
 
@@ -119,7 +132,7 @@ pub(super) fn load(entry: &Entry, keep_time: bool) -> Result<Loaded, CampaignErr
         _ => 0.0,
     };
     let mut rows = Rows::default();
-    let expected = file.rows();
+    let expected = file.rows().unwrap_or(0);
     rows.first.reserve_exact(if polar_by_time { 0 } else { expected });
     rows.second.reserve_exact(expected);
     rows.time.reserve_exact(if keep && time_field.is_some() { expected } else { 0 });

@@ -100,8 +100,8 @@ impl Table {
         Ok(Self { path: path.to_path_buf(), header, text })
     }
 
-    /// Rows to expect.
-    pub(crate) fn rows(&self) -> usize {
+    /// Rows to expect, unless they come at once.
+    pub(crate) fn rows(&self) -> Option<usize> {
         self.text.rows()
     }
 
