@@ -116,7 +116,7 @@ pub(crate) fn heading(versions: &Value) -> String {
     let cores = std::thread::available_parallelism().map_or(0, usize::from);
     let mut page = String::from(
         "# Side by side\n\nWritten by `cargo bench -p giotto --bench peers`. Median of interleaved rounds, [quartiles]; a ratio above 1 \
-         means that giotto takes less time. Answers of all contenders are compared before they count.\n\n",
+         means that giotto takes less time. Each part has a process of its own. Answers of all contenders are compared before they count.\n\n",
     );
     // Writing to a string cannot fail.
     let _ = writeln!(

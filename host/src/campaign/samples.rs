@@ -93,13 +93,8 @@ impl Rows {
 }
 
 /// Adds numbers behind others; those that come at once are not copied.
-fn append(numbers: &mut Vec<f64>, mut more: Vec<f64>) {
-    if numbers.capacity() > 0 {
-        numbers.extend_from_slice(&more);
-    } else {
-        more.shrink_to_fit();
-        *numbers = more;
-    }
+fn append(numbers: &mut Vec<f64>, more: Vec<f64>) {
+    if numbers.capacity() > 0 { numbers.extend_from_slice(&more) } else { *numbers = more }
 }
 
 /// Reads and checks one run. Of its rows the angle and the deviation (or x and y) are kept, and the time only if it is wanted

@@ -226,8 +226,9 @@ struct Growing {
 /// Parses whole lines of as many numbers as there are factors to SI; the error is the offset of the line that does not fit.
 fn parse_block(bytes: &[u8], factors: &[f64]) -> Result<Parsed, usize> {
     let width = factors.len();
-    let guess = bytes.len() / (6 * width) + 1;
-    let new = |&factor: &f64| Growing { values: Vec::with_capacity(guess), shape: None, factor };
+    // The last line may have no end.
+    let lines = memchr::memchr_iter(b'\n', bytes).count() + 1;
+    let new = |&factor: &f64| Growing { values: Vec::with_capacity(lines), shape: None, factor };
     let mut columns: Vec<Growing> = factors.iter().map(new).collect();
     let (mut at, mut rows, mut blank_at) = (0, 0, None);
     'rows: while at < bytes.len() {
