@@ -1,7 +1,7 @@
 //! From a campaign to the set of explanations: prepare, search, refine, and again about the better model.
 use super::column::Column;
 use super::explained::{Explained, chosen_kinds, refit, residual};
-use super::item::{Item, Kind};
+use super::item::Kind;
 use super::ledger::Ledger;
 use super::linear::Solution;
 use super::material::{is_material, prune};
@@ -213,23 +213,17 @@ fn enter(found: &mut Explained, start: &Start, kinds: &[Kind]) {
         run.low_of(&Harmonics::mean(-0.5 * run.view.radius_m * w * w * g.powi(3)))
     };
     found.nuisance.push(found.ledger.push(Column::within(runs.iter().map(own).collect())));
-    let add = |found: &mut Explained, kind: Kind, shapes: usize| -> usize {
-        let columns = kind.columns_over(&runs).into_iter().map(|column| found.ledger.push(column)).collect();
-        found.items.push(Item { price: kind.price(shapes), columns, kind, fitted_beside: None });
-        found.items.len() - 1
-    };
-    for kind in kinds {
-        let item = add(found, kind.clone(), shape::count(kind, &views));
-        found.chosen.push(item);
-    }
+    let before = kinds.iter().map(|kind| (kind.clone(), shape::count(kind, &views))).collect();
+    found.chosen = found.enter(before).collect();
     // The data no longer hold what the response has taken in; its column still does.
     if start.own_fourth_order {
         let fourth = Kind::Cause { cause: Cause::HigherOrderDynamics, axis: None, shape: Vec::new() };
         let columns = fourth.columns_over(&runs);
-        found.nuisance.extend(columns.into_iter().map(|column| found.ledger.push(column)));
+        found.nuisance.extend(found.ledger.push_all(columns));
     } else if found.response.b_s4 != 0.0 {
         restore_fourth_order(found);
     }
+    let mut further = Vec::new();
     for model in ALL {
         if model.evidence() != Evidence::Signature
             || (start.own_fourth_order && model.cause() == Cause::HigherOrderDynamics)
@@ -243,16 +237,17 @@ fn enter(found: &mut Explained, start: &Start, kinds: &[Kind]) {
             );
             if let (false, Some(first)) = (known, shapes.first()) {
                 let kind = Kind::Cause { cause: model.cause(), axis, shape: first.clone() };
-                add(found, kind, shapes.len());
+                further.push((kind, shapes.len()));
             }
         }
     }
     for pattern in Pattern::sizes() {
         let kind = Kind::Pattern(pattern);
         if !kinds.contains(&kind) {
-            add(found, kind, 1);
+            further.push((kind, 1));
         }
     }
+    found.enter(further);
 }
 
 /// The response holds a fourth-order part that the search may still reject: give it back to the data, to first
@@ -264,5 +259,5 @@ fn restore_fourth_order(found: &mut Explained) {
     };
     let mut data = found.ledger.column(0).clone();
     data.add(1.0, &Column::within(found.runs.iter().map(shift).collect()));
-    found.ledger.replace(0, data);
+    found.ledger.replace_all([(0, data)]);
 }

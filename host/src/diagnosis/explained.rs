@@ -10,6 +10,8 @@ use super::spread::Spread;
 use super::survey::{Lag, Prepared, Response};
 use super::tangent::Tangents;
 use super::tone::Tone;
+use rayon::prelude::*;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// What the search found, with all that is needed to refit it.
@@ -51,6 +53,29 @@ impl Explained {
     /// Each run once.
     pub fn all(&self) -> Vec<f64> {
         vec![1.0; self.runs.len()]
+    }
+
+    /// Enters explanations, each chosen from so many starting shapes; gives their numbers.
+    pub fn enter(&mut self, kinds: Vec<(Kind, usize)>) -> Range<usize> {
+        let first = self.items.len();
+        let columns: Vec<Vec<Column>> =
+            kinds.par_iter().map(|(kind, _)| kind.columns_over(&self.runs)).collect();
+        let mut next = self.ledger.size();
+        for ((kind, shapes), columns) in kinds.into_iter().zip(&columns) {
+            let own = (next..next + columns.len()).collect();
+            next += columns.len();
+            self.items.push(Item { price: kind.price(shapes), columns: own, kind, fitted_beside: None });
+        }
+        self.ledger.push_all(columns.into_iter().flatten());
+        first..self.items.len()
+    }
+
+    /// Brings the columns of items up to date with their kinds.
+    pub fn relay(&mut self, items: &[usize]) {
+        let columns: Vec<Vec<Column>> =
+            items.par_iter().map(|&item| self.items[item].kind.columns_over(&self.runs)).collect();
+        let at = items.iter().flat_map(|&item| self.items[item].columns.iter().copied());
+        self.ledger.replace_all(at.zip(columns.into_iter().flatten()));
     }
 }
 

@@ -40,25 +40,26 @@ impl Ledger {
 
     /// Adds a column and gives its number.
     pub fn push(&mut self, column: Column) -> usize {
-        let at = self.columns.len();
-        self.columns.push(column);
-        for (run, [white, plain]) in self.rows(at).into_iter().enumerate() {
-            self.white[run].push(white.into_iter());
-            self.plain[run].push(plain.into_iter());
-        }
-        at
+        self.push_all([column]).start
     }
 
-    /// Replaces a column.
-    pub fn replace(&mut self, at: usize, column: Column) {
-        self.columns[at] = column;
-        for (run, rows) in self.rows(at).into_iter().enumerate() {
-            for (products, row) in [&mut self.white[run], &mut self.plain[run]].into_iter().zip(rows) {
-                for (other, value) in row.into_iter().enumerate() {
-                    *products.at_mut(at, other) = value;
-                }
-            }
+    /// Adds columns and gives their numbers.
+    pub fn push_all(&mut self, columns: impl IntoIterator<Item = Column>) -> Range<usize> {
+        let first = self.columns.len();
+        self.columns.extend(columns);
+        let new = first..self.columns.len();
+        self.multiply(&new.clone().collect::<Vec<_>>());
+        new
+    }
+
+    /// Replaces columns.
+    pub fn replace_all(&mut self, columns: impl IntoIterator<Item = (usize, Column)>) {
+        let mut replaced = Vec::new();
+        for (at, column) in columns {
+            self.columns[at] = column;
+            replaced.push(at);
         }
+        self.multiply(&replaced);
     }
 
     /// Takes out all columns from number `size` on.
@@ -84,28 +85,28 @@ impl Ledger {
         self.places.iter().zip(weights).map(|(place, weight)| weight * place.len() as f64).sum()
     }
 
-    /// White and plain products of a column with all columns, run by run.
-    fn rows(&self, at: usize) -> Vec<[Vec<f64>; 2]> {
-        let row = |run: usize| {
-            let mut rows = [Vec::with_capacity(self.columns.len()), Vec::with_capacity(self.columns.len())];
-            let (own, discount) = (&self.columns[at], &self.discounts[run]);
-            for other in &self.columns {
-                let (a, b) = (&own.low()[run], &other.low()[run]);
-                let outside = own.product_outside(other, &self.places[run]);
-                let reach = own.reach().min(other.reach());
-                let [mut white, mut whole] = [0.0; 2];
-                for ((a, b), discount) in a.iter().zip(b).zip(discount).take(reach) {
-                    white += (1.0 - discount) * a * b;
-                    whole += a * b;
+    /// Brings the products of some columns with all up to date: a run at a time, whose samples in all columns stay in the
+    /// cache meanwhile.
+    fn multiply(&mut self, changed: &[usize]) {
+        let Self { columns, places, discounts, noise_m2, white, plain } = self;
+        let mut both = vec![false; columns.len()];
+        changed.iter().for_each(|&at| both[at] = true);
+        places.par_iter().zip(&*discounts).zip(white).zip(plain).enumerate().for_each(
+            |(run, (((place, discount), white), plain))| {
+                white.grow(columns.len());
+                plain.grow(columns.len());
+                for &at in changed {
+                    // Two that have changed meet once.
+                    for other in (0..columns.len()).filter(|&other| other <= at || !both[other]) {
+                        let (own, other_column) = (&columns[at], &columns[other]);
+                        let outside = own.product_outside(other_column, place);
+                        let [within, plain_within] = products_within(own, other_column, run, discount);
+                        *white.at_mut(at, other) = (within + outside) / *noise_m2;
+                        *plain.at_mut(at, other) = plain_within + outside;
+                    }
                 }
-                // The centre, order 1, is the operator's, not the machine's.
-                let plain = whole - a[1] * b[1] - a[2] * b[2];
-                rows[0].push((white + outside) / self.noise_m2);
-                rows[1].push(plain + outside);
-            }
-            rows
-        };
-        (0..self.places.len()).into_par_iter().map(row).collect()
+            },
+        );
     }
 
     /// Evidence products summed over runs with the given weights (1 keep, 0 leave out, bootstrap counts).
@@ -134,9 +135,22 @@ impl Ledger {
     }
 }
 
+/// White and plain product of the low orders of two columns in one run, the same from either side.
+fn products_within(one: &Column, other: &Column, run: usize, discount: &Low) -> [f64; 2] {
+    let (a, b) = (&one.low()[run], &other.low()[run]);
+    let [mut white, mut whole] = [0.0; 2];
+    for ((a, b), discount) in a.iter().zip(b).zip(discount).take(one.reach().min(other.reach())) {
+        let product = a * b;
+        white += (1.0 - discount) * product;
+        whole += product;
+    }
+    // The centre, order 1, is the operator's, not the machine's.
+    [white, whole - a[1] * b[1] - a[2] * b[2]]
+}
+
 /// Product of what scatter between runs leaves of the low orders.
 pub fn kept(a: &Low, b: &Low, discount: &Low) -> f64 {
-    (0..COLUMNS).map(|k| (1.0 - discount[k]) * a[k] * b[k]).sum()
+    (0..COLUMNS).map(|k| (1.0 - discount[k]) * (a[k] * b[k])).sum()
 }
 
 fn total(products: &[Products], weights: &[f64]) -> Products {

@@ -43,10 +43,9 @@ impl Products {
         &mut self.packed[place(i, j)]
     }
 
-    /// A further column, by its products with those that are there, and with itself last.
-    pub fn push(&mut self, row: impl Iterator<Item = f64>) {
-        self.packed.extend(row);
-        self.size += 1;
+    /// Further columns, up to so many; their products are zero.
+    pub fn grow(&mut self, size: usize) {
+        self.size = self.size.max(size);
         self.packed.resize(self.size * (self.size + 1) / 2, 0.0);
     }
 
@@ -69,7 +68,10 @@ mod tests {
     #[test]
     fn rows_are_found_from_either_side() {
         let mut products = Products::from_fn(2, |i, j| (10 * i + j) as f64);
-        products.push([20.0, 21.0, 22.0].into_iter());
+        products.grow(3);
+        for (j, value) in [20.0, 21.0, 22.0].into_iter().enumerate() {
+            *products.at_mut(2, j) = value;
+        }
         assert_eq!((products.at(2, 1), products.at(1, 2), products.at(1, 0)), (21.0, 21.0, 10.0));
         *products.at_mut(0, 2) += 5.0;
         assert_eq!(products.at(2, 0), 25.0);

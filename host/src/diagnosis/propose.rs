@@ -1,7 +1,7 @@
 //! Patterns that the data themselves suggest.
 use super::basis::{Low, ORDERS};
 use super::explained::{Explained, residual};
-use super::item::{Item, Kind};
+use super::item::Kind;
 use super::material::smallest_pattern_m;
 use super::pattern::{LAWS, Law, Pattern};
 use super::places::{PLACES, bump_weights, place_means};
@@ -47,11 +47,7 @@ pub fn propose_patterns(found: &mut Explained) {
             new.push(candidate.pattern);
         }
     }
-    for pattern in new {
-        let kind = Kind::Pattern(pattern);
-        let columns = kind.columns_over(&runs).into_iter().map(|column| found.ledger.push(column)).collect();
-        found.items.push(Item { price: kind.price(1), columns, kind, fitted_beside: None });
-    }
+    found.enter(new.into_iter().map(|pattern| (Kind::Pattern(pattern), 1)).collect());
 }
 
 /// The laws that patterns go by, in every run.

@@ -52,7 +52,7 @@ pub fn improve(found: &mut Explained) {
     for item in chosen {
         let Some(task) = Task::of(found, item) else { continue };
         let shape = Fit::new(found).best(&task);
-        task.settle(found, shape);
+        settle(found, [(&task, shape)]);
     }
     let tasks: Vec<Task> = others.into_iter().filter_map(|item| Task::of(found, item)).collect();
     if tasks.is_empty() {
@@ -60,9 +60,19 @@ pub fn improve(found: &mut Explained) {
     }
     let fit = Fit::new(found);
     let shapes: Vec<Vec<f64>> = tasks.par_iter().map(|task| fit.best(task)).collect();
-    for (task, shape) in tasks.iter().zip(shapes) {
-        task.settle(found, shape);
+    settle(found, tasks.iter().zip(shapes));
+}
+
+/// Takes over the shapes that have changed.
+fn settle<'a>(found: &mut Explained, shapes: impl IntoIterator<Item = (&'a Task, Vec<f64>)>) {
+    let mut changed = Vec::new();
+    for (task, shape) in shapes {
+        if shape != task.shape {
+            found.items[task.item].kind = task.kind(&shape);
+            changed.push(task.item);
+        }
     }
+    found.relay(&changed);
 }
 
 /// A shape to be fitted.
@@ -102,17 +112,6 @@ impl Task {
 
     fn kind(&self, shape: &[f64]) -> Kind {
         Kind::Cause { cause: self.cause, axis: self.axis, shape: shape.to_vec() }
-    }
-
-    fn settle(&self, found: &mut Explained, shape: Vec<f64>) {
-        if shape == self.shape {
-            return;
-        }
-        let kind = self.kind(&shape);
-        for (&at, column) in found.items[self.item].columns.iter().zip(kind.columns_over(&found.runs)) {
-            found.ledger.replace(at, column);
-        }
-        found.items[self.item].kind = kind;
     }
 }
 

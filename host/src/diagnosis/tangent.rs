@@ -173,12 +173,7 @@ fn step(found: &mut Explained, weights: &[f64], tangents: &Tangents) -> bool {
 fn relay(found: &mut Explained, shapes: &[Shape]) {
     let mut items: Vec<usize> = shapes.iter().map(|shape| shape.item).collect();
     items.dedup();
-    for item in items {
-        let item = &found.items[item];
-        for (&at, column) in item.columns.iter().zip(item.kind.columns_over(&found.runs)) {
-            found.ledger.replace(at, column);
-        }
-    }
+    found.relay(&items);
 }
 
 /// Lays the tangents for good, so that intervals count them in, and says how much longer the lag ought to be, s.
