@@ -64,7 +64,8 @@ struct Spectrum {
     nyquist_hz: f64,
     /// 2|X|²/(nσ²) at multiples of 1/(length·Δt).
     power: Vec<f64>,
-    step_hz: f64,
+    /// Places of `power` a hertz.
+    per_hz: f64,
 }
 
 /// What a run leaves outside its low orders.
@@ -124,9 +125,9 @@ pub fn find(runs: &[Prepared], residual: &Column, spread: &Spread) -> Option<Ton
     if levels.len() < 100 {
         return None;
     }
-    levels.sort_by(f64::total_cmp);
-    let floor = levels[levels.len() / 2];
-    let width = (levels[levels.len() * 84 / 100] - floor).max(1e-9);
+    let (middle, high) = (levels.len() / 2, levels.len() * 84 / 100);
+    let floor = *levels.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let width = (*levels.select_nth_unstable_by(high, f64::total_cmp).1 - floor).max(1e-9);
     // Where much else is rough, a capped mean is never far above it: a tone that nearly every run shows is one all the same.
     let shown = |hz: f64, count: usize| {
         let those = spectra.iter().filter(|s| s.sees(hz) && s.stands_out(hz)).count();
@@ -336,7 +337,7 @@ fn spectrum(clean: &Clean<'_>, transform: &Arc<dyn Fft<f64>>, noise_m2: f64) -> 
         turn_s: clean.turn_s,
         nyquist_hz: 0.5 * n as f64 / clean.turn_s,
         power: powers(clean.samples, transform, noise_m2),
-        step_hz: n as f64 / (clean.turn_s * length as f64),
+        per_hz: clean.turn_s * length as f64 / n as f64,
     }
 }
 
@@ -367,7 +368,8 @@ impl Spectrum {
     }
 
     fn at(&self, hz: f64) -> f64 {
-        self.power.get((hz / self.step_hz).round() as usize).copied().unwrap_or(0.0)
+        // The nearest, of frequencies above zero.
+        self.power.get((hz * self.per_hz + 0.5) as usize).copied().unwrap_or(0.0)
     }
 }
 
@@ -401,9 +403,9 @@ mod tests {
 
     /// A run of 400 samples in 2 s with this spectrum at multiples of 1/8 Hz.
     fn spectrum_of(power: impl Fn(f64) -> f64) -> Spectrum {
-        let step_hz = 0.125;
+        let step_hz: f64 = 0.125;
         let power = (0..800).map(|line| power(f64::from(line) * step_hz)).collect();
-        Spectrum { turn_s: 2.0, nyquist_hz: 100.0, power, step_hz }
+        Spectrum { turn_s: 2.0, nyquist_hz: 100.0, power, per_hz: step_hz.recip() }
     }
 
     #[test]
