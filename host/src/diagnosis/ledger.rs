@@ -89,20 +89,20 @@ impl Ledger {
     /// cache meanwhile.
     fn multiply(&mut self, changed: &[usize]) {
         let Self { columns, places, discounts, noise_m2, white, plain } = self;
-        let mut both = vec![false; columns.len()];
-        changed.iter().for_each(|&at| both[at] = true);
+        let mut has_changed = vec![false; columns.len()];
+        changed.iter().for_each(|&at| has_changed[at] = true);
         places.par_iter().zip(&*discounts).zip(white).zip(plain).enumerate().for_each(
             |(run, (((place, discount), white), plain))| {
                 white.grow(columns.len());
                 plain.grow(columns.len());
                 for &at in changed {
                     // Two that have changed meet once.
-                    for other in (0..columns.len()).filter(|&other| other <= at || !both[other]) {
-                        let (own, other_column) = (&columns[at], &columns[other]);
-                        let outside = own.product_outside(other_column, place);
-                        let [within, plain_within] = products_within(own, other_column, run, discount);
-                        *white.at_mut(at, other) = (within + outside) / *noise_m2;
-                        *plain.at_mut(at, other) = plain_within + outside;
+                    for other in (0..columns.len()).filter(|&other| other <= at || !has_changed[other]) {
+                        let [one, two] = [&columns[at], &columns[other]];
+                        let outside = one.product_outside(two, place);
+                        let [kept, whole] = products_within(one, two, run, discount);
+                        *white.at_mut(at, other) = (kept + outside) / *noise_m2;
+                        *plain.at_mut(at, other) = whole + outside;
                     }
                 }
             },
@@ -161,4 +161,74 @@ fn total(products: &[Products], weights: &[f64]) -> Products {
         }
     }
     sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::item::Kind;
+    use super::super::pattern::Pattern;
+    use super::super::spread;
+    use super::super::survey::{Response, Survey, misfit};
+    use super::*;
+    use crate::causes::Cause;
+    use crate::model_file::Servo;
+    use crate::simulation::{self, Plan};
+    use giotto_shared::Axis;
+    use std::path::Path;
+
+    const PLAN: &str = r#"
+[campaign]
+name = "ledger"
+[machine]
+x = { backlash_um = 8.0 }
+[instrument]
+noise_um = 1.0
+spread_um = 0.5
+[grid]
+radii_mm = [100.0, 150.0]
+feeds_mm_s = [50.0, 200.0, 400.0]
+directions = ["ccw", "cw"]
+"#;
+
+    /// Columns of both sorts: low orders only, and with samples of their own.
+    fn kinds() -> Vec<Kind> {
+        let cause = |cause, axis, shape: &[f64]| Kind::Cause { cause, axis, shape: shape.to_vec() };
+        let mut kinds = vec![
+            cause(Cause::Squareness, None, &[]),
+            cause(Cause::Backlash, Some(Axis::X), &[0.0, 0.0]),
+            cause(Cause::CyclicError, Some(Axis::Y), &[0.02]),
+        ];
+        kinds.extend(Pattern::sizes().into_iter().take(2).map(Kind::Pattern));
+        kinds
+    }
+
+    #[test]
+    fn columns_that_come_or_change_together_are_those_that_did_so_one_by_one() {
+        let campaign = simulation::campaign(&Plan::parse(PLAN, Path::new("ledger.toml")).unwrap(), 1);
+        let (runs, _) = Survey::new(&campaign).prepare(&Response::of(&Servo::Lag { kv_per_s: 90.0 }), 0.0);
+        let data = misfit(&runs);
+        let spread = spread::measure(&runs, &data.all_samples(&runs));
+        let columns: Vec<Column> = kinds().iter().flat_map(|kind| kind.columns_over(&runs)).collect();
+        assert!(columns.iter().any(|column| column.outside(&runs[0]).is_empty()));
+        assert!(columns.iter().any(|column| !column.outside(&runs[0]).is_empty()));
+        let mut one_by_one = Ledger::open(&runs, &spread, data.clone());
+        for column in &columns {
+            one_by_one.push(column.clone());
+        }
+        let mut together = Ledger::open(&runs, &spread, data.clone());
+        assert_eq!(together.push_all(columns.clone()), 1..columns.len() + 1);
+        let same = |a: &Ledger, b: &Ledger| a.white == b.white && a.plain == b.plain;
+        assert!(same(&together, &one_by_one));
+        // Others in their places, the last first, and back.
+        let at = [4, 1, 3];
+        together.replace_all(at.map(|at| (at, columns[at % columns.len()].clone())));
+        assert!(!same(&together, &one_by_one));
+        together.replace_all(at.map(|at| (at, columns[at - 1].clone())));
+        assert!(same(&together, &one_by_one));
+        // By the definition: white products weigh the low orders of a run by what scatter leaves of them.
+        let (a, b, run) = (&columns[1], &data, 3);
+        let low = kept(&a.low()[run], &b.low()[run], together.discounts(run));
+        let white = (low + a.product_outside(b, &runs[run].place)) / spread.noise_m2;
+        assert!((together.white_of(run).at(2, 0) / white - 1.0).abs() < 1e-12);
+    }
 }
