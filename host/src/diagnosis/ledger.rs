@@ -219,16 +219,32 @@ directions = ["ccw", "cw"]
         assert_eq!(together.push_all(columns.clone()), 1..columns.len() + 1);
         let same = |a: &Ledger, b: &Ledger| a.white == b.white && a.plain == b.plain;
         assert!(same(&together, &one_by_one));
-        // Others in their places, the last first, and back.
-        let at = [4, 1, 3];
-        together.replace_all(at.map(|at| (at, columns[at % columns.len()].clone())));
-        assert!(!same(&together, &one_by_one));
-        together.replace_all(at.map(|at| (at, columns[at - 1].clone())));
-        assert!(same(&together, &one_by_one));
-        // By the definition: white products weigh the low orders of a run by what scatter leaves of them.
-        let (a, b, run) = (&columns[1], &data, 3);
-        let low = kept(&a.low()[run], &b.low()[run], together.discounts(run));
-        let white = (low + a.product_outside(b, &runs[run].place)) / spread.noise_m2;
-        assert!((together.white_of(run).at(2, 0) / white - 1.0).abs() < 1e-12);
+        let mut all = [vec![data], columns].concat();
+        is_by_definition(&together, &all, &runs);
+        // Others in their places, the last first.
+        let changed = [(4, all[1].clone()), (1, all[2].clone()), (3, all[5].clone())];
+        changed.iter().for_each(|(at, column)| all[*at] = column.clone());
+        together.replace_all(changed);
+        is_by_definition(&together, &all, &runs);
+    }
+
+    /// White products weigh the low orders of a run by what scatter leaves of them, plain ones are without the centre.
+    fn is_by_definition(ledger: &Ledger, all: &[Column], runs: &[Prepared]) {
+        for (run, prepared) in runs.iter().enumerate() {
+            let [white, plain] = [&ledger.white[run], &ledger.plain[run]];
+            for (i, j) in (0..all.len()).flat_map(|i| (0..all.len()).map(move |j| (i, j))) {
+                let (a, b) = (&all[i].low()[run], &all[j].low()[run]);
+                let outside = all[i].product_outside(&all[j], &prepared.place);
+                let low: f64 = (0..COLUMNS).filter(|k| ![1, 2].contains(k)).map(|k| a[k] * b[k]).sum();
+                let close = |products: &Products, value: f64| {
+                    let size = (products.at(i, i) * products.at(j, j)).sqrt();
+                    (products.at(i, j) - value).abs() <= 1e-9 * size
+                };
+                assert!(close(plain, low + outside), "run {run}: {i}, {j}");
+                let weighed = kept(a, b, ledger.discounts(run)) + outside;
+                assert!(close(white, weighed / ledger.noise_m2), "run {run}: {i}, {j}");
+            }
+            assert!((0..all.len()).all(|i| white.at(i, i) > 0.0 && plain.at(i, i) > 0.0), "run {run}");
+        }
     }
 }
