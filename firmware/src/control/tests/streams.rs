@@ -114,6 +114,38 @@ fn a_stream_that_dries_up_comes_to_rest_and_faults() {
     assert_eq!(bench.desk.begin(), Err(MotionRefusal::Fault));
 }
 
+/// A host that was held up goes on as if nothing were amiss.
+#[test]
+fn a_fault_ends_a_stream_and_what_comes_behind_it_is_refused() {
+    let mut bench = bench();
+    bench.desk.begin_stream(1.0, 60).unwrap();
+    let mut source = Source::new([0; 3]);
+    for _ in 0..100 {
+        source.feed(&mut bench, 1000);
+        bench.ticks(10);
+    }
+    // Dried up; what comes while it slows down is taken, and too late.
+    bench.ticks(1100);
+    assert_eq!(bench.now().state, MotionState::Stopping);
+    source.feed(&mut bench, STREAMED);
+    assert!(bench.now().queued > 0);
+    while bench.now().fault.is_none() {
+        bench.ticks(1);
+    }
+    assert_eq!(bench.desk.points(&[]), Err(MotionRefusal::NoProgram));
+    assert_eq!(bench.desk.end(), Err(MotionRefusal::NoProgram));
+    // What was taken goes, one a tick, and it stays so.
+    bench.ticks(4);
+    let now = bench.now();
+    assert_eq!((now.state, now.queued), (MotionState::Fault, 0));
+    for _ in 0..50 {
+        bench.ticks(1);
+        assert_eq!(bench.desk.points(&[]), Err(MotionRefusal::NoProgram));
+        let later = bench.now();
+        assert_eq!((later.state, later.dropped_segments), (MotionState::Fault, now.dropped_segments));
+    }
+}
+
 #[test]
 fn set_points_that_come_late_are_left_out_and_the_stream_keeps_its_time() {
     let mut bench = bench();

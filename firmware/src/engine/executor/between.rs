@@ -67,7 +67,7 @@ impl Executor {
                 self.counters.dropped = self.counters.dropped.wrapping_add(1);
             } else if self.segment.start_nm != self.rest_nm {
                 self.counters.dropped = self.counters.dropped.wrapping_add(1);
-                self.fault = Some(Fault::Discontinuity);
+                self.fail(Fault::Discontinuity);
             } else {
                 self.begin_settle();
                 return self.finish(self.rest_nm, self.rest_offset_nm, flag::SETTLING);

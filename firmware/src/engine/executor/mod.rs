@@ -126,7 +126,7 @@ pub struct Executor {
     /// Of the vectors of an arc, as long: radial and tangential, and what X and Y take with opposite signs.
     shares: [i32; 4],
     sides: Sides,
-    /// Segments planned before the last stop carry an older epoch and are thrown away.
+    /// Segments planned before the last stop or fault carry an older epoch and are thrown away.
     epoch: u8,
     /// On the way to a standstill that was asked for.
     halting: bool,
@@ -175,7 +175,7 @@ impl Executor {
         self.mode == Mode::Rest
     }
 
-    /// Epoch that a planned segment must carry to be run; grows with each stop.
+    /// Epoch that a planned segment must carry to be run; grows with each stop and fault.
     pub const fn epoch(&self) -> u8 {
         self.epoch
     }
@@ -221,9 +221,10 @@ impl Executor {
         self.stop();
     }
 
-    /// Something beside the executor went wrong: nothing more runs until [`Self::clear_fault`].
+    /// Something went wrong at rest: nothing more runs until [`Self::clear_fault`], and what is open ends here.
     pub fn fail(&mut self, fault: Fault) {
         self.fault = Some(fault);
+        self.epoch = self.epoch.wrapping_add(1);
     }
 
     /// A stop was asked for and the machine still moves.
