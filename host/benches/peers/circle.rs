@@ -1,15 +1,14 @@
 //! Geometric circle fit: `circle-fit` and `scipy.optimize.least_squares`, and the time to read the points.
 use crate::Error;
-use crate::python::Peers;
+use crate::python::{Peers, store};
 use crate::table::{Table, Times, growth};
+use crate::timing::{repeats, timed_again};
 use giotto::fit::fit_circle;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use serde_json::json;
 use std::hint::black_box;
-use std::path::Path;
-use std::time::Instant;
 
 const SIZES: [usize; 5] = [1_000, 10_000, 100_000, 1_000_000, 10_000_000];
 /// Above this the peers need more memory and patience than the comparison is worth.
@@ -39,35 +38,6 @@ fn read(x: &[f64], y: &[f64]) -> f64 {
         lanes.iter().sum::<f64>()
     };
     x.par_chunks(32768).zip(y.par_chunks(32768)).map(|(x, y)| sum(x) + sum(y)).sum()
-}
-
-/// How often a work of this size is repeated within a round, by every contender: a clock has a grain, and the first time
-/// after a wait is that of a cold machine.
-pub(crate) fn repeats(size: usize) -> usize {
-    (100_000 / size).clamp(1, 20)
-}
-
-/// As [`timed`], the mean of several times in a row.
-pub(crate) fn timed_again<T>(times: usize, mut work: impl FnMut() -> T) -> (f64, T) {
-    let (seconds, value) = timed(|| {
-        (1..times).for_each(|_| {
-            black_box(work());
-        });
-        work()
-    });
-    (seconds / times as f64, value)
-}
-
-pub(crate) fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
-    let start = Instant::now();
-    let value = black_box(work());
-    (start.elapsed().as_secs_f64(), value)
-}
-
-/// Writes numbers as Python reads them.
-pub(crate) fn store(path: &Path, values: &[f64]) -> Result<(), Error> {
-    let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
-    Ok(std::fs::write(path, bytes)?)
 }
 
 /// Runs the part.

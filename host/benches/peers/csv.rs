@@ -1,8 +1,8 @@
 //! Reading a campaign: pandas and polars. giotto checks every number and every run as well; they only parse.
 use crate::Error;
-use crate::circle::timed;
 use crate::python::Peers;
 use crate::table::{Table, Times};
+use crate::timing::timed;
 use giotto::campaign;
 use serde_json::json;
 use std::fmt::Write as _;

@@ -1,8 +1,8 @@
 //! A whole diagnosis: a NumPy and SciPy script that does the same work by the same algorithm.
 use crate::Error;
-use crate::circle::{store, timed};
-use crate::python::Peers;
+use crate::python::{Peers, store};
 use crate::table::{Table, Times};
+use crate::timing::timed;
 use giotto::diagnosis::{Diagnosis, Options, diagnose};
 use giotto::simulation::{self, Plan};
 use giotto_shared::Axis;

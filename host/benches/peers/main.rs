@@ -15,6 +15,7 @@ mod plant;
 mod python;
 mod stepwise;
 mod table;
+mod timing;
 
 use python::Peers;
 use std::process::{Command, Stdio};

@@ -1,7 +1,8 @@
 """What people would otherwise use, timed on the same data: one request a line on stdin, one answer a line on stdout.
 
 Request: {"peer": NAME, "times": N, "data": {...}}; answer: {"seconds": S, "value": [...]}, S the mean of the N times in a
-row. Loading the data is not timed, except where reading is the work. Each peer is given what makes it fast: analytic Jacobians, contiguous arrays, all cores.
+row. Loading the data is not timed, except where reading is the work. Each peer is given what makes it fast: analytic
+Jacobians, contiguous arrays, all cores.
 """
 import glob
 import json

@@ -1,8 +1,8 @@
 //! The simulated machine: `scipy.signal.lsim` and `scipy.integrate.solve_ivp` on the same differential equations.
 use crate::Error;
-use crate::circle::timed;
 use crate::python::Peers;
 use crate::table::{Table, Times};
+use crate::timing::timed;
 use giotto::simulation::machine::{Machine, PositionLoop, SecondOrder};
 use giotto::simulation::{CircleTest, circle};
 use giotto_shared::Direction;

@@ -39,6 +39,12 @@ fn environment() -> Result<PathBuf, Error> {
     Ok(python)
 }
 
+/// Writes numbers as Python reads them.
+pub(crate) fn store(path: &Path, values: &[f64]) -> Result<(), Error> {
+    let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+    Ok(std::fs::write(path, bytes)?)
+}
+
 impl Peers {
     /// Starts the peers.
     pub(crate) fn start() -> Result<Self, Error> {

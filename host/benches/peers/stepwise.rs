@@ -1,8 +1,8 @@
 //! Stepwise fit with intervals: statsmodels.
 use crate::Error;
-use crate::circle::{repeats, store, timed_again};
-use crate::python::Peers;
+use crate::python::{Peers, store};
 use crate::table::{Table, Times};
+use crate::timing::{repeats, timed_again};
 use giotto::fit::{Observation, Options, RadiusFit};
 use giotto_shared::model::RadiusModel;
 use rand::{RngExt, SeedableRng};

@@ -57,7 +57,7 @@ impl<'a> Polar<'a> {
                 walk.blocks(a, v).for_each(|(a, v)| sum.merge(&part(a, v)));
                 sum
             };
-            let size = BLOCKS_A_TASK * walk.of;
+            let size = BLOCKS_A_TASK * walk.stride();
             if angle.len() <= size {
                 total.merge(&task((angle, deviation)));
             } else {

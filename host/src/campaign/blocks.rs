@@ -92,7 +92,7 @@ impl Text {
         let rest = self.size.saturating_sub(self.at);
         let large = rest > LARGE;
         let window = if large { BLOCK * BLOCKS } else { BLOCK.max(rest as usize) };
-        let block = if large { BLOCK } else { usize::MAX };
+        let block = if large { BLOCK } else { 1 };
         let mut next = Vec::new();
         let mut last = self.fill()?;
         loop {

@@ -18,7 +18,7 @@ impl Points for Parallel<'_> {
 
     fn sum<P: Part>(&self, walk: Walk, part: &P) -> P::Sum {
         let (x, y) = (self.0.x(), self.0.y());
-        let chunk = BLOCKS_A_TASK * walk.of;
+        let chunk = BLOCKS_A_TASK * walk.stride();
         if x.len() <= chunk {
             return lanes::sum(part, walk, x, y);
         }

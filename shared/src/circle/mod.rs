@@ -95,7 +95,7 @@ const MANY: usize = 6 * FEW;
 /// [`CircleError`] for fewer than three points, coincident or collinear points, or a coordinate that is not finite.
 pub fn fit(points: &(impl Points + ?Sized)) -> Result<CircleFit, CircleError> {
     if points.count() >= MANY {
-        let few = Walk { run: RUN, of: points.count() / (FEW / RUN) };
+        let few = Walk::some(RUN, points.count() / (FEW / RUN));
         let moments = Moments::of_walk(few, points);
         // Whatever is odd about the few is left to all of them to show.
         if let Ok(start) = hyper(&moments).and_then(|start| refine_walk(few, points, &moments, start))

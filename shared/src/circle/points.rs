@@ -15,15 +15,24 @@ pub trait Merge: Default + Send {
 /// Which points are walked over: the first `run` of each `of`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Walk {
-    /// Points of a block that are handed out, 1 ≤ `run` ≤ [`BLOCK`].
-    pub run: usize,
-    /// Points from one block to the next, at least `run`.
-    pub of: usize,
+    run: usize,
+    of: usize,
 }
 
 impl Walk {
     /// All points.
     pub const ALL: Self = Self { run: BLOCK, of: BLOCK };
+
+    /// The first `run` of each `of` points; 1 ≤ `run` ≤ [`BLOCK`], and `of` is no less.
+    pub(super) const fn some(run: usize, of: usize) -> Self {
+        assert!(run >= 1 && run <= BLOCK && of >= run);
+        Self { run, of }
+    }
+
+    /// Points from one block to the next.
+    pub const fn stride(self) -> usize {
+        self.of
+    }
 
     /// The blocks of the points (`x`, `y`), x and y of equal length.
     #[inline(always)]

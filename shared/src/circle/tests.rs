@@ -285,7 +285,7 @@ fn degenerate_planes_are_told_apart() {
 fn a_walk_sums_the_first_points_of_each_part() {
     let at = |i: usize| [(i * 37 % 1009) as f64, (i * 91 % 1013) as f64];
     let (x, y): (Vec<f64>, Vec<f64>) = (0..5003).map(|i| (at(i)[0], at(i)[1])).unzip();
-    let walk = Walk { run: 7, of: 100 };
+    let walk = Walk::some(7, 100);
     let some: Vec<[f64; 2]> = (0..5003).filter(|i| i % 100 < 7).map(at).collect();
     let of_some = Moments::of(some.as_slice());
     let walked = Moments::of_walk(walk, &Xy::new(&x, &y).unwrap());
