@@ -13,17 +13,30 @@ struct Memory {
 
 const BOARDS: [Memory; 3] = [
     // SSRAM1 as code memory, SSRAM2 as data memory (ARM DAI0386). The flash stand-in is at 0x0010_0000.
-    Memory { feature: "CARGO_FEATURE_MPS2_AN386", flash: 0x0000_0000, ram: 0x2000_0000 },
+    Memory {
+        feature: "CARGO_FEATURE_MPS2_AN386",
+        flash: 0x0000_0000,
+        ram: 0x2000_0000,
+    },
     // Sectors 0 to 4 of the flash; key and tables are in 9 to 11 (RM0090 3.3). The first of two RAMs (RM0090 2.3).
-    Memory { feature: "CARGO_FEATURE_STM32F405", flash: 0x0800_0000, ram: 0x2000_0000 },
-    Memory { feature: "CARGO_FEATURE_TICKS", flash: 0x0000_0000, ram: 0x2000_0000 },
+    Memory {
+        feature: "CARGO_FEATURE_STM32F405",
+        flash: 0x0800_0000,
+        ram: 0x2000_0000,
+    },
+    Memory {
+        feature: "CARGO_FEATURE_TICKS",
+        flash: 0x0000_0000,
+        ram: 0x2000_0000,
+    },
 ];
 
 /// Most text and most RAM, stack and all, of an image: not what the part has, so that what is too large does not link.
 /// Checking signatures takes a quarter more of the one and half as much again of the other; counting ticks links `libm`.
 fn room() -> [u32; 2] {
-    let larger =
-        ["CARGO_FEATURE_SIGNED", "CARGO_FEATURE_TICKS"].iter().any(|name| env::var_os(name).is_some());
+    let larger = ["CARGO_FEATURE_SIGNED", "CARGO_FEATURE_TICKS"]
+        .iter()
+        .any(|name| env::var_os(name).is_some());
     let factor = if larger { 2 } else { 1 };
     [factor * 64 * 1024, factor * 16 * 1024]
 }
@@ -31,11 +44,15 @@ fn room() -> [u32; 2] {
 /// Version of the package and, in a git work tree, the commit: what an image says of itself.
 fn build() -> String {
     let git = |arguments: &[&str]| {
-        let output =
-            Command::new("git").args(arguments).output().ok().filter(|output| output.status.success())?;
+        let output = Command::new("git")
+            .args(arguments)
+            .output()
+            .ok()
+            .filter(|output| output.status.success())?;
         Some(String::from_utf8(output.stdout).ok()?.trim().to_owned())
     };
-    let log = git(&["rev-parse", "--git-path", "logs/HEAD"]).filter(|log| fs::exists(log).unwrap_or(false));
+    let log = git(&["rev-parse", "--git-path", "logs/HEAD"])
+        .filter(|log| fs::exists(log).unwrap_or(false));
     if let Some(log) = log {
         println!("cargo:rerun-if-changed={log}");
     }
@@ -52,16 +69,25 @@ fn main() {
         return;
     }
     println!("cargo:rustc-env=GIOTTO_BUILD={}", build());
-    let chosen = BOARDS.iter().find(|board| env::var_os(board.feature).is_some());
-    let (Some(board), Some(out)) = (chosen, env::var_os("OUT_DIR")) else { return };
+    let chosen = BOARDS
+        .iter()
+        .find(|board| env::var_os(board.feature).is_some());
+    let (Some(board), Some(out)) = (chosen, env::var_os("OUT_DIR")) else {
+        return;
+    };
     let out = PathBuf::from(out);
-    let region = |name, (origin, length)| format!("  {name} : ORIGIN = {origin:#010x}, LENGTH = {length}\n");
+    let region =
+        |name, (origin, length)| format!("  {name} : ORIGIN = {origin:#010x}, LENGTH = {length}\n");
     let [text, ram] = room();
-    let (flash, ram) = (region("FLASH", (board.flash, text)), region("RAM", (board.ram, ram)));
+    let (flash, ram) = (
+        region("FLASH", (board.flash, text)),
+        region("RAM", (board.ram, ram)),
+    );
     let memory = format!("MEMORY\n{{\n{flash}{ram}}}\n");
-    for (name, text) in
-        [("memory.x", memory.as_str()), ("device.x", "/* the vector table names its handlers */\n")]
-    {
+    for (name, text) in [
+        ("memory.x", memory.as_str()),
+        ("device.x", "/* the vector table names its handlers */\n"),
+    ] {
         if let Err(error) = fs::write(out.join(name), text) {
             println!("cargo:error=cannot write {name}: {error}");
         }

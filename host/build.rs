@@ -23,7 +23,9 @@ fn main() -> io::Result<()> {
             _ if name == "index" => Ok(()),
             None => {
                 let close = if folder.take().is_some() { "}\n" } else { "" };
-                let nested = pages.keys().any(|other| other.starts_with(&format!("{name}/")));
+                let nested = pages
+                    .keys()
+                    .any(|other| other.starts_with(&format!("{name}/")));
                 if nested {
                     folder = Some(name.clone());
                 }
@@ -62,8 +64,11 @@ fn read(root: &Path, folder: &Path) -> io::Result<BTreeMap<String, String>> {
             pages.extend(read(root, &path)?);
         } else if path.extension().is_some_and(|e| e == "md") && !path.ends_with("SUMMARY.md") {
             let name = path.with_extension("");
-            let name =
-                name.strip_prefix(root).map_err(io::Error::other)?.to_string_lossy().replace('\\', "/");
+            let name = name
+                .strip_prefix(root)
+                .map_err(io::Error::other)?
+                .to_string_lossy()
+                .replace('\\', "/");
             pages.insert(name, fs::read_to_string(&path)?);
         }
     }
@@ -79,8 +84,9 @@ fn relinked(name: &str, text: &str) -> String {
         out += before;
         let Some(end) = after.find(')') else { break };
         let link = &after[..end];
-        let (path, anchor) =
-            link.split_once('#').map_or((link, String::new()), |(p, a)| (p, format!("#{a}")));
+        let (path, anchor) = link
+            .split_once('#')
+            .map_or((link, String::new()), |(p, a)| (p, format!("#{a}")));
         match path.strip_suffix(".md").filter(|p| !p.contains("://")) {
             Some(page) => out += &format!("{}{anchor}", address(name, page)),
             // A file beside the guide has no place in the documentation: its name stays, the link goes.
@@ -111,7 +117,15 @@ fn address(name: &str, page: &str) -> String {
         }
     }
     // Every page but the first is a folder of its own.
-    let up = if name == "index" { 0 } else { name.split('/').count() };
-    let target = if parts == ["index"] { String::new() } else { module(&parts.join("/")) + "/" };
+    let up = if name == "index" {
+        0
+    } else {
+        name.split('/').count()
+    };
+    let target = if parts == ["index"] {
+        String::new()
+    } else {
+        module(&parts.join("/")) + "/"
+    };
     "../".repeat(up) + &target + "index.html"
 }

@@ -16,8 +16,15 @@ const ARRIVAL: usize = 300;
 
 /// The machine.
 fn machine() -> Machine {
-    let servo = [PositionLoop { kv_per_s: 1.0 / LAG_S, feed_forward: 0.0 }; 2];
-    Machine { acc_dec: AccDec::MovingAverage(AVERAGE_S), servo, ..Machine::default() }
+    let servo = [PositionLoop {
+        kv_per_s: 1.0 / LAG_S,
+        feed_forward: 0.0,
+    }; 2];
+    Machine {
+        acc_dec: AccDec::MovingAverage(AVERAGE_S),
+        servo,
+        ..Machine::default()
+    }
 }
 
 /// A table that corrects this machine.
@@ -34,7 +41,13 @@ pub fn table() -> Vec<u8> {
         },
         terms: table::Terms::new(),
     };
-    let mut table = Table { limits: Limits { offset_m: 5e-3, slew_m_s: 0.1 }, ..Table::empty() };
+    let mut table = Table {
+        limits: Limits {
+            offset_m: 5e-3,
+            slew_m_s: 0.1,
+        },
+        ..Table::empty()
+    };
     table.machine = "contour".chars().collect();
     let _ = table.zones.push(zone); // an empty list takes one
     let mut bytes = vec![0; MAX_IMAGE_BYTES];
@@ -62,8 +75,12 @@ impl Errors {
 /// The errors of a recorded run; `distance` is that of a point from the programmed path, m.
 pub fn errors(recording: &Recording, distance: &dyn Fn([f64; 2]) -> f64) -> Errors {
     let largest = |pick: fn(&giotto::controller::SetPointRecord) -> [f64; 3]| {
-        let mut position_m: Vec<[f64; 2]> =
-            recording.points.iter().map(pick).map(|[x, y, _]| [x, y]).collect();
+        let mut position_m: Vec<[f64; 2]> = recording
+            .points
+            .iter()
+            .map(pick)
+            .map(|[x, y, _]| [x, y])
+            .collect();
         let end = position_m.last().copied().unwrap_or_default();
         position_m.extend([end; ARRIVAL]);
         let set_points = SetPoints {
@@ -74,7 +91,12 @@ pub fn errors(recording: &Recording, distance: &dyn Fn([f64; 2]) -> f64) -> Erro
             hold: Hold::Cubic,
         };
         let path = drive(&machine(), &set_points).position_m;
-        path.into_iter().map(|p| distance(p).abs()).fold(0.0, f64::max)
+        path.into_iter()
+            .map(|p| distance(p).abs())
+            .fold(0.0, f64::max)
     };
-    Errors { corrected: largest(|point| point.corrected_m), uncorrected: largest(|point| point.programmed_m) }
+    Errors {
+        corrected: largest(|point| point.corrected_m),
+        uncorrected: largest(|point| point.programmed_m),
+    }
 }

@@ -51,10 +51,18 @@ impl Image {
     /// Those of the file; `InvalidData` if it is no ELF image.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path)?;
-        let invalid = |error| Error::new(ErrorKind::InvalidData, format!("not a 32-bit ELF image: {error}"));
+        let invalid = |error| {
+            Error::new(
+                ErrorKind::InvalidData,
+                format!("not a 32-bit ELF image: {error}"),
+            )
+        };
         let file = object::File::parse(&*bytes).map_err(invalid)?;
         let mut image = Self {
-            size: Size { text: 0, variables: 0 },
+            size: Size {
+                text: 0,
+                variables: 0,
+            },
             functions: BTreeMap::new(),
             marks: BTreeMap::new(),
             segments: Vec::new(),
@@ -65,18 +73,27 @@ impl Image {
             if segment.address() >= RAM_BASE {
                 image.size.variables += segment.size() as u32;
             }
-            image.segments.push((segment.address() as u32, data.to_vec()));
+            image
+                .segments
+                .push((segment.address() as u32, data.to_vec()));
         }
         for symbol in file.symbols() {
-            let (Ok(name), address) = (symbol.name(), symbol.address() as u32 & !1) else { continue };
+            let (Ok(name), address) = (symbol.name(), symbol.address() as u32 & !1) else {
+                continue;
+            };
             match name.as_bytes() {
                 [b'$', b't', ..] => drop(image.marks.insert(address, true)),
                 [b'$', b'd', ..] => drop(image.marks.insert(address, false)),
                 _ if symbol.kind() == SymbolKind::Text && symbol.size() > 0 => {
                     let end = address + symbol.size() as u32;
-                    let function = Function { end, names: Vec::new() };
+                    let function = Function {
+                        end,
+                        names: Vec::new(),
+                    };
                     let function = image.functions.entry(address).or_insert(function);
-                    function.names.push(format!("{:#}", rustc_demangle::demangle(name)));
+                    function
+                        .names
+                        .push(format!("{:#}", rustc_demangle::demangle(name)));
                 }
                 _ => {}
             }
@@ -87,18 +104,27 @@ impl Image {
     /// Names of the functions for which `wanted` holds.
     pub fn functions(&self, wanted: impl Fn(&str) -> bool) -> Vec<&str> {
         let names = self.functions.values().flat_map(|function| &function.names);
-        names.map(String::as_str).filter(|name| wanted(name)).collect()
+        names
+            .map(String::as_str)
+            .filter(|name| wanted(name))
+            .collect()
     }
 
     /// Everything that the function of this name can reach; `None`: there is no such function.
     pub fn reach(&self, name: &str) -> Option<Reach> {
         let is_start = |function: &Function| function.names.iter().any(|one| one == name);
-        let start = *self.functions.iter().find(|(_, function)| is_start(function))?.0;
+        let start = *self
+            .functions
+            .iter()
+            .find(|(_, function)| is_start(function))?
+            .0;
         let mut reach = Reach::default();
         let mut seen = BTreeSet::from([start]);
         let mut open = vec![start];
         while let Some(address) = open.pop() {
-            let Some(function) = self.functions.get(&address) else { continue };
+            let Some(function) = self.functions.get(&address) else {
+                continue;
+            };
             reach.functions.extend(function.names.iter().cloned());
             let (targets, indirect) = self.jumps(address, function.end);
             if indirect {
@@ -106,7 +132,9 @@ impl Image {
             }
             for target in targets {
                 // A jump into the middle of a function is a jump into that function.
-                let Some((&entry, _)) = self.functions.range(..=target).next_back() else { continue };
+                let Some((&entry, _)) = self.functions.range(..=target).next_back() else {
+                    continue;
+                };
                 if seen.insert(entry) {
                     open.push(entry);
                 }
@@ -117,7 +145,9 @@ impl Image {
 
     fn half(&self, address: u32) -> Option<u32> {
         let (base, bytes) = self.segments.iter().rev().find(|(base, bytes)| {
-            address.checked_sub(*base).is_some_and(|offset| (offset as usize) < bytes.len())
+            address
+                .checked_sub(*base)
+                .is_some_and(|offset| (offset as usize) < bytes.len())
         })?;
         let pair = bytes.get((address - base) as usize..)?.first_chunk()?;
         Some(u32::from(u16::from_le_bytes(*pair)))
@@ -125,7 +155,10 @@ impl Image {
 
     /// Whether instructions, not constants, are at this address.
     fn is_code(&self, address: u32) -> bool {
-        self.marks.range(..=address).next_back().is_none_or(|(_, code)| *code)
+        self.marks
+            .range(..=address)
+            .next_back()
+            .is_none_or(|(_, code)| *code)
     }
 
     /// Targets of the calls and jumps that leave `start..end`, and whether a call goes through a pointer.
@@ -135,9 +168,15 @@ impl Image {
             let Some(first) = self.half(at) else { break };
             let wide = first >= 0xe800;
             if self.is_code(at) {
-                let second = if wide { self.half(at + 2).unwrap_or(0) } else { 0 };
+                let second = if wide {
+                    self.half(at + 2).unwrap_or(0)
+                } else {
+                    0
+                };
                 match jump(at, first, second) {
-                    Some(Jump::To(target)) if !(start..end).contains(&target) => targets.push(target),
+                    Some(Jump::To(target)) if !(start..end).contains(&target) => {
+                        targets.push(target)
+                    }
                     Some(Jump::Through) => indirect = true,
                     _ => {}
                 }

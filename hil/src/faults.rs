@@ -88,7 +88,12 @@ struct Breaker {
 
 impl Breaker {
     fn new(seed: u64, share: f64, tally: Arc<Tally>) -> Self {
-        Self { random: ChaCha8Rng::seed_from_u64(seed), share, delayed: Vec::new(), tally }
+        Self {
+            random: ChaCha8Rng::seed_from_u64(seed),
+            share,
+            delayed: Vec::new(),
+            tally,
+        }
     }
 
     /// A place in the piece.
@@ -138,7 +143,12 @@ impl<L: Link> FaultyLink<L> {
     pub fn new(inner: L, seed: u64, share: f64) -> Self {
         let tally = Arc::new(Tally::default());
         let breaker = |seed| Breaker::new(seed, share, Arc::clone(&tally));
-        Self { inner, to_controller: breaker(seed), to_host: breaker(!seed), pending: VecDeque::new() }
+        Self {
+            inner,
+            to_controller: breaker(seed),
+            to_host: breaker(!seed),
+            pending: VecDeque::new(),
+        }
     }
 
     /// The counts, which go on while the link is in use.
@@ -151,7 +161,10 @@ impl<L: Link> Link for FaultyLink<L> {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         // The zero that a client sends before a frame is a piece, but no frame.
         let frame = u64::from(bytes.len() > 1);
-        self.to_controller.tally.to_controller.fetch_add(frame, Relaxed);
+        self.to_controller
+            .tally
+            .to_controller
+            .fetch_add(frame, Relaxed);
         let broken = self.to_controller.pass(bytes);
         self.inner.send(&broken)
     }
@@ -199,7 +212,9 @@ pub struct Report {
 /// The largest table, with a number for its name.
 fn table(number: u64) -> Vec<u8> {
     let mut image = largest_table();
-    let Ok(mut table) = table::decode(&image) else { return image };
+    let Ok(mut table) = table::decode(&image) else {
+        return image;
+    };
     table.machine = number.to_string().chars().collect();
     image.resize(MAX_IMAGE_BYTES, 0);
     let length = table::encode(&table, &mut image).unwrap_or(0);
@@ -212,11 +227,31 @@ fn program(number: u64) -> Vec<Step> {
     let x = 0.01 + 0.001 * (number % 20) as f64;
     let arc = |sweep_rad, rise_m| {
         let (centre_m, normal) = ([x, 0.01, 0.0], [0.0, 0.0, 1.0]);
-        Segment::Arc { centre_m, normal, sweep_rad, rise_m, feed_m_s: 0.3 }
+        Segment::Arc {
+            centre_m,
+            normal,
+            sweep_rad,
+            rise_m,
+            feed_m_s: 0.3,
+        }
     };
-    let line = |to_m| Segment::Line { to_m, feed_m_s: 0.3 };
-    let segments = [line([x, 0.0, 0.0]), arc(2.0, 0.002), arc(-2.0, -0.002), line([0.0; 3]), arc(0.5, 0.0)];
-    segments.map(|segment| Step { segment, tolerance_m: 0.0 }).to_vec()
+    let line = |to_m| Segment::Line {
+        to_m,
+        feed_m_s: 0.3,
+    };
+    let segments = [
+        line([x, 0.0, 0.0]),
+        arc(2.0, 0.002),
+        arc(-2.0, -0.002),
+        line([0.0; 3]),
+        arc(0.5, 0.0),
+    ];
+    segments
+        .map(|segment| Step {
+            segment,
+            tolerance_m: 0.0,
+        })
+        .to_vec()
 }
 
 /// What came of programs over a link that breaks what passes.
@@ -238,13 +273,23 @@ pub struct ProgramReport {
 ///
 /// # Errors
 /// Those of opening the session.
-pub fn programs_over_faults(frames: u64, share: f64, seed: u64) -> Result<ProgramReport, ControllerError> {
+pub fn programs_over_faults(
+    frames: u64,
+    share: f64,
+    seed: u64,
+) -> Result<ProgramReport, ControllerError> {
     let link = FaultyLink::new(VirtualLink::new(), seed, share);
     let tally = link.tally();
     let mut controller = Controller::connect(Box::new(link), "sim with faults", 1)?;
     // A disturbed line is not a dead one.
     controller.supervise(None)?;
-    let mut report = ProgramReport { programs: 0, astray: 0, given_up: 0, repeats: 0, tally };
+    let mut report = ProgramReport {
+        programs: 0,
+        astray: 0,
+        given_up: 0,
+        repeats: 0,
+        tally,
+    };
     while report.tally.frames_sent() < frames {
         let sent = controller.send_program(&program(report.programs));
         if sent.is_err() {
@@ -279,7 +324,13 @@ pub fn flash_over_faults(frames: u64, share: f64, seed: u64) -> Result<Report, C
     let link = FaultyLink::new(VirtualLink::new(), seed, share);
     let tally = link.tally();
     let mut controller = Controller::connect(Box::new(link), "sim with faults", 1)?;
-    let mut report = Report { flashes: 0, retries: 0, repeats: 0, wrong: 0, tally };
+    let mut report = Report {
+        flashes: 0,
+        retries: 0,
+        repeats: 0,
+        wrong: 0,
+        tally,
+    };
     let mut good: Option<Vec<u8>> = None;
     while report.tally.frames_sent() < frames {
         let new = table(report.flashes);
@@ -291,8 +342,14 @@ pub fn flash_over_faults(frames: u64, share: f64, seed: u64) -> Result<Report, C
             Err(_) => report.retries += 1,
         }
         let mut verdict = |image| (0..QUESTIONS).find_map(|_| controller.verify(image).ok());
-        let verdicts: Vec<_> = good.iter().chain([&new]).map(|image| verdict(image)).collect();
-        let same = verdicts.iter().any(|verdict| matches!(verdict, Some(Verdict::Same { .. })));
+        let verdicts: Vec<_> = good
+            .iter()
+            .chain([&new])
+            .map(|image| verdict(image))
+            .collect();
+        let same = verdicts
+            .iter()
+            .any(|verdict| matches!(verdict, Some(Verdict::Same { .. })));
         let unknown = verdicts.iter().all(Option::is_none);
         let none_yet = good.is_none() && verdicts.contains(&Some(Verdict::None));
         report.wrong += u64::from(!(same || unknown || none_yet));

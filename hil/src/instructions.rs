@@ -10,7 +10,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Where the record is.
-pub const RECORD: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../host/benches/instructions.toml");
+pub const RECORD: &str = concat!(
+    env!("CARGO_MANIFEST_DIR"),
+    "/../host/benches/instructions.toml"
+);
 /// A count may grow by so much, percent.
 pub const TOLERANCE_PERCENT: f64 = 3.0;
 /// Kernels of `host/examples/kernels.rs`.
@@ -38,13 +41,18 @@ fn other(reason: impl ToString) -> CountError {
 fn kernels() -> Result<PathBuf, CountError> {
     let exe = std::env::current_exe().map_err(other)?;
     let built = exe.ancestors().find(|a| a.join("examples").is_dir());
-    let path = built.map(|a| a.join("examples").join("kernels")).filter(|p| p.is_file());
+    let path = built
+        .map(|a| a.join("examples").join("kernels"))
+        .filter(|p| p.is_file());
     path.ok_or_else(|| other("the kernels are not built: run cargo build --workspace --examples"))
 }
 
 /// Whether callgrind is installed.
 pub fn has_valgrind() -> bool {
-    Command::new("valgrind").arg("--version").output().is_ok_and(|out| out.status.success())
+    Command::new("valgrind")
+        .arg("--version")
+        .output()
+        .is_ok_and(|out| out.status.success())
 }
 
 fn collected(program: &Path, kernel: &str, times: u32) -> Result<u64, CountError> {
@@ -56,7 +64,9 @@ fn collected(program: &Path, kernel: &str, times: u32) -> Result<u64, CountError
         .output()
         .map_err(other)?;
     let text = String::from_utf8_lossy(&out.stderr);
-    let count = text.lines().find_map(|line| line.split("Collected :").nth(1)?.trim().parse().ok());
+    let count = text
+        .lines()
+        .find_map(|line| line.split("Collected :").nth(1)?.trim().parse().ok());
     count
         .filter(|_| out.status.success())
         .ok_or_else(|| other(format_args!("{kernel}: callgrind says {text}")))
@@ -81,8 +91,12 @@ pub fn of_kernels() -> Result<Counts, CountError> {
 /// As [`ticks::count`].
 pub fn of_ticks(note: &mut dyn FnMut(&str)) -> Result<Counts, CountError> {
     let ours = |name: &String| !name.starts_with("naive");
-    let counts = ticks::count(note)?.into_iter().filter(|(name, _)| ours(name));
-    Ok(counts.map(|(name, (_, most))| (format!("tick.{name}"), u64::from(most))).collect())
+    let counts = ticks::count(note)?
+        .into_iter()
+        .filter(|(name, _)| ours(name));
+    Ok(counts
+        .map(|(name, (_, most))| (format!("tick.{name}"), u64::from(most)))
+        .collect())
 }
 
 /// The record as text.
@@ -103,9 +117,13 @@ pub fn write(counts: &Counts, compiler: &str) -> String {
 /// A line that is neither.
 pub fn read(text: &str) -> Result<(Counts, String), CountError> {
     let (mut counts, mut compiler) = (Counts::new(), String::new());
-    for line in text.lines().filter(|l| !l.starts_with('#') && !l.trim().is_empty()) {
-        let (name, value) =
-            line.split_once(" = ").ok_or_else(|| other(format_args!("not a count: {line}")))?;
+    for line in text
+        .lines()
+        .filter(|l| !l.starts_with('#') && !l.trim().is_empty())
+    {
+        let (name, value) = line
+            .split_once(" = ")
+            .ok_or_else(|| other(format_args!("not a count: {line}")))?;
         match value.parse() {
             Ok(count) => drop(counts.insert(name.to_owned(), count)),
             Err(_) if name == "compiler" => value.trim_matches('"').clone_into(&mut compiler),
@@ -123,10 +141,16 @@ pub fn growth_percent(now: u64, recorded: Option<&u64>) -> Option<f64> {
 /// The compiler at hand, and the vectors that host kernels are counted with.
 pub fn compiler() -> String {
     let out = Command::new("rustc").arg("--version").output();
-    let version = out
-        .map_or_else(|_| "unknown".to_owned(), |out| String::from_utf8_lossy(&out.stdout).trim().to_owned());
+    let version = out.map_or_else(
+        |_| "unknown".to_owned(),
+        |out| String::from_utf8_lossy(&out.stdout).trim().to_owned(),
+    );
     #[cfg(target_arch = "x86_64")]
-    let vectors = if std::arch::is_x86_feature_detected!("avx2") { "AVX2" } else { "SSE2" };
+    let vectors = if std::arch::is_x86_feature_detected!("avx2") {
+        "AVX2"
+    } else {
+        "SSE2"
+    };
     #[cfg(not(target_arch = "x86_64"))]
     let vectors = std::env::consts::ARCH;
     format!("{version}, {vectors}")
@@ -138,10 +162,15 @@ mod tests {
 
     #[test]
     fn a_record_is_read_as_it_was_written() {
-        let counts =
-            Counts::from([("kernel.circle_fit".to_owned(), 12_345), ("tick.stream".to_owned(), 150)]);
+        let counts = Counts::from([
+            ("kernel.circle_fit".to_owned(), 12_345),
+            ("tick.stream".to_owned(), 150),
+        ]);
         let text = write(&counts, "rustc 1.95.0 (59807616e 2026-04-14)");
-        assert_eq!(read(&text).unwrap(), (counts, "rustc 1.95.0 (59807616e 2026-04-14)".to_owned()));
+        assert_eq!(
+            read(&text).unwrap(),
+            (counts, "rustc 1.95.0 (59807616e 2026-04-14)".to_owned())
+        );
         assert!(read("tick.stream = many").is_err());
     }
 

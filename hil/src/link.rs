@@ -37,9 +37,17 @@ impl Report {
     /// runs on the machine slows both of a round.
     pub fn rates(&self) -> [f64; 3] {
         let rate = |seconds: &[f64]| self.table_bytes as f64 / median(seconds);
-        let ratios: Vec<f64> =
-            self.echo_s.iter().zip(&self.table_s).map(|(echo, table)| echo / table).collect();
-        [rate(&self.table_s), rate(&self.echo_s), 100.0 * median(&ratios)]
+        let ratios: Vec<f64> = self
+            .echo_s
+            .iter()
+            .zip(&self.table_s)
+            .map(|(echo, table)| echo / table)
+            .collect();
+        [
+            rate(&self.table_s),
+            rate(&self.echo_s),
+            100.0 * median(&ratios),
+        ]
     }
 
     /// Whether the bar is met.
@@ -71,7 +79,10 @@ impl Report {
 pub fn measure(note: &mut dyn FnMut(&str)) -> Result<Report, ControllerError> {
     let table = largest_table();
     let board = Board::Mps2An386;
-    let images = [image::ensure_with(board, &["echo"], note)?, image::ensure(board, note)?];
+    let images = [
+        image::ensure_with(board, &["echo"], note)?,
+        image::ensure(board, note)?,
+    ];
     let [echo, giotto] = images.map(|image| {
         move || Emulator::start_board(board, Some(&image), Pace::Fast, &mut |_| {})?.into_link()
     });
@@ -85,10 +96,16 @@ pub fn measure(note: &mut dyn FnMut(&str)) -> Result<Report, ControllerError> {
         drop(link);
         let mut controller = Controller::connect(Box::new(giotto()?), "qemu", 1)?;
         flashed(&mut controller, &table)?;
-        let times: Result<Vec<_>, _> = (0..TIMES).map(|_| flashed(&mut controller, &table)).collect();
+        let times: Result<Vec<_>, _> = (0..TIMES)
+            .map(|_| flashed(&mut controller, &table))
+            .collect();
         table_s.push(median(&times?));
     }
-    Ok(Report { table_bytes: table.len(), table_s, echo_s })
+    Ok(Report {
+        table_bytes: table.len(),
+        table_s,
+        echo_s,
+    })
 }
 
 /// Seconds until the table is confirmed.
@@ -107,13 +124,20 @@ fn returned(link: &mut impl Link, bytes: &[u8]) -> Result<f64, ControllerError> 
     while back.len() < bytes.len() {
         let to = bytes.len().min(back.len() + IN_FLIGHT);
         if to > sent {
-            link.send(&bytes[sent..to]).map_err(|e| fault(e.to_string()))?;
+            link.send(&bytes[sent..to])
+                .map_err(|e| fault(e.to_string()))?;
             sent = to;
         }
         let until = link.now() + Duration::from_secs(5);
-        let count = link.receive(&mut buffer, until).map_err(|e| fault(e.to_string()))?;
+        let count = link
+            .receive(&mut buffer, until)
+            .map_err(|e| fault(e.to_string()))?;
         if count == 0 {
-            return Err(fault(format!("the echo stopped after {} of {} bytes", back.len(), bytes.len())));
+            return Err(fault(format!(
+                "the echo stopped after {} of {} bytes",
+                back.len(),
+                bytes.len()
+            )));
         }
         back.extend_from_slice(&buffer[..count]);
     }

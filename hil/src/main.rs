@@ -104,14 +104,36 @@ enum Command {
 fn main() -> ExitCode {
     let done = match Cli::parse().command {
         Command::Ticks { json } => run_ticks(json),
-        Command::Run { port, baud, image, worn_flash, json } => {
-            run_scenarios(&port, &OpenOptions { image, baud, pace: Pace::Fast }, worn_flash, json)
-        }
+        Command::Run {
+            port,
+            baud,
+            image,
+            worn_flash,
+            json,
+        } => run_scenarios(
+            &port,
+            &OpenOptions {
+                image,
+                baud,
+                pace: Pace::Fast,
+            },
+            worn_flash,
+            json,
+        ),
         Command::Link { json, check } => run_link(json, check),
         Command::Instructions { record } => return run_instructions(record),
         Command::Rate { json, check } => run_rate(json, check),
-        Command::Size { board, signed, json, check } => run_size(&board, signed, json, check),
-        Command::Faults { frames, share, seed } => run_faults(frames, share, seed),
+        Command::Size {
+            board,
+            signed,
+            json,
+            check,
+        } => run_size(&board, signed, json, check),
+        Command::Faults {
+            frames,
+            share,
+            seed,
+        } => run_faults(frames, share, seed),
     };
     match done {
         Ok(code) => code,
@@ -157,7 +179,10 @@ fn run_ticks(as_json: bool) -> Result<ExitCode, ControllerError> {
     for (name, (min, max)) in &counts {
         println!("  {name:20} {min:5} to {max:5}");
     }
-    println!("image: {} bytes text, {} RAM with a stack of {}", image.text, image.ram, image.stack);
+    println!(
+        "image: {} bytes text, {} RAM with a stack of {}",
+        image.text, image.ram, image.stack
+    );
     Ok(ExitCode::SUCCESS)
 }
 
@@ -175,7 +200,14 @@ fn run_scenarios(
     for (at, scenario) in scenarios::ALL.iter().chain(&streams::ALL).enumerate() {
         if at == scenarios::ALL.len() && emulated {
             // In the emulator time would run away from whoever sends or records every set-point.
-            controller = open(&port, &OpenOptions { pace: Pace::Slow, ..options.clone() }, &mut note)?;
+            controller = open(
+                &port,
+                &OpenOptions {
+                    pace: Pace::Slow,
+                    ..options.clone()
+                },
+                &mut note,
+            )?;
         }
         let outcome = scenarios::run(scenario, &mut controller);
         let good = match outcome {
@@ -190,16 +222,25 @@ fn run_scenarios(
             Outcome::Failed(how) => format!("failed: {how}"),
         };
         if !as_json {
-            println!("{} {}: {words}", if good { "ok    " } else { "FAILED" }, scenario.0);
+            println!(
+                "{} {}: {words}",
+                if good { "ok    " } else { "FAILED" },
+                scenario.0
+            );
         }
         done.push(json!({ "scenario": scenario.0, "ok": good, "outcome": words }));
     }
     if as_json {
         let identity = controller.identity();
-        let document = json!({ "board": identity.board, "build": identity.build, "scenarios": done });
+        let document =
+            json!({ "board": identity.board, "build": identity.build, "scenarios": done });
         println!("{document:#}");
     }
-    Ok(if failed == 0 { ExitCode::SUCCESS } else { ExitCode::from(5) })
+    Ok(if failed == 0 {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(5)
+    })
 }
 
 fn run_link(as_json: bool, check: bool) -> Result<ExitCode, ControllerError> {
@@ -214,7 +255,11 @@ fn run_link(as_json: bool, check: bool) -> Result<ExitCode, ControllerError> {
             link::BAR_PERCENT
         );
     }
-    Ok(if check && !report.meets_bar() { ExitCode::from(5) } else { ExitCode::SUCCESS })
+    Ok(if check && !report.meets_bar() {
+        ExitCode::from(5)
+    } else {
+        ExitCode::SUCCESS
+    })
 }
 
 fn run_instructions(record: bool) -> ExitCode {
@@ -237,7 +282,11 @@ fn count_instructions(record: bool) -> Result<ExitCode, CountError> {
     }
     let compiler = instructions::compiler();
     if record {
-        std::fs::write(instructions::RECORD, instructions::write(&counts, &compiler)).map_err(failed)?;
+        std::fs::write(
+            instructions::RECORD,
+            instructions::write(&counts, &compiler),
+        )
+        .map_err(failed)?;
         println!("{} counts recorded", counts.len());
         return Ok(ExitCode::SUCCESS);
     }
@@ -248,8 +297,14 @@ fn count_instructions(record: bool) -> Result<ExitCode, CountError> {
         let growth = instructions::growth_percent(now, recorded.get(name));
         let too_much = growth.is_none_or(|percent| percent > instructions::TOLERANCE_PERCENT);
         grown += u32::from(too_much);
-        let words = growth.map_or_else(|| "not recorded".to_owned(), |percent| format!("{percent:+.2} %"));
-        println!("{} {name:28} {now:12} {words}", if too_much { "GROWN" } else { "ok   " });
+        let words = growth.map_or_else(
+            || "not recorded".to_owned(),
+            |percent| format!("{percent:+.2} %"),
+        );
+        println!(
+            "{} {name:28} {now:12} {words}",
+            if too_much { "GROWN" } else { "ok   " }
+        );
     }
     if grown > 0 {
         println!(
@@ -258,7 +313,11 @@ fn count_instructions(record: bool) -> Result<ExitCode, CountError> {
         );
         println!("if that is meant, write it down: giotto-hil instructions --record");
     }
-    Ok(if grown == 0 { ExitCode::SUCCESS } else { ExitCode::from(5) })
+    Ok(if grown == 0 {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(5)
+    })
 }
 
 fn run_rate(as_json: bool, check: bool) -> Result<ExitCode, ControllerError> {
@@ -283,16 +342,28 @@ fn run_rate(as_json: bool, check: bool) -> Result<ExitCode, ControllerError> {
             rate::FLASH_BAR_S
         );
     }
-    Ok(if check && !report.meets_bars() { ExitCode::from(5) } else { ExitCode::SUCCESS })
+    Ok(if check && !report.meets_bars() {
+        ExitCode::from(5)
+    } else {
+        ExitCode::SUCCESS
+    })
 }
 
-fn run_size(board: &str, signed: bool, as_json: bool, check: bool) -> Result<ExitCode, ControllerError> {
+fn run_size(
+    board: &str,
+    signed: bool,
+    as_json: bool,
+    check: bool,
+) -> Result<ExitCode, ControllerError> {
     let Some(board) = Board::named(board) else {
         eprintln!("error: no board {board}: there are mps2_an386 and stm32f405");
         return Ok(ExitCode::from(2));
     };
-    let report =
-        size::measure(board, if signed { &["signed"] } else { &[] }, &mut |text: &str| eprintln!("{text}"))?;
+    let report = size::measure(
+        board,
+        if signed { &["signed"] } else { &[] },
+        &mut |text: &str| eprintln!("{text}"),
+    )?;
     if as_json {
         println!("{:#}", report.document());
     } else {
@@ -306,20 +377,36 @@ fn run_size(board: &str, signed: bool, as_json: bool, check: bool) -> Result<Exi
             report.stack
         );
         println!("  panics in the image: {}", names(report.panics.iter()));
-        println!("  panics that the tick can reach: {}", names(report.panics_in_tick().iter()));
-        println!("  calls of the tick through pointers: {}", names(report.tick.indirect.iter()));
+        println!(
+            "  panics that the tick can reach: {}",
+            names(report.panics_in_tick().iter())
+        );
+        println!(
+            "  calls of the tick through pointers: {}",
+            names(report.tick.indirect.iter())
+        );
     }
-    Ok(if check && !report.meets_bars() { ExitCode::from(5) } else { ExitCode::SUCCESS })
+    Ok(if check && !report.meets_bars() {
+        ExitCode::from(5)
+    } else {
+        ExitCode::SUCCESS
+    })
 }
 
 fn names(names: impl Iterator<Item = impl std::fmt::Display>) -> String {
     let names: Vec<String> = names.map(|name| name.to_string()).collect();
-    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+    if names.is_empty() {
+        "none".to_owned()
+    } else {
+        names.join(", ")
+    }
 }
 
 fn run_faults(frames: u64, share: f64, seed: u64) -> Result<ExitCode, ControllerError> {
     let broken = |tally: &faults::Tally| {
-        let kinds = tally.broken().map(|(fault, count)| format!("{fault:?} {count}").to_lowercase());
+        let kinds = tally
+            .broken()
+            .map(|(fault, count)| format!("{fault:?} {count}").to_lowercase());
         println!("broken: {}", kinds.join(", "));
     };
     let report = faults::flash_over_faults(frames, share, seed)?;
@@ -346,5 +433,9 @@ fn run_faults(frames: u64, share: f64, seed: u64) -> Result<ExitCode, Controller
     );
     broken(&paths.tally);
     let good = report.wrong + paths.astray == 0 && report.flashes > 0 && paths.programs > 0;
-    Ok(if good { ExitCode::SUCCESS } else { ExitCode::from(5) })
+    Ok(if good {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(5)
+    })
 }

@@ -19,16 +19,31 @@ const BAR: f64 = 0.05;
 pub(crate) const TRIES: usize = 3;
 
 fn line(x: f64, y: f64) -> Segment {
-    Segment::Line { to_m: [x, y, 0.0], feed_m_s: FEED_M_S }
+    Segment::Line {
+        to_m: [x, y, 0.0],
+        feed_m_s: FEED_M_S,
+    }
 }
 
 fn quarter(x: f64, y: f64) -> Segment {
     let (normal, sweep_rad) = ([0.0, 0.0, 1.0], PI / 2.0);
-    Segment::Arc { centre_m: [x, y, 0.0], normal, sweep_rad, rise_m: 0.0, feed_m_s: FEED_M_S }
+    Segment::Arc {
+        centre_m: [x, y, 0.0],
+        normal,
+        sweep_rad,
+        rise_m: 0.0,
+        feed_m_s: FEED_M_S,
+    }
 }
 
 fn steps(segments: &[Segment]) -> Vec<Step> {
-    segments.iter().map(|&segment| Step { segment, tolerance_m: 0.0 }).collect()
+    segments
+        .iter()
+        .map(|&segment| Step {
+            segment,
+            tolerance_m: 0.0,
+        })
+        .collect()
 }
 
 /// Where segments lead from a place, nm.
@@ -52,11 +67,16 @@ fn recorded(
         controller.move_to(start_nm, FEED_M_S)?;
         let before = controller.status()?.counters.segments;
         let recording = match controller.run_program(&steps(segments), 1) {
-            Err(ProgramError { error: ControllerError::SetPointsLost { .. }, .. }) if !last => continue,
+            Err(ProgramError {
+                error: ControllerError::SetPointsLost { .. },
+                ..
+            }) if !last => continue,
             other => other?,
         };
         let done = controller.status()?.counters.segments.wrapping_sub(before);
-        ensure(done as usize == segments.len(), || format!("{done} segments done"))?;
+        ensure(done as usize == segments.len(), || {
+            format!("{done} segments done")
+        })?;
         return Ok(recording);
     }
     Err(Trouble::Wrong("never recorded".to_owned()))
@@ -95,17 +115,25 @@ pub fn ends_exactly(controller: &mut Controller) -> Result<(), Trouble> {
     let expected = end_nm(start_nm, &segments)?;
     let recording = recorded(controller, start_nm, &segments)?;
     let after = controller.status()?;
-    ensure(after.raw_nm == expected, || format!("ends at {:?}, not at {expected:?}", after.raw_nm))?;
+    ensure(after.raw_nm == expected, || {
+        format!("ends at {:?}, not at {expected:?}", after.raw_nm)
+    })?;
     // No step in velocity: never more than the acceleration of one tick.
     let dt = recording.dt_s;
     let mut worst = 0.0_f64;
     for triple in recording.points.windows(3) {
-        let [a, b, c] = [triple[0].corrected_m, triple[1].corrected_m, triple[2].corrected_m];
+        let [a, b, c] = [
+            triple[0].corrected_m,
+            triple[1].corrected_m,
+            triple[2].corrected_m,
+        ];
         let size: f64 = (0..3).map(|i| (c[i] - 2.0 * b[i] + a[i]).powi(2)).sum();
         worst = worst.max(size.sqrt() / (dt * dt));
     }
     ensure(worst < 5.1, || format!("{worst} m/s² commanded"))?;
-    ensure(after.counters.tick_overruns == 0, || "ticks are late".to_owned())
+    ensure(after.counters.tick_overruns == 0, || {
+        "ticks are late".to_owned()
+    })
 }
 
 /// The host dies with segments in the queue.
@@ -118,7 +146,10 @@ pub fn silent_host(controller: &mut Controller) -> Result<(), Trouble> {
     controller.command(Command::Begin)?;
     for (n, x) in [0.08, 0.02, 0.06].into_iter().enumerate() {
         let segment = line(x, 0.0).exact(at).map_err(ControllerError::from)?;
-        controller.command(Command::Append { segment, tolerance_nm: 0 })?;
+        controller.command(Command::Append {
+            segment,
+            tolerance_nm: 0,
+        })?;
         at = segment.end_nm(at);
         if n == 0 {
             first = at;
@@ -128,10 +159,16 @@ pub fn silent_host(controller: &mut Controller) -> Result<(), Trouble> {
     controller.stay_silent(Duration::from_millis(2500))?;
     controller.supervise(None)?;
     let after = at_rest(controller)?;
-    ensure(after.raw_nm == first, || format!("stands at {:?}, not at {first:?}", after.raw_nm))?;
+    ensure(after.raw_nm == first, || {
+        format!("stands at {:?}, not at {first:?}", after.raw_nm)
+    })?;
     let (was, is) = (before.counters, after.counters);
-    ensure(is.link_losses == was.link_losses + 1, || format!("not noticed: {is:?}"))?;
-    ensure(is.dropped_segments == was.dropped_segments + 2, || format!("dropped: {is:?}"))?;
+    ensure(is.link_losses == was.link_losses + 1, || {
+        format!("not noticed: {is:?}")
+    })?;
+    ensure(is.dropped_segments == was.dropped_segments + 2, || {
+        format!("dropped: {is:?}")
+    })?;
     refused_as(controller.command(Command::End), |refusal| {
         *refusal == Refusal::Motion(MotionRefusal::NoProgram)
     })
@@ -145,7 +182,10 @@ fn contour_of(
     distance: &dyn Fn([f64; 2]) -> f64,
 ) -> Result<Errors, Trouble> {
     let [x_nm, y_nm] = start_m.map(|m| (m * 1e9).round() as i32);
-    Ok(contour::errors(&recorded(controller, [x_nm, y_nm, 0], segments)?, distance))
+    Ok(contour::errors(
+        &recorded(controller, [x_nm, y_nm, 0], segments)?,
+        distance,
+    ))
 }
 
 /// Line, arc, line; and a rounded rectangle: set-points from the controller, the machine behind them simulated.
@@ -176,8 +216,15 @@ pub fn contour(controller: &mut Controller) -> Result<(), Trouble> {
         quarter(r, r),
     ];
     let rounded = |[x, y]: [f64; 2]| {
-        let (dx, dy) = ((x - w / 2.0).abs() - (w / 2.0 - r), (y - h / 2.0).abs() - (h / 2.0 - r));
-        if dx > 0.0 && dy > 0.0 { dx.hypot(dy) - r } else { dx.max(dy) - r }
+        let (dx, dy) = (
+            (x - w / 2.0).abs() - (w / 2.0 - r),
+            (y - h / 2.0).abs() - (h / 2.0 - r),
+        );
+        if dx > 0.0 && dy > 0.0 {
+            dx.hypot(dy) - r
+        } else {
+            dx.max(dy) - r
+        }
     };
     let errors = contour_of(controller, [r, 0.0], &rectangle, &rounded)?;
     holds("rounded rectangle", errors, BAR)?;

@@ -77,7 +77,9 @@ pub fn measure(note: &mut dyn FnMut(&str)) -> Result<Report, ControllerError> {
     while !matches!(status.motion, MotionState::Idle | MotionState::Fault) {
         // Not the spans before and during the start.
         if status.tick.wrapping_sub(begun) > tick_hz {
-            least = status.idle_permille.map_or(least, |permille| least.min(f64::from(permille) / 10.0));
+            least = status
+                .idle_permille
+                .map_or(least, |permille| least.min(f64::from(permille) / 10.0));
         }
         controller.stay_silent(std::time::Duration::from_millis(5))?;
         status = controller.status()?;
@@ -103,5 +105,8 @@ fn flash_time(board: Board, note: &mut dyn FnMut(&str)) -> Result<(f64, f64), Co
     controller.verify(&table)?;
     let clock_s = started.elapsed().as_secs_f64();
     let ticks = controller.status()?.tick.wrapping_sub(before);
-    Ok((clock_s, f64::from(ticks) / f64::from(controller.identity().tick_hz)))
+    Ok((
+        clock_s,
+        f64::from(ticks) / f64::from(controller.identity().tick_hz),
+    ))
 }

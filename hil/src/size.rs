@@ -37,9 +37,15 @@ pub struct Report {
 }
 
 fn panics(name: &str) -> bool {
-    ["core::panicking", "panic_already", "unwrap_failed", "expect_failed", "rust_begin_unwind"]
-        .iter()
-        .any(|part| name.contains(part))
+    [
+        "core::panicking",
+        "panic_already",
+        "unwrap_failed",
+        "expect_failed",
+        "rust_begin_unwind",
+    ]
+    .iter()
+    .any(|part| name.contains(part))
 }
 
 impl Report {
@@ -50,7 +56,12 @@ impl Report {
 
     /// Functions that panic and that the tick can reach.
     pub fn panics_in_tick(&self) -> Vec<&str> {
-        self.tick.functions.iter().map(String::as_str).filter(|name| panics(name)).collect()
+        self.tick
+            .functions
+            .iter()
+            .map(String::as_str)
+            .filter(|name| panics(name))
+            .collect()
     }
 
     /// Whether every bar is met.
@@ -90,9 +101,22 @@ pub fn measure(
     let stack = deepest_stack(board, &path, note)?;
     let failed = |reason: String| ControllerError::Emulator { reason };
     let image = Image::read(&path).map_err(|error| failed(error.to_string()))?;
-    let tick = image.reach(TICK).ok_or_else(|| failed(format!("the image has no {TICK}")))?;
-    let panics = image.functions(panics).into_iter().map(str::to_owned).collect();
-    Ok(Report { board, text: image.size.text, variables: image.size.variables, stack, panics, tick })
+    let tick = image
+        .reach(TICK)
+        .ok_or_else(|| failed(format!("the image has no {TICK}")))?;
+    let panics = image
+        .functions(panics)
+        .into_iter()
+        .map(str::to_owned)
+        .collect();
+    Ok(Report {
+        board,
+        text: image.size.text,
+        variables: image.size.variables,
+        stack,
+        panics,
+        tick,
+    })
 }
 
 /// One of each kind of segment, where a zone of the largest table holds.
@@ -105,12 +129,19 @@ fn path() -> [Segment; 4] {
         rise_m,
         feed_m_s: 0.3,
     };
-    let line = Segment::Line { to_m: [0.1, 0.0, 0.0], feed_m_s: 0.3 };
+    let line = Segment::Line {
+        to_m: [0.1, 0.0, 0.0],
+        feed_m_s: 0.3,
+    };
     [line, arc(0.0), arc(0.01), Segment::Dwell { time_s: 0.01 }]
 }
 
 /// Flashes the largest table twice, rolls back, runs corrected circles, resets; asks how deep the stack went.
-fn deepest_stack(board: Board, image: &Path, note: &mut dyn FnMut(&str)) -> Result<u32, ControllerError> {
+fn deepest_stack(
+    board: Board,
+    image: &Path,
+    note: &mut dyn FnMut(&str),
+) -> Result<u32, ControllerError> {
     use giotto_shared::wire::Command;
     let emulator = Emulator::start_board(board, Some(image), Pace::Fast, note)?;
     let mut controller = Controller::connect(Box::new(emulator.into_link()?), "qemu", 1)?;
@@ -124,7 +155,15 @@ fn deepest_stack(board: Board, image: &Path, note: &mut dyn FnMut(&str)) -> Resu
         controller.run_circle(&circle(0.1, 0.5, direction, 1), EVERY)?;
     }
     for segment in path() {
-        controller.run_program(&[Step { segment, tolerance_m: 0.0 }], EVERY).map_err(|e| e.error)?;
+        controller
+            .run_program(
+                &[Step {
+                    segment,
+                    tolerance_m: 0.0,
+                }],
+                EVERY,
+            )
+            .map_err(|e| e.error)?;
     }
     if flashed {
         controller.command(Command::Rollback)?;

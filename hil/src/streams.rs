@@ -10,11 +10,23 @@ use std::f64::consts::TAU;
 
 /// Every set-point is sent or recorded. In an emulator they need a time that a busy host can keep up with.
 pub const ALL: [Scenario; 5] = [
-    ("a program ends where its segments do, to the nanometre", programs::ends_exactly),
-    ("flash, programs: contour of arcs between lines, through a machine", programs::contour),
+    (
+        "a program ends where its segments do, to the nanometre",
+        programs::ends_exactly,
+    ),
+    (
+        "flash, programs: contour of arcs between lines, through a machine",
+        programs::contour,
+    ),
     ("a stream is followed set-point by set-point", followed),
-    ("flash, streams: contour of an ellipse and a figure of eight, through a machine", contour),
-    ("a stream that dries up comes to rest and faults until a reset", dries_up),
+    (
+        "flash, streams: contour of an ellipse and a figure of eight, through a machine",
+        contour,
+    ),
+    (
+        "a stream that dries up comes to rest and faults until a reset",
+        dries_up,
+    ),
 ];
 
 /// Time in which a stream gains its speed, and loses it, s: 150 time constants of the machine behind it, as in the library's own
@@ -40,7 +52,9 @@ fn places(curve: Curve, rate: f64, tick_s: f64) -> Vec<[i32; 3]> {
         let [x, y] = curve(rate * (way(t) - way((t - turn_s).max(0.0))));
         [(x * 1e9).round() as i32, (y * 1e9).round() as i32, 0]
     };
-    (0..=((turn_s + START_S) / tick_s).ceil() as usize).map(place).collect()
+    (0..=((turn_s + START_S) / tick_s).ceil() as usize)
+        .map(place)
+        .collect()
 }
 
 /// Streams a curve from rest at its start, again if the host was too busy to keep up with an emulator.
@@ -68,25 +82,48 @@ fn tick_s(controller: &Controller) -> f64 {
 fn followed(controller: &mut Controller) -> Result<(), Trouble> {
     let places_nm = places(ellipse, 8.0, tick_s(controller));
     let streamed = streamed(controller, &places_nm)?;
-    ensure(streamed.missing + streamed.late + streamed.rejected == 0, || {
-        let Streamed { missing, late, rejected, .. } = &streamed;
-        format!("{missing} missing, {late} late, {rejected} rejected")
-    })?;
+    ensure(
+        streamed.missing + streamed.late + streamed.rejected == 0,
+        || {
+            let Streamed {
+                missing,
+                late,
+                rejected,
+                ..
+            } = &streamed;
+            format!("{missing} missing, {late} late, {rejected} rejected")
+        },
+    )?;
     let nm = |metres: [f64; 3]| metres.map(|m| (m * 1e9).round() as i32);
     // From the first that moves on, each in its turn.
     let start_nm = places_nm.first().copied().unwrap_or_default();
     let moved = |places: Vec<[i32; 3]>| -> Vec<[i32; 3]> {
-        places.into_iter().skip_while(|place| *place == start_nm).collect()
+        places
+            .into_iter()
+            .skip_while(|place| *place == start_nm)
+            .collect()
     };
-    let out = moved(streamed.recording.points.iter().map(|point| nm(point.programmed_m)).collect());
+    let out = moved(
+        streamed
+            .recording
+            .points
+            .iter()
+            .map(|point| nm(point.programmed_m))
+            .collect(),
+    );
     let same = out.starts_with(&moved(places_nm.clone()));
-    ensure(same, || "a set-point is not the one that was sent".to_owned())?;
+    ensure(same, || {
+        "a set-point is not the one that was sent".to_owned()
+    })?;
     let status = controller.status()?;
     let (end, is) = (places_nm.last().copied(), status.raw_nm);
-    ensure(end == Some(is) && status.motion == MotionState::Idle, || {
-        format!("ends at {is:?}, not at {end:?}")
-    })?;
-    ensure(status.counters.tick_overruns == 0, || "ticks are late".to_owned())
+    ensure(
+        end == Some(is) && status.motion == MotionState::Idle,
+        || format!("ends at {is:?}, not at {end:?}"),
+    )?;
+    ensure(status.counters.tick_overruns == 0, || {
+        "ticks are late".to_owned()
+    })
 }
 
 /// Distance from a polyline of many points, m.
@@ -102,11 +139,15 @@ fn from_polyline(points: &[[f64; 2]], p: [f64; 2]) -> f64 {
 
 fn contour(controller: &mut Controller) -> Result<(), Trouble> {
     controller.flash(&contour::table(), &mut |_| {})?;
-    let shapes: [(&str, Curve, f64, f64); 2] =
-        [("ellipse", ellipse, 5.0, 0.02), ("figure of eight", eight, 4.0, 0.05)];
+    let shapes: [(&str, Curve, f64, f64); 2] = [
+        ("ellipse", ellipse, 5.0, 0.02),
+        ("figure of eight", eight, 4.0, 0.05),
+    ];
     for (name, curve, rate, bar) in shapes {
         let streamed = streamed(controller, &places(curve, rate, tick_s(controller)))?;
-        let points: Vec<[f64; 2]> = (0..=2000).map(|i| curve(TAU * f64::from(i) / 2000.0)).collect();
+        let points: Vec<[f64; 2]> = (0..=2000)
+            .map(|i| curve(TAU * f64::from(i) / 2000.0))
+            .collect();
         let errors = contour::errors(&streamed.recording, &|p| from_polyline(&points, p));
         holds(name, errors, bar)?;
     }
@@ -120,12 +161,20 @@ fn dries_up(controller: &mut Controller) -> Result<(), Trouble> {
     // The end of the first half is no end: nobody says so.
     let before = streamed(controller, &places_nm)?;
     let dry = controller.run_stream_without_end(half, 0.5)?;
-    ensure(dry.fault == Some(FaultCause::Starved) && dry.motion == MotionState::Fault, || {
-        format!("{dry:?}")
+    ensure(
+        dry.fault == Some(FaultCause::Starved) && dry.motion == MotionState::Fault,
+        || format!("{dry:?}"),
+    )?;
+    ensure(dry.raw_nm == dry.corrected_nm, || {
+        format!("not at rest without correction: {dry:?}")
     })?;
-    ensure(dry.raw_nm == dry.corrected_nm, || format!("not at rest without correction: {dry:?}"))?;
-    ensure(controller.command(Command::Begin).is_err(), || "something starts in fault".to_owned())?;
+    ensure(controller.command(Command::Begin).is_err(), || {
+        "something starts in fault".to_owned()
+    })?;
     controller.reset()?;
     let after = controller.status()?;
-    ensure(after.motion == MotionState::Idle && !before.recording.points.is_empty(), || format!("{after:?}"))
+    ensure(
+        after.motion == MotionState::Idle && !before.recording.points.is_empty(),
+        || format!("{after:?}"),
+    )
 }

@@ -5,7 +5,9 @@ use giotto::controller::image::{self, Board};
 use giotto::controller::{ControllerError, OpenOptions, Port, circle, open};
 use giotto_shared::Direction;
 use giotto_shared::model::Cumulants;
-use giotto_shared::table::{self, Limits, MAX_IMAGE_BYTES, MAX_TERMS, MAX_ZONES, Table, Travel, Zone};
+use giotto_shared::table::{
+    self, Limits, MAX_IMAGE_BYTES, MAX_TERMS, MAX_ZONES, Table, Travel, Zone,
+};
 use giotto_shared::term::Term;
 use std::collections::BTreeMap;
 use std::process::{Command, Stdio};
@@ -31,7 +33,9 @@ pub struct ImageSize {
 }
 
 fn emulator(reason: impl ToString) -> ControllerError {
-    ControllerError::Emulator { reason: reason.to_string() }
+    ControllerError::Emulator {
+        reason: reason.to_string(),
+    }
 }
 
 fn parse(text: &str) -> Option<Counts> {
@@ -41,7 +45,11 @@ fn parse(text: &str) -> Option<Counts> {
             return Some(counts);
         }
         let mut words = line.split(' ');
-        let (name, least, most) = (words.next()?, words.next()?.parse().ok()?, words.next()?.parse().ok()?);
+        let (name, least, most) = (
+            words.next()?,
+            words.next()?.parse().ok()?,
+            words.next()?.parse().ok()?,
+        );
         counts.insert(name.to_owned(), (least, most));
     }
     None
@@ -56,7 +64,14 @@ pub fn count(note: &mut dyn FnMut(&str)) -> Result<Counts, ControllerError> {
     let folder = tempfile::tempdir().map_err(emulator)?;
     let output = folder.path().join("uart0");
     let mut process = Command::new(program())
-        .args(["-machine", Board::Ticks.machine(), "-display", "none", "-monitor", "none"])
+        .args([
+            "-machine",
+            Board::Ticks.machine(),
+            "-display",
+            "none",
+            "-monitor",
+            "none",
+        ])
         .args(["-icount", "shift=10,sleep=off", "-kernel"])
         .arg(&image)
         .args(["-serial", &format!("file:{}", output.display())])
@@ -84,13 +99,19 @@ pub fn count(note: &mut dyn FnMut(&str)) -> Result<Counts, ControllerError> {
 /// The largest table there is.
 pub fn largest_table() -> Vec<u8> {
     let mut table = Table::empty();
-    table.limits = Limits { offset_m: 2e-3, slew_m_s: 0.1 };
+    table.limits = Limits {
+        offset_m: 2e-3,
+        slew_m_s: 0.1,
+    };
     let mut zone = Zone {
         place_m: Some([[-1.0; 3], [1.0; 3]]),
         radius_m: [0.05, 0.3],
         feed_m_s: [0.02, 0.7],
         travel: Travel::Both,
-        cumulants: Cumulants { kappa2_s2: 46.58e-6, kappa4_s4: -5.53e-6 },
+        cumulants: Cumulants {
+            kappa2_s2: 46.58e-6,
+            kappa4_s4: -5.53e-6,
+        },
         terms: heapless_terms(),
     };
     while !table.zones.is_full() {
@@ -108,7 +129,11 @@ pub fn largest_table() -> Vec<u8> {
 }
 
 fn heapless_terms() -> giotto_shared::table::Terms {
-    let spike = Term::ReversalSpike { axis: giotto_shared::Axis::X, peak_m: 2e-6, decay_s: 0.02 };
+    let spike = Term::ReversalSpike {
+        axis: giotto_shared::Axis::X,
+        peak_m: 2e-6,
+        decay_s: 0.02,
+    };
     std::iter::repeat_n(spike, MAX_TERMS).collect()
 }
 
@@ -127,5 +152,9 @@ pub fn image_size(note: &mut dyn FnMut(&str)) -> Result<ImageSize, ControllerErr
         controller.status()?;
     }
     let stack = controller.status()?.stack_bytes;
-    Ok(ImageSize { text: size.text, ram: size.variables + stack, stack })
+    Ok(ImageSize {
+        text: size.text,
+        ram: size.variables + stack,
+        stack,
+    })
 }

@@ -1,5 +1,8 @@
 //! The image in QEMU over a real pty, opened with the serialport crate. Needs the emulator: `.ci/setup` brings it.
-#![allow(clippy::unwrap_used, reason = "helpers of a test fail as the test does")]
+#![allow(
+    clippy::unwrap_used,
+    reason = "helpers of a test fail as the test does"
+)]
 use giotto::controller::emulator::{Emulator, Pace};
 use giotto::controller::flash::Verdict;
 use giotto::controller::port::BAUD;
@@ -37,37 +40,73 @@ fn flash_status_verify_reset_verify_and_every_refusal_leaves_the_table() {
     assert_eq!((flashed.slot, flashed.generation), (0, 1));
     let status = controller.status().unwrap();
     assert!(!status.bypass && status.active == Some(0));
-    assert_eq!(controller.verify(&table).unwrap(), Verdict::Same { slot: 0 });
+    assert_eq!(
+        controller.verify(&table).unwrap(),
+        Verdict::Same { slot: 0 }
+    );
     controller.reset().unwrap();
-    assert_eq!(controller.verify(&table).unwrap(), Verdict::Same { slot: 0 });
+    assert_eq!(
+        controller.verify(&table).unwrap(),
+        Verdict::Same { slot: 0 }
+    );
 
     // In use: a second program does not get the port.
-    assert!(matches!(connect(&emulator), Err(ControllerError::InUse { .. })));
+    assert!(matches!(
+        connect(&emulator),
+        Err(ControllerError::InUse { .. })
+    ));
 
     // A broken table that a careless client sends: refused, the old one intact.
     let mut broken = other_table();
     broken[40] ^= 1;
     let refused = controller.write(&broken, &mut |_| {});
-    let crc = matches!(refused, Err(ControllerError::Refused(Refusal::Table(TableError::BadCrc { .. }))));
+    let crc = matches!(
+        refused,
+        Err(ControllerError::Refused(Refusal::Table(
+            TableError::BadCrc { .. }
+        )))
+    );
     assert!(crc, "{refused:?}");
-    assert_eq!(controller.verify(&table).unwrap(), Verdict::Same { slot: 0 });
+    assert_eq!(
+        controller.verify(&table).unwrap(),
+        Verdict::Same { slot: 0 }
+    );
 
     // Written and committed, never confirmed: gone after a reset.
     controller.write(&other_table(), &mut |_| {}).unwrap();
     controller.command(Command::Commit).unwrap();
-    assert_eq!(controller.verify(&other_table()).unwrap(), Verdict::Same { slot: 1 });
+    assert_eq!(
+        controller.verify(&other_table()).unwrap(),
+        Verdict::Same { slot: 1 }
+    );
     controller.reset().unwrap();
-    assert_eq!(controller.verify(&table).unwrap(), Verdict::Same { slot: 0 });
+    assert_eq!(
+        controller.verify(&table).unwrap(),
+        Verdict::Same { slot: 0 }
+    );
 
     // And it moves.
-    let recording = controller.run_circle(&circle(0.1, 0.5, Direction::Ccw, 1), 1).unwrap();
-    assert!(recording.points.iter().any(|point| point.programmed_m != point.corrected_m));
+    let recording = controller
+        .run_circle(&circle(0.1, 0.5, Direction::Ccw, 1), 1)
+        .unwrap();
+    assert!(
+        recording
+            .points
+            .iter()
+            .any(|point| point.programmed_m != point.corrected_m)
+    );
     assert_eq!(controller.status().unwrap().counters.tick_overruns, 0);
 }
 
 #[test]
 fn ports_that_are_none_are_told_apart() {
     let open = |path| SerialLink::open(path, BAUD).map(drop);
-    assert!(matches!(open("/dev/giotto-is-not-here"), Err(ControllerError::NoPort { .. })));
-    assert!(matches!(open("/dev/null"), Err(ControllerError::CannotOpen { .. })));
+    assert!(matches!(
+        open("/dev/giotto-is-not-here"),
+        Err(ControllerError::NoPort { .. })
+    ));
+    assert!(matches!(
+        open("/dev/null"),
+        Err(ControllerError::CannotOpen { .. })
+    ));
 }

@@ -1,6 +1,9 @@
 //! Flashing with several requests on their way: one mishap at every frame in turn, both ways; a line that dies at every
 //! frame; lines slow and fast.
-#![allow(clippy::unwrap_used, reason = "helpers of a test fail as the test does")]
+#![allow(
+    clippy::unwrap_used,
+    reason = "helpers of a test fail as the test does"
+)]
 use giotto::controller::flash::{Verdict, active_table};
 use giotto::controller::link::Link;
 use giotto::controller::virtual_controller::VirtualLink;
@@ -106,7 +109,14 @@ impl Line {
             held: Vec::new(),
             happened: Arc::clone(&happened),
         });
-        (Self { inner: inner.clone(), ways, pending: VecDeque::new() }, happened)
+        (
+            Self {
+                inner: inner.clone(),
+                ways,
+                pending: VecDeque::new(),
+            },
+            happened,
+        )
     }
 }
 
@@ -168,7 +178,13 @@ fn with_table(image: &[u8]) -> Wired {
 #[test]
 fn one_mishap_at_every_frame_in_turn() {
     let (old, new) = (table("old"), table("new"));
-    for mishap in [Mishap::Lost, Mishap::Damaged, Mishap::Twice, Mishap::Passed, Mishap::Echoed] {
+    for mishap in [
+        Mishap::Lost,
+        Mishap::Damaged,
+        Mishap::Twice,
+        Mishap::Passed,
+        Mishap::Echoed,
+    ] {
         for way in [0, 1] {
             let mut frames = 0;
             for at in 0.. {
@@ -178,7 +194,11 @@ fn one_mishap_at_every_frame_in_turn() {
                 let mut client = Controller::connect(Box::new(line), "sim", 2).unwrap();
                 let flashed = client.flash(&new, &mut |_| {}).expect(&what);
                 assert_eq!((flashed.slot, flashed.generation), (1, 2), "{what}");
-                assert_eq!(client.verify(&new).unwrap(), Verdict::Same { slot: 1 }, "{what}");
+                assert_eq!(
+                    client.verify(&new).unwrap(),
+                    Verdict::Same { slot: 1 },
+                    "{what}"
+                );
                 let status = client.status().unwrap();
                 assert_eq!(status.probation, Probation::None, "{what}");
                 let generation = |slot: usize| match status.slots[slot] {
@@ -216,18 +236,28 @@ fn a_line_that_dies_leaves_a_whole_table() {
                 flashed.unwrap();
                 break;
             }
-            assert!(matches!(flashed, Err(ControllerError::NoAnswer { .. })), "{flashed:?}");
+            assert!(
+                matches!(flashed, Err(ControllerError::NoAnswer { .. })),
+                "{flashed:?}"
+            );
             let mut client = connect(&controller, 3);
             client.reset().unwrap();
             let (slot, _) = active_table(&client.status().unwrap()).unwrap();
             let image = if slot == 0 { &old } else { &new };
-            assert_eq!(client.verify(image).unwrap(), Verdict::Same { slot }, "way {way}, frame {at}");
+            assert_eq!(
+                client.verify(image).unwrap(),
+                Verdict::Same { slot },
+                "way {way}, frame {at}"
+            );
             outcomes[usize::from(slot)] += 1;
             // And nothing is in the way of the next one.
             client.flash(&new, &mut |_| {}).unwrap();
         }
         // Only once the confirmation has arrived is it the new one: its answer or those of two statuses are lost then.
-        assert!(outcomes[0] > 20 && (1..=2).contains(&outcomes[1]), "{outcomes:?}");
+        assert!(
+            outcomes[0] > 20 && (1..=2).contains(&outcomes[1]),
+            "{outcomes:?}"
+        );
     }
 }
 
@@ -299,7 +329,10 @@ fn what_is_on_its_way_fits_the_controller() {
         let mut client = Controller::connect(Box::new(line), "sim", 1).unwrap();
         client.flash(&largest_table(), &mut |_| {}).unwrap();
         let longest = longest.load(Relaxed);
-        assert!((3 * MAX_FRAME..=IN_FLIGHT).contains(&longest), "{baud} baud: {longest}");
+        assert!(
+            (3 * MAX_FRAME..=IN_FLIGHT).contains(&longest),
+            "{baud} baud: {longest}"
+        );
         assert_eq!(client.repeats(), 0, "{baud} baud");
     }
 }
@@ -310,6 +343,9 @@ fn a_line_slower_than_patience_is_still_a_line() {
     let (line, _) = Serial::new(2400.0);
     let mut client = Controller::connect(Box::new(line), "sim", 1).unwrap();
     client.flash(&largest_table(), &mut |_| {}).unwrap();
-    assert_eq!(client.verify(&largest_table()).unwrap(), Verdict::Same { slot: 0 });
+    assert_eq!(
+        client.verify(&largest_table()).unwrap(),
+        Verdict::Same { slot: 0 }
+    );
     assert!(client.repeats() > 0);
 }

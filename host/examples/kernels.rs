@@ -43,7 +43,8 @@ fn campaign_rows() -> Result<Box<dyn Fn()>, Box<dyn Error>> {
     let mut rows = String::from("time_s,deviation_um\n");
     for k in 0..20_000 {
         let turn = f64::from(k) / 20_000.0;
-        let deviation = -100.0 + 20.0 * (std::f64::consts::TAU * turn).cos() + 2.0 * wave(k as usize);
+        let deviation =
+            -100.0 + 20.0 * (std::f64::consts::TAU * turn).cos() + 2.0 * wave(k as usize);
         writeln!(rows, "{:.6},{deviation:.1}", turn * std::f64::consts::TAU)?;
     }
     std::fs::write(folder.path().join("run.csv"), rows)?;
@@ -58,8 +59,14 @@ fn campaign_rows() -> Result<Box<dyn Fn()>, Box<dyn Error>> {
 /// A lap of 1000 samples with lag and mechanics.
 fn plant_lap() -> Result<Box<dyn Fn()>, Box<dyn Error>> {
     let machine = Machine {
-        servo: [PositionLoop { kv_per_s: 40.0, feed_forward: 0.0 }; 2],
-        mechanics: [Some(SecondOrder { omega_n_rad_s: 60.0, zeta: 0.5 }); 2],
+        servo: [PositionLoop {
+            kv_per_s: 40.0,
+            feed_forward: 0.0,
+        }; 2],
+        mechanics: [Some(SecondOrder {
+            omega_n_rad_s: 60.0,
+            zeta: 0.5,
+        }); 2],
         ..Machine::default()
     };
     let test = CircleTest::new(0.1, 0.3, Direction::Ccw);
@@ -71,9 +78,17 @@ fn plant_lap() -> Result<Box<dyn Fn()>, Box<dyn Error>> {
 /// The radius model of 300 runs.
 fn stepwise_fit() -> Result<Box<dyn Fn()>, Box<dyn Error>> {
     let run = |k: usize| {
-        let (radius_m, feed_m_s) = ([0.1, 0.15, 0.3][k % 3], 0.02 + 0.68 * (k as f64 * 0.377).fract());
+        let (radius_m, feed_m_s) = (
+            [0.1, 0.15, 0.3][k % 3],
+            0.02 + 0.68 * (k as f64 * 0.377).fract(),
+        );
         let radius_error_m = -23.29e-6 * feed_m_s * feed_m_s / radius_m + 0.5e-6 * wave(k);
-        Observation { radius_m, feed_m_s, radius_error_m, out_of_roundness_m: None }
+        Observation {
+            radius_m,
+            feed_m_s,
+            radius_error_m,
+            out_of_roundness_m: None,
+        }
     };
     let runs: Vec<Observation> = (0..300).map(run).collect();
     Ok(Box::new(move || {
@@ -83,9 +98,15 @@ fn stepwise_fit() -> Result<Box<dyn Fn()>, Box<dyn Error>> {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let kernel = KERNELS.iter().find(|(name, _)| arguments.first().is_some_and(|a| a == name));
+    let kernel = KERNELS
+        .iter()
+        .find(|(name, _)| arguments.first().is_some_and(|a| a == name));
     let (Some((_, make)), Some(times)) = (kernel, arguments.get(1)) else {
-        return Err(format!("expected one of {:?} and a number of times", KERNELS.map(|k| k.0)).into());
+        return Err(format!(
+            "expected one of {:?} and a number of times",
+            KERNELS.map(|k| k.0)
+        )
+        .into());
     };
     let work = make()?;
     (0..times.parse()?).for_each(|_: u32| work());

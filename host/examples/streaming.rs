@@ -19,7 +19,12 @@ const RADII_MM: [f64; 3] = [100.0, 150.0, 300.0];
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let value = |name: &str| arguments.iter().position(|a| a == name).and_then(|k| arguments.get(k + 1));
+    let value = |name: &str| {
+        arguments
+            .iter()
+            .position(|a| a == name)
+            .and_then(|k| arguments.get(k + 1))
+    };
     if let Some(path) = value("--measure") {
         return measure(Path::new(path));
     }
@@ -38,8 +43,15 @@ fn main() -> Result<(), Box<dyn Error>> {
             None => write(&dir, runs, rows)?,
         }
     }
-    let status = std::process::Command::new(std::env::current_exe()?).arg("--measure").arg(&path).status()?;
-    if status.success() { Ok(()) } else { Err("the measurement failed".into()) }
+    let status = std::process::Command::new(std::env::current_exe()?)
+        .arg("--measure")
+        .arg(&path)
+        .status()?;
+    if status.success() {
+        Ok(())
+    } else {
+        Err("the measurement failed".into())
+    }
 }
 
 fn measure(path: &Path) -> Result<(), Box<dyn Error>> {
@@ -67,9 +79,14 @@ fn measure(path: &Path) -> Result<(), Box<dyn Error>> {
     let seconds = start.elapsed().as_secs_f64();
     let rows: usize = report.runs.iter().map(|r| r.samples).sum();
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let peak = status
-        .lines()
-        .find_map(|l| l.strip_prefix("VmHWM:")?.trim().strip_suffix("kB")?.trim().parse::<f64>().ok());
+    let peak = status.lines().find_map(|l| {
+        l.strip_prefix("VmHWM:")?
+            .trim()
+            .strip_suffix("kB")?
+            .trim()
+            .parse::<f64>()
+            .ok()
+    });
     println!(
         "{{\"runs\":{},\"rows\":{rows},\"seconds\":{seconds:.3},\"of_these_looking_through\":{opened:.3},\"rows_per_second\":{:.3e},\"peak_mb\":{}}}",
         report.runs.len(),
@@ -87,7 +104,9 @@ fn write_foreign(path: &Path, layout: &str, rows: usize) -> Result<(), Box<dyn E
         "leica" => "X  [mm],Y  [mm],Z  [mm],U(95)  [mm],Time Stamp",
         "kflop" => "time,pos0,pos1,pos2,dest0,dest1,dest2",
         "german" => "Zeit [s];Abweichung [µm]",
-        other => return Err(format!("no layout \"{other}\"; expected leica, kflop or german").into()),
+        other => {
+            return Err(format!("no layout \"{other}\"; expected leica, kflop or german").into());
+        }
     };
     writeln!(out, "{header}")?;
     let turn_s = TAU * RADIUS_MM / FOREIGN_FEED_MM_S;
@@ -95,13 +114,22 @@ fn write_foreign(path: &Path, layout: &str, rows: usize) -> Result<(), Box<dyn E
     let around = (rows - 2 * lead) as f64;
     let mut state = 1u64;
     for row in 0..rows {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         let noise = (state >> 40) as f64 / f64::from(1 << 23) - 1.0;
         let turn = (row as f64 - lead as f64) / around;
         let beyond = TAU * RADIUS_MM * (turn - turn.clamp(0.0, 1.0));
-        let ((sin, cos), t) = ((TAU * turn.clamp(0.0, 1.0)).sin_cos(), turn_s * row as f64 / around);
+        let ((sin, cos), t) = (
+            (TAU * turn.clamp(0.0, 1.0)).sin_cos(),
+            turn_s * row as f64 / around,
+        );
         if layout == "german" {
-            writeln!(out, "{}", format!("{t:.7};{:.1}", 45.0 * cos - 30.0 + 2.0 * noise).replace('.', ","))?;
+            writeln!(
+                out,
+                "{}",
+                format!("{t:.7};{:.1}", 45.0 * cos - 30.0 + 2.0 * noise).replace('.', ",")
+            )?;
             continue;
         }
         let radius = RADIUS_MM - 0.03 + 0.002 * noise + 0.01 * (2.0 * cos * cos - 1.0);
@@ -110,7 +138,10 @@ fn write_foreign(path: &Path, layout: &str, rows: usize) -> Result<(), Box<dyn E
         let (x, y, z) = (1832.4 + x, -977.1 + y, 611.8 - 0.02 * x);
         if layout == "leica" {
             let (minute, second) = ((t / 60.0) as u32, t % 60.0);
-            writeln!(out, "{x:.5},{y:.5},{z:.5},0.0152,'08.11.2022 16:{minute:02}:{second:010.7}")?;
+            writeln!(
+                out,
+                "{x:.5},{y:.5},{z:.5},0.0152,'08.11.2022 16:{minute:02}:{second:010.7}"
+            )?;
         } else {
             writeln!(out, "{t:.7},{x:.5},{y:.5},{z:.5},{u:.5},{v:.5},0")?;
         }
@@ -123,21 +154,35 @@ fn write(dir: &Path, runs: usize, rows: usize) -> Result<(), Box<dyn Error>> {
     let mut toml = "[campaign]\nname = \"streaming\"\nmachine = \"made up\"\n".to_owned();
     let mut state = 1u64;
     for run in 0..runs {
-        let (radius, feed) =
-            (if runs == 1 { RADIUS_MM } else { RADII_MM[run / 2 % 3] }, 20.0 * (1 + run / 6 % 35) as f64);
+        let (radius, feed) = (
+            if runs == 1 {
+                RADIUS_MM
+            } else {
+                RADII_MM[run / 2 % 3]
+            },
+            20.0 * (1 + run / 6 % 35) as f64,
+        );
         let direction = if run % 2 == 0 { "ccw" } else { "cw" };
         toml += &format!(
             "[[run]]\nfile = \"run{run:05}.csv\"\nradius_mm = {radius}\nfeed_mm_s = {feed}\ndirection = \"{direction}\"\n"
         );
-        let mut out = BufWriter::with_capacity(1 << 20, File::create(dir.join(format!("run{run:05}.csv")))?);
+        let mut out =
+            BufWriter::with_capacity(1 << 20, File::create(dir.join(format!("run{run:05}.csv")))?);
         writeln!(out, "time_s,deviation_um")?;
         let turn = TAU * radius / feed;
         for k in 0..rows {
             // White noise: the high bits of a linear congruence.
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             let noise = (state >> 40) as f64 / f64::from(1 << 23) - 1.0;
             let a = TAU * k as f64 / rows as f64;
-            writeln!(out, "{:.7},{:.1}", turn * k as f64 / rows as f64, 45.0 * a.cos() - 30.0 + 2.0 * noise)?;
+            writeln!(
+                out,
+                "{:.7},{:.1}",
+                turn * k as f64 / rows as f64,
+                45.0 * a.cos() - 30.0 + 2.0 * noise
+            )?;
         }
         out.flush()?;
     }

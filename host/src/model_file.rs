@@ -85,7 +85,9 @@ impl ModelFile {
     fn of_text(text: &TomlText) -> Result<Self, TomlFileError> {
         // A newer format may have other keys: its number comes before them.
         match text.top("format") {
-            Some(found) if found.parse() != Ok(FORMAT) => return Err(text.format_error(found, FORMAT)),
+            Some(found) if found.parse() != Ok(FORMAT) => {
+                return Err(text.format_error(found, FORMAT));
+            }
             Some(_) | None => {}
         }
         let model: Self = text.parse()?;
@@ -105,14 +107,20 @@ impl ModelFile {
     pub fn save(&self, file: &Path) -> Result<(), TomlFileError> {
         let text = self.to_text(file)?;
         crate::campaign::replace(file, &text).map_err(|e| {
-            let problem = TomlProblem::Io { action: "written", reason: e.problem.to_string() };
+            let problem = TomlProblem::Io {
+                action: "written",
+                reason: e.problem.to_string(),
+            };
             TomlFileError::new((*e.at).clone(), problem)
         })
     }
 
     fn to_text(&self, file: &Path) -> Result<String, TomlFileError> {
         let text = toml::to_string(self).map_err(|e| {
-            let problem = TomlProblem::Io { action: "written", reason: e.to_string() };
+            let problem = TomlProblem::Io {
+                action: "written",
+                reason: e.to_string(),
+            };
             TomlFileError::new(crate::campaign::Place::file(file), problem)
         })?;
         Self::parse(&text, file)?;
@@ -120,24 +128,36 @@ impl ModelFile {
     }
 
     fn fault(&self) -> Option<Fault> {
-        self.servo.fault().or_else(|| self.valid.fault()).or_else(|| {
-            self.effects.iter().enumerate().find_map(|(i, effect)| {
-                let i = i.to_string();
-                let finite =
-                    |path: &[&str], value: f64| Fault::unless(value.is_finite(), path, value, FINITE);
-                let [lo, hi] = effect.ci95;
-                finite(&["effect", &i, "value"], effect.value)
-                    .or_else(|| finite(&["effect", &i, "ci95", "0"], lo))
-                    .or_else(|| finite(&["effect", &i, "ci95", "1"], hi))
-                    .or_else(|| {
-                        let expected = "lower end first";
-                        Fault::unless(lo <= hi, &["effect", &i, "ci95"], format!("[{lo}, {hi}]"), expected)
-                    })
-                    .or_else(|| {
-                        effect.params.iter().find_map(|(k, v)| finite(&["effect", &i, "params", k], *v))
-                    })
+        self.servo
+            .fault()
+            .or_else(|| self.valid.fault())
+            .or_else(|| {
+                self.effects.iter().enumerate().find_map(|(i, effect)| {
+                    let i = i.to_string();
+                    let finite = |path: &[&str], value: f64| {
+                        Fault::unless(value.is_finite(), path, value, FINITE)
+                    };
+                    let [lo, hi] = effect.ci95;
+                    finite(&["effect", &i, "value"], effect.value)
+                        .or_else(|| finite(&["effect", &i, "ci95", "0"], lo))
+                        .or_else(|| finite(&["effect", &i, "ci95", "1"], hi))
+                        .or_else(|| {
+                            let expected = "lower end first";
+                            Fault::unless(
+                                lo <= hi,
+                                &["effect", &i, "ci95"],
+                                format!("[{lo}, {hi}]"),
+                                expected,
+                            )
+                        })
+                        .or_else(|| {
+                            effect
+                                .params
+                                .iter()
+                                .find_map(|(k, v)| finite(&["effect", &i, "params", k], *v))
+                        })
+                })
             })
-        })
     }
 }
 
@@ -151,44 +171,69 @@ struct Fault {
 }
 
 impl Fault {
-    fn unless(ok: bool, path: &[&str], found: impl ToString, expected: &'static str) -> Option<Self> {
+    fn unless(
+        ok: bool,
+        path: &[&str],
+        found: impl ToString,
+        expected: &'static str,
+    ) -> Option<Self> {
         let path = || path.iter().map(ToString::to_string).collect();
-        (!ok).then(|| Self { path: path(), found: found.to_string(), expected })
+        (!ok).then(|| Self {
+            path: path(),
+            found: found.to_string(),
+            expected,
+        })
     }
 }
 
 impl Servo {
     fn fault(&self) -> Option<Fault> {
-        let finite = |key, value: f64| Fault::unless(value.is_finite(), &["servo", key], value, FINITE);
+        let finite =
+            |key, value: f64| Fault::unless(value.is_finite(), &["servo", key], value, FINITE);
         let positive = |key, value: f64| {
-            Fault::unless(value > 0.0 && value.is_finite(), &["servo", key], value, "a positive number")
+            Fault::unless(
+                value > 0.0 && value.is_finite(),
+                &["servo", key],
+                value,
+                "a positive number",
+            )
         };
         match *self {
-            Self::Beta { beta1_s2, beta2_s4, half_width95 } => {
-                finite("beta1_s2", beta1_s2).or_else(|| finite("beta2_s4", beta2_s4)).or_else(|| {
+            Self::Beta {
+                beta1_s2,
+                beta2_s4,
+                half_width95,
+            } => finite("beta1_s2", beta1_s2)
+                .or_else(|| finite("beta2_s4", beta2_s4))
+                .or_else(|| {
                     half_width95.iter().enumerate().find_map(|(i, w)| {
                         let path = ["servo", "half_width95", &i.to_string()];
-                        Fault::unless(*w >= 0.0 && w.is_finite(), &path, w, "zero or a positive number")
+                        Fault::unless(
+                            *w >= 0.0 && w.is_finite(),
+                            &path,
+                            w,
+                            "zero or a positive number",
+                        )
                     })
-                })
-            }
+                }),
             Self::Lag { kv_per_s } => positive("kv_per_s", kv_per_s),
-            Self::SecondOrder { omega_n_rad_s, zeta } => {
-                positive("omega_n_rad_s", omega_n_rad_s).or_else(|| positive("zeta", zeta))
-            }
+            Self::SecondOrder {
+                omega_n_rad_s,
+                zeta,
+            } => positive("omega_n_rad_s", omega_n_rad_s).or_else(|| positive("zeta", zeta)),
         }
     }
 }
 
 impl Valid {
     fn fault(&self) -> Option<Fault> {
-        [("radius_mm", self.radius_mm), ("feed_mm_s", self.feed_mm_s)].into_iter().find_map(
-            |(key, [lo, hi])| {
+        [("radius_mm", self.radius_mm), ("feed_mm_s", self.feed_mm_s)]
+            .into_iter()
+            .find_map(|(key, [lo, hi])| {
                 let ok = 0.0 < lo && lo <= hi && hi.is_finite();
                 let expected = "two positive numbers, the smaller first";
                 Fault::unless(ok, &["valid", key], format!("[{lo}, {hi}]"), expected)
-            },
-        )
+            })
     }
 }
 
@@ -230,7 +275,9 @@ pitch_mm = 10.0
 
     fn refuse(from: &str, to: &str) -> String {
         assert!(TEXT.contains(from));
-        ModelFile::parse(&TEXT.replacen(from, to, 1), Path::new("M.toml")).unwrap_err().to_string()
+        ModelFile::parse(&TEXT.replacen(from, to, 1), Path::new("M.toml"))
+            .unwrap_err()
+            .to_string()
     }
 
     #[test]
@@ -238,7 +285,11 @@ pitch_mm = 10.0
         let model = ModelFile::parse(TEXT, Path::new("M.toml")).unwrap();
         assert_eq!(
             model.servo,
-            Servo::Beta { beta1_s2: -2.329e-5, beta2_s4: -2.3e-7, half_width95: [2.1e-6, 1.3e-7] }
+            Servo::Beta {
+                beta1_s2: -2.329e-5,
+                beta2_s4: -2.3e-7,
+                half_width95: [2.1e-6, 1.3e-7]
+            }
         );
         assert_eq!(model.effects[0].cause, Cause::Backlash);
         assert_eq!(model.effects[0].axis, Some(Axis::X));
@@ -264,17 +315,34 @@ pitch_mm = 10.0
             "M.toml:24:9: `effect.value` is inf; expected a finite number"
         );
         assert!(
-            refuse("pitch_mm = 10.0", "pitch_mm = nan").starts_with("M.toml:28:12: `effect.params.pitch_mm`")
+            refuse("pitch_mm = 10.0", "pitch_mm = nan")
+                .starts_with("M.toml:28:12: `effect.params.pitch_mm`")
         );
-        assert!(refuse("[2.0, 3.0]", "[3.0, 2.0]").contains("M.toml:25:8: `effect.ci95` is [3, 2]"));
-        assert!(refuse("-2.329e-5", "\"small\"").starts_with("M.toml:"), "text for a number");
+        assert!(
+            refuse("[2.0, 3.0]", "[3.0, 2.0]").contains("M.toml:25:8: `effect.ci95` is [3, 2]")
+        );
+        assert!(
+            refuse("-2.329e-5", "\"small\"").starts_with("M.toml:"),
+            "text for a number"
+        );
         assert!(refuse("kind = \"beta\"", "kind = \"magic\"").contains("magic"));
-        assert!(refuse("machine = \"ABB\"", "machin = \"ABB\"").starts_with("M.toml:3:1: unknown field"));
+        assert!(
+            refuse("machine = \"ABB\"", "machin = \"ABB\"")
+                .starts_with("M.toml:3:1: unknown field")
+        );
         assert!(refuse("machine = \"ABB\"", "machine = \"ABB").starts_with("M.toml:3:"));
-        assert!(refuse("\"backlash\"", "\"gremlin\"").contains("M.toml:16:9: unknown variant `gremlin`"));
+        assert!(
+            refuse("\"backlash\"", "\"gremlin\"")
+                .contains("M.toml:16:9: unknown variant `gremlin`")
+        );
         let lag = TEXT.replace("kind = \"beta\"", "kind = \"lag\"\nkv_per_s = -3.0");
-        let error = ModelFile::parse(&lag, Path::new("M.toml")).unwrap_err().to_string();
-        assert_eq!(error, "M.toml:7:12: `servo.kv_per_s` is -3; expected a positive number");
+        let error = ModelFile::parse(&lag, Path::new("M.toml"))
+            .unwrap_err()
+            .to_string();
+        assert_eq!(
+            error,
+            "M.toml:7:12: `servo.kv_per_s` is -3; expected a positive number"
+        );
     }
 
     #[test]
@@ -284,19 +352,48 @@ pitch_mm = 10.0
         let mut model = ModelFile::parse(TEXT, Path::new("M.toml")).unwrap();
         for servo in [
             model.servo,
-            Servo::Lag { kv_per_s: 1.0 / 3.0 * 100.0 },
-            Servo::SecondOrder { omega_n_rad_s: 38.0 + f64::EPSILON * 64.0, zeta: 0.72 },
+            Servo::Lag {
+                kv_per_s: 1.0 / 3.0 * 100.0,
+            },
+            Servo::SecondOrder {
+                omega_n_rad_s: 38.0 + f64::EPSILON * 64.0,
+                zeta: 0.72,
+            },
         ] {
             model.servo = servo;
             model.save(&file).unwrap();
             assert_eq!(ModelFile::load(&file).unwrap(), model);
         }
         model.effects[0].value = f64::NAN;
-        assert!(model.save(&file).unwrap_err().to_string().contains("effect.value"));
-        assert!(ModelFile::load(&file).unwrap().effects[0].value.is_finite(), "the old file is whole");
-        assert!(ModelFile::load(dir.path()).unwrap_err().to_string().contains("is a directory"));
-        assert!(ModelFile::load(&dir.path().join("no")).unwrap_err().to_string().contains("no such file"));
+        assert!(
+            model
+                .save(&file)
+                .unwrap_err()
+                .to_string()
+                .contains("effect.value")
+        );
+        assert!(
+            ModelFile::load(&file).unwrap().effects[0].value.is_finite(),
+            "the old file is whole"
+        );
+        assert!(
+            ModelFile::load(dir.path())
+                .unwrap_err()
+                .to_string()
+                .contains("is a directory")
+        );
+        assert!(
+            ModelFile::load(&dir.path().join("no"))
+                .unwrap_err()
+                .to_string()
+                .contains("no such file")
+        );
         std::fs::write(&file, b"format = 1\nmachine = \"\xff\"").unwrap();
-        assert!(ModelFile::load(&file).unwrap_err().to_string().contains(":2:12: not UTF-8"));
+        assert!(
+            ModelFile::load(&file)
+                .unwrap_err()
+                .to_string()
+                .contains(":2:12: not UTF-8")
+        );
     }
 }

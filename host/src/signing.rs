@@ -52,7 +52,9 @@ impl SigningKey {
         let text = std::fs::read_to_string(path)?;
         let seed = seed(&text).map(Seed::new).ok_or(KeyError::NotAKey)?;
         // A seed of zeros is refused.
-        KeyPair::try_from_seed(seed).map(Self).map_err(|_| KeyError::NotAKey)
+        KeyPair::try_from_seed(seed)
+            .map(Self)
+            .map_err(|_| KeyError::NotAKey)
     }
 
     /// Writes a new key file, for the owner's eyes only; never over another file.
@@ -101,9 +103,13 @@ mod tests {
     /// RFC 8032 7.1, test 2: seed and public key.
     #[test]
     fn public_key_of_the_rfc() {
-        let text = "giotto-key-1 4ccd089b28ff96da9db6c346ec114e0f5b8a319f35aba624da8cf6ed4fb8a6fb\n";
+        let text =
+            "giotto-key-1 4ccd089b28ff96da9db6c346ec114e0f5b8a319f35aba624da8cf6ed4fb8a6fb\n";
         let key = SigningKey(KeyPair::from_seed(Seed::new(seed(text).unwrap())));
-        assert_eq!(key.public_hex(), "3d4017c3e843895a92b70aa74d1b7ebc9c982ccf2ec4968cc0cd55f12af4660c");
+        assert_eq!(
+            key.public_hex(),
+            "3d4017c3e843895a92b70aa74d1b7ebc9c982ccf2ec4968cc0cd55f12af4660c"
+        );
     }
 
     #[test]
@@ -113,11 +119,24 @@ mod tests {
         let key = SigningKey::generate();
         key.save(&path).unwrap();
         assert_eq!(SigningKey::load(&path).unwrap().public(), key.public());
-        assert_eq!(SigningKey::generate().save(&path).unwrap_err().kind(), io::ErrorKind::AlreadyExists);
+        assert_eq!(
+            SigningKey::generate().save(&path).unwrap_err().kind(),
+            io::ErrorKind::AlreadyExists
+        );
         let zeros = format!("{MARK}{}", "0".repeat(64));
-        for text in ["", "giotto-key-1", "giotto-key-1 00", "giotto-key-1 zz", &"é".repeat(40), &zeros] {
+        for text in [
+            "",
+            "giotto-key-1",
+            "giotto-key-1 00",
+            "giotto-key-1 zz",
+            &"é".repeat(40),
+            &zeros,
+        ] {
             std::fs::write(&path, text).unwrap();
-            assert!(matches!(SigningKey::load(&path), Err(KeyError::NotAKey)), "{text}");
+            assert!(
+                matches!(SigningKey::load(&path), Err(KeyError::NotAKey)),
+                "{text}"
+            );
         }
     }
 }

@@ -45,17 +45,28 @@ pub struct ModelTable {
 /// κ2 and κ4 of the servo law.
 fn cumulants(servo: &Servo) -> Cumulants<f64> {
     match *servo {
-        Servo::Beta { beta1_s2, beta2_s4, .. } => {
+        Servo::Beta {
+            beta1_s2, beta2_s4, ..
+        } => {
             // ln(1 + β1ω² + β2ω⁴) = β1ω² + (β2 − β1²/2)ω⁴ + …, against −κ2ω²/2 + κ4ω⁴/24.
             let beta = RadiusModel { beta1_s2, beta2_s4 };
             let kappa2_s2 = -2.0 * beta.beta1_s2;
-            Cumulants { kappa2_s2, kappa4_s4: 24.0 * beta.beta2_s4 - 3.0 * kappa2_s2 * kappa2_s2 }
+            Cumulants {
+                kappa2_s2,
+                kappa4_s4: 24.0 * beta.beta2_s4 - 3.0 * kappa2_s2 * kappa2_s2,
+            }
         }
         Servo::Lag { kv_per_s } => {
             let kappa2_s2 = 1.0 / (kv_per_s * kv_per_s);
-            Cumulants { kappa2_s2, kappa4_s4: 6.0 * kappa2_s2 * kappa2_s2 }
+            Cumulants {
+                kappa2_s2,
+                kappa4_s4: 6.0 * kappa2_s2 * kappa2_s2,
+            }
         }
-        Servo::SecondOrder { omega_n_rad_s, zeta } => {
+        Servo::SecondOrder {
+            omega_n_rad_s,
+            zeta,
+        } => {
             let (w2, z2) = (omega_n_rad_s * omega_n_rad_s, zeta * zeta);
             Cumulants {
                 kappa2_s2: -2.0 * (1.0 - 2.0 * z2) / w2,
@@ -76,7 +87,10 @@ fn share(effect: &Effect) -> Result<Share, ModelTableError> {
     let model = effect.cause.model();
     let one_axis = model.axes().iter().all(Option::is_some);
     if one_axis && effect.axis.is_none() && model.words().not_compensable.is_none() {
-        return Err(ModelTableError::MissingParameter { cause: effect.cause, name: "axis" });
+        return Err(ModelTableError::MissingParameter {
+            cause: effect.cause,
+            name: "axis",
+        });
     }
     Ok(match (effect.cause, model.term(effect)) {
         (Cause::HigherOrderDynamics, _) => Share::Kappa4(24.0 * effect.value),
@@ -98,7 +112,9 @@ fn reach(term: &Term<f64>, radius: f64, feed: f64, omega: f64) -> f64 {
         Term::LateralPlay { shift_m, .. } => shift_m,
         Term::ReversalSpike { peak_m, .. } => peak_m,
         Term::Cyclic { amplitude_m, .. } => amplitude_m,
-        Term::Straightness { curvature_per_m, .. } => curvature_per_m * radius * radius,
+        Term::Straightness {
+            curvature_per_m, ..
+        } => curvature_per_m * radius * radius,
         _ => 0.0,
     };
     offset.abs()
@@ -128,23 +144,37 @@ pub fn table_from_model(model: &ModelFile) -> Result<ModelTable, ModelTableError
         radius_m: radius_m.map(|r| r as f32),
         feed_m_s: feed_m_s.map(|f| f as f32),
         travel: Travel::Both,
-        cumulants: Cumulants { kappa2_s2: cumulants.kappa2_s2 as f32, kappa4_s4: cumulants.kappa4_s4 as f32 },
+        cumulants: Cumulants {
+            kappa2_s2: cumulants.kappa2_s2 as f32,
+            kappa4_s4: cumulants.kappa4_s4 as f32,
+        },
         terms: heapless::Vec::new(),
     };
     for term in single {
-        zone.terms.push(term).map_err(|_| ModelTableError::TooManyTerms { count })?;
+        zone.terms
+            .push(term)
+            .map_err(|_| ModelTableError::TooManyTerms { count })?;
     }
     let mut zones = heapless::Vec::new();
     // A table holds at least one zone.
     let _ = zones.push(zone);
     let limits = limits(&cumulants, &terms, radius_m, feed_m_s);
-    let table = Table { machine: cut(&model.machine), zones, limits };
+    let table = Table {
+        machine: cut(&model.machine),
+        zones,
+        limits,
+    };
     table.validate()?;
     Ok(ModelTable { table, left_out })
 }
 
 /// Limits that the largest correction inside the zone meets with room to spare.
-fn limits(cumulants: &Cumulants<f64>, terms: &[Term<f64>], radius_m: [f64; 2], feed_m_s: [f64; 2]) -> Limits {
+fn limits(
+    cumulants: &Cumulants<f64>,
+    terms: &[Term<f64>],
+    radius_m: [f64; 2],
+    feed_m_s: [f64; 2],
+) -> Limits {
     let [smallest, largest] = radius_m;
     let [_, fastest] = feed_m_s;
     let omega = fastest / smallest;
@@ -152,7 +182,10 @@ fn limits(cumulants: &Cumulants<f64>, terms: &[Term<f64>], radius_m: [f64; 2], f
     let fourth = k2 * k2 / 8.0 - cumulants.kappa4_s4 / 24.0;
     // R·(κ2/2·ω² + …·ω⁴) with ω = f/R falls with R, so the smallest circle asks for the most.
     let law = smallest * omega * omega * (0.5 * k2.abs() + fourth.abs() * omega * omega);
-    let terms: f64 = terms.iter().map(|term| reach(term, largest, fastest, omega)).sum();
+    let terms: f64 = terms
+        .iter()
+        .map(|term| reach(term, largest, fastest, omega))
+        .sum();
     let offset = (HEADROOM * (law + terms)).max(LEAST_OFFSET_M);
     // Ovals turn twice a turn.
     let slew = (HEADROOM * 2.0 * offset * omega).max(LEAST_SLEW_M_S);
@@ -185,8 +218,15 @@ mod tests {
             format: FORMAT,
             campaign: "lab".to_owned(),
             machine: "ABB IRB 1600-6/1.45".to_owned(),
-            servo: Servo::Beta { beta1_s2: -23.29e-6, beta2_s4: -0.23e-6, half_width95: [0.0; 2] },
-            valid: Valid { radius_mm: [100.0, 300.0], feed_mm_s: [20.0, 700.0] },
+            servo: Servo::Beta {
+                beta1_s2: -23.29e-6,
+                beta2_s4: -0.23e-6,
+                half_width95: [0.0; 2],
+            },
+            valid: Valid {
+                radius_mm: [100.0, 300.0],
+                feed_mm_s: [20.0, 700.0],
+            },
             effects: Vec::new(),
         }
     }
@@ -199,7 +239,11 @@ mod tests {
         assert!((f64::from(zone.cumulants.kappa4_s4) / -5.526_509e-6 - 1.0).abs() < 1e-6);
         assert!(left_out.is_empty());
         // 169 um at R = 100 mm, 700 mm/s (Eq. 15), with room for twice as much.
-        assert!((335e-6..345e-6).contains(&f64::from(table.limits.offset_m)), "{:?}", table.limits);
+        assert!(
+            (335e-6..345e-6).contains(&f64::from(table.limits.offset_m)),
+            "{:?}",
+            table.limits
+        );
     }
 
     #[test]
@@ -217,8 +261,13 @@ mod tests {
 
     #[test]
     fn effects_become_terms_in_si() {
-        let effect =
-            |cause, axis, value| Effect { cause, axis, value, ci95: [0.0; 2], params: Default::default() };
+        let effect = |cause, axis, value| Effect {
+            cause,
+            axis,
+            value,
+            ci95: [0.0; 2],
+            params: Default::default(),
+        };
         let mut model = paper();
         model.effects = vec![
             effect(Cause::Squareness, None, 120.0),
@@ -226,25 +275,53 @@ mod tests {
             effect(Cause::Vibration, None, 40.0),
         ];
         let ModelTable { table, left_out } = table_from_model(&model).unwrap();
-        let expected =
-            [Term::Squareness { shear_rad: 120e-6_f32 }, Term::Backlash { axis: Axis::Y, step_m: 10e-6 }];
+        let expected = [
+            Term::Squareness {
+                shear_rad: 120e-6_f32,
+            },
+            Term::Backlash {
+                axis: Axis::Y,
+                step_m: 10e-6,
+            },
+        ];
         for (term, expected) in table.zones[0].terms.iter().zip(expected) {
-            assert!(format!("{term:?}").starts_with(format!("{expected:?}").split('{').next().unwrap()));
+            assert!(
+                format!("{term:?}").starts_with(format!("{expected:?}").split('{').next().unwrap())
+            );
         }
-        assert_eq!((table.zones[0].terms.len(), left_out), (2, vec![Cause::Vibration]));
+        assert_eq!(
+            (table.zones[0].terms.len(), left_out),
+            (2, vec![Cause::Vibration])
+        );
         model.effects[1].axis = None;
-        let missing = ModelTableError::MissingParameter { cause: Cause::Backlash, name: "axis" };
+        let missing = ModelTableError::MissingParameter {
+            cause: Cause::Backlash,
+            name: "axis",
+        };
         assert_eq!(table_from_model(&model), Err(missing));
     }
 
     #[test]
     fn a_model_beyond_the_controller_is_refused() {
         let mut model = paper();
-        model.servo = Servo::Beta { beta1_s2: -1.0, beta2_s4: 0.0, half_width95: [0.0; 2] };
-        assert!(matches!(table_from_model(&model), Err(ModelTableError::Table(_))));
+        model.servo = Servo::Beta {
+            beta1_s2: -1.0,
+            beta2_s4: 0.0,
+            half_width95: [0.0; 2],
+        };
+        assert!(matches!(
+            table_from_model(&model),
+            Err(ModelTableError::Table(_))
+        ));
         let mut model = paper();
         model.valid.radius_mm = [300.0, 100.0];
         let empty = table_from_model(&model);
-        assert!(matches!(empty, Err(ModelTableError::Table(TableError::EmptyRange { .. }))), "{empty:?}");
+        assert!(
+            matches!(
+                empty,
+                Err(ModelTableError::Table(TableError::EmptyRange { .. }))
+            ),
+            "{empty:?}"
+        );
     }
 }

@@ -16,24 +16,37 @@ pub struct TomlFileError {
 
 /// Everything that a TOML file is refused for.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[allow(missing_docs, reason = "the message of each variant is its documentation")]
+#[allow(
+    missing_docs,
+    reason = "the message of each variant is its documentation"
+)]
 pub enum TomlProblem {
     #[error("no such file; expected {expected}")]
     Missing { expected: &'static str },
     #[error("is a directory; expected {expected}")]
     IsDirectory { expected: &'static str },
     #[error("cannot be {action}: {reason}")]
-    Io { action: &'static str, reason: String },
+    Io {
+        action: &'static str,
+        reason: String,
+    },
     #[error("not UTF-8 text; expected {expected}")]
     NotUtf8 { expected: &'static str },
     #[error("is empty; expected {expected}")]
     Empty { expected: &'static str },
     #[error("{reason}; expected {expected}")]
-    Syntax { reason: String, expected: &'static str },
+    Syntax {
+        reason: String,
+        expected: &'static str,
+    },
     #[error("format {found}, and this build reads format {known}")]
     Format { found: String, known: u32 },
     #[error("`{key}` is {found}; expected {expected}")]
-    Value { key: String, found: String, expected: String },
+    Value {
+        key: String,
+        found: String,
+        expected: String,
+    },
     #[error("{what}; expected {expected}")]
     Missed { what: String, expected: String },
 }
@@ -41,15 +54,18 @@ pub enum TomlProblem {
 impl TomlFileError {
     /// A problem at a place.
     pub fn new(at: Place, problem: TomlProblem) -> Self {
-        Self { at: Box::new(at), problem: Box::new(problem) }
+        Self {
+            at: Box::new(at),
+            problem: Box::new(problem),
+        }
     }
 
     /// What to do next, one sentence.
     pub fn help(&self) -> &'static str {
         match *self.problem {
-            TomlProblem::Missing { .. } | TomlProblem::IsDirectory { .. } | TomlProblem::Io { .. } => {
-                "check the path"
-            }
+            TomlProblem::Missing { .. }
+            | TomlProblem::IsDirectory { .. }
+            | TomlProblem::Io { .. } => "check the path",
             TomlProblem::Format { .. } => "make the file again with this version of giotto",
             TomlProblem::NotUtf8 { .. } | TomlProblem::Empty { .. } => "check which file this is",
             _ => "correct this line of the file",
@@ -75,26 +91,40 @@ impl TomlText {
         let fail = |at, problem| Err(TomlFileError::new(at, problem));
         let bytes = match std::fs::read(file) {
             Ok(bytes) => bytes,
-            Err(_) if file.is_dir() => return fail(Place::file(file), TomlProblem::IsDirectory { expected }),
+            Err(_) if file.is_dir() => {
+                return fail(Place::file(file), TomlProblem::IsDirectory { expected });
+            }
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
                 return fail(Place::file(file), TomlProblem::Missing { expected });
             }
             Err(e) => {
-                let problem = TomlProblem::Io { action: "read", reason: e.to_string() };
+                let problem = TomlProblem::Io {
+                    action: "read",
+                    reason: e.to_string(),
+                };
                 return fail(Place::file(file), problem);
             }
         };
         let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&bytes);
         match std::str::from_utf8(bytes) {
-            Ok(text) if text.trim().is_empty() => fail(Place::file(file), TomlProblem::Empty { expected }),
+            Ok(text) if text.trim().is_empty() => {
+                fail(Place::file(file), TomlProblem::Empty { expected })
+            }
             Ok(text) => Ok(Self::new(file, text, expected)),
-            Err(e) => fail(Place::of_byte(file, bytes, e.valid_up_to()), TomlProblem::NotUtf8 { expected }),
+            Err(e) => fail(
+                Place::of_byte(file, bytes, e.valid_up_to()),
+                TomlProblem::NotUtf8 { expected },
+            ),
         }
     }
 
     /// Text that is in memory, with the name it goes by.
     pub fn new(file: impl Into<PathBuf>, text: &str, expected: &'static str) -> Self {
-        Self { file: file.into(), text: text.to_owned(), expected }
+        Self {
+            file: file.into(),
+            text: text.to_owned(),
+            expected,
+        }
     }
 
     /// Reads the text as a `T`.
@@ -108,7 +138,13 @@ impl TomlText {
                 None => Place::file(&self.file),
             };
             let reason = e.message().replace('\n', ", ");
-            TomlFileError::new(at, TomlProblem::Syntax { reason, expected: self.expected })
+            TomlFileError::new(
+                at,
+                TomlProblem::Syntax {
+                    reason,
+                    expected: self.expected,
+                },
+            )
         })
     }
 
@@ -121,31 +157,60 @@ impl TomlText {
 
     /// A value that is out of its range. The path goes through tables by key and through lists by number
     /// (`["effect", "0", "value"]`); of a key that is not there, the nearest table above is pointed at.
-    pub fn value_error(&self, path: &[&str], found: impl ToString, expected: impl ToString) -> TomlFileError {
-        let key = path.iter().filter(|k| k.parse::<usize>().is_err()).copied().collect::<Vec<_>>().join(".");
-        let problem = TomlProblem::Value { key, found: found.to_string(), expected: expected.to_string() };
+    pub fn value_error(
+        &self,
+        path: &[&str],
+        found: impl ToString,
+        expected: impl ToString,
+    ) -> TomlFileError {
+        let key = path
+            .iter()
+            .filter(|k| k.parse::<usize>().is_err())
+            .copied()
+            .collect::<Vec<_>>()
+            .join(".");
+        let problem = TomlProblem::Value {
+            key,
+            found: found.to_string(),
+            expected: expected.to_string(),
+        };
         TomlFileError::new(self.place(path), problem)
     }
 
     /// A problem of the whole of a table.
-    pub fn missed(&self, path: &[&str], what: impl ToString, expected: impl ToString) -> TomlFileError {
-        let problem = TomlProblem::Missed { what: what.to_string(), expected: expected.to_string() };
+    pub fn missed(
+        &self,
+        path: &[&str],
+        what: impl ToString,
+        expected: impl ToString,
+    ) -> TomlFileError {
+        let problem = TomlProblem::Missed {
+            what: what.to_string(),
+            expected: expected.to_string(),
+        };
         TomlFileError::new(self.place(path), problem)
     }
 
     /// A problem with the format number at the top.
     pub fn format_error(&self, found: String, known: u32) -> TomlFileError {
-        TomlFileError::new(self.place(&["format"]), TomlProblem::Format { found, known })
+        TomlFileError::new(
+            self.place(&["format"]),
+            TomlProblem::Format { found, known },
+        )
     }
 
     fn place(&self, path: &[&str]) -> Place {
-        let Ok(document) = DeTable::parse(&self.text) else { return Place::file(&self.file) };
+        let Ok(document) = DeTable::parse(&self.text) else {
+            return Place::file(&self.file);
+        };
         let mut span = None;
         let mut next = path.first().and_then(|key| document.get_ref().get(*key));
         let mut rest = path.get(1..).unwrap_or_default();
         while let Some(value) = next {
             span = Some(value.span());
-            let Some((step, after)) = rest.split_first() else { break };
+            let Some((step, after)) = rest.split_first() else {
+                break;
+            };
             rest = after;
             next = match value.get_ref() {
                 DeValue::Table(table) => table.get(*step),

@@ -1,5 +1,9 @@
 //! `giotto fit` as its user runs it: JSON by the contract, model file, figures, exit codes.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of a test fail as the test does")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of a test fail as the test does"
+)]
 use giotto::campaign::{Campaign, Direction, Run, Samples, write};
 use giotto::model_file::{ModelFile, Servo};
 use giotto_shared::model::RadiusModel;
@@ -8,7 +12,10 @@ use std::f64::consts::TAU;
 use std::path::Path;
 use std::process::{Command, Output};
 
-const PAPER: RadiusModel<f64> = RadiusModel { beta1_s2: -23.29e-6, beta2_s4: -0.23e-6 };
+const PAPER: RadiusModel<f64> = RadiusModel {
+    beta1_s2: -23.29e-6,
+    beta2_s4: -0.23e-6,
+};
 
 /// Circles of the paper's robot, with a spread between runs of ±0.5 µm.
 fn campaign() -> Campaign {
@@ -42,11 +49,19 @@ fn campaign() -> Campaign {
             }
         }
     }
-    Campaign { name: "paper".into(), machine: "ABB IRB 1600-6/1.45, simulated".into(), runs }
+    Campaign {
+        name: "paper".into(),
+        machine: "ABB IRB 1600-6/1.45, simulated".into(),
+        runs,
+    }
 }
 
 fn giotto(directory: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_giotto")).current_dir(directory).args(arguments).output().unwrap()
+    Command::new(env!("CARGO_BIN_EXE_giotto"))
+        .current_dir(directory)
+        .args(arguments)
+        .output()
+        .unwrap()
 }
 
 fn written() -> tempfile::TempDir {
@@ -58,33 +73,68 @@ fn written() -> tempfile::TempDir {
 #[test]
 fn json_is_the_contracts() {
     let directory = written();
-    let output =
-        giotto(directory.path(), &["fit", "campaign", "--train-radius", "100", "--json", "-o", "m.toml"]);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let output = giotto(
+        directory.path(),
+        &[
+            "fit",
+            "campaign",
+            "--train-radius",
+            "100",
+            "--json",
+            "-o",
+            "m.toml",
+        ],
+    );
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     let json: Value = serde_json::from_slice(&output.stdout).unwrap();
-    let number =
-        |path: &str| json.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path} in {json}"));
+    let number = |path: &str| {
+        json.pointer(path)
+            .and_then(Value::as_f64)
+            .unwrap_or_else(|| panic!("{path} in {json}"))
+    };
     assert!((number("/model/beta1_s2") / PAPER.beta1_s2 - 1.0).abs() < 0.03);
     assert!((number("/model/beta2_s4") / PAPER.beta2_s4 - 1.0).abs() < 0.08);
     for (term, truth) in [("beta1_s2", PAPER.beta1_s2), ("beta2_s4", PAPER.beta2_s4)] {
-        assert!(number(&format!("/ci95/{term}/0")) < truth && truth < number(&format!("/ci95/{term}/1")));
+        assert!(
+            number(&format!("/ci95/{term}/0")) < truth
+                && truth < number(&format!("/ci95/{term}/1"))
+        );
     }
     assert_eq!(json["stepwise"][0]["enter"], "f2_r");
     assert_eq!(json["stepwise"][1]["enter"], "f4_r3");
     assert_eq!(json["stepwise"][1]["dof"], serde_json::json!([1, 13]));
     assert!(number("/stepwise/1/partial_f") > number("/stepwise/1/critical_f"));
-    assert_eq!((number("/train/runs"), number("/heldout/runs")), (16.0, 32.0));
+    assert_eq!(
+        (number("/train/runs"), number("/heldout/runs")),
+        (16.0, 32.0)
+    );
     assert!(
-        number("/train/rms_um") < 0.5 && number("/heldout/rms_um") < 0.6 && number("/heldout/max_um") < 2.0
+        number("/train/rms_um") < 0.5
+            && number("/heldout/rms_um") < 0.6
+            && number("/heldout/max_um") < 2.0
     );
     assert!(number("/heldout/explained_percent") > 99.9);
-    assert!((number("/offset_um/300") - 38.0).abs() < 0.5 && (number("/offset_um/100") - 2.0).abs() < 0.5);
+    assert!(
+        (number("/offset_um/300") - 38.0).abs() < 0.5
+            && (number("/offset_um/100") - 2.0).abs() < 0.5
+    );
     assert!((number("/cumulants/kappa2_s2") + 2.0 * number("/model/beta1_s2")).abs() < 1e-12);
     assert!(number("/cumulants/kappa4_s4") < 0.0);
     assert_eq!(json["cumulants"]["class"], "second_order");
 
     let model = ModelFile::load(&directory.path().join("m.toml")).unwrap();
-    let Servo::Beta { beta1_s2, half_width95, .. } = model.servo else { panic!("{model:?}") };
+    let Servo::Beta {
+        beta1_s2,
+        half_width95,
+        ..
+    } = model.servo
+    else {
+        panic!("{model:?}")
+    };
     assert_eq!(beta1_s2, number("/model/beta1_s2"));
     assert!(half_width95[0] > 0.0 && half_width95[1] > 0.0);
     assert_eq!(model.valid.radius_mm, [100.0, 300.0]);
@@ -96,12 +146,31 @@ fn offsets_and_partial_f_are_named_in_words() {
     let directory = written();
     let joint = giotto(directory.path(), &["fit", "campaign"]);
     let text = String::from_utf8(joint.stdout).unwrap();
-    assert!(text.contains("fitted together with β") && text.contains("F(α; 1; n − p)"), "{text}");
-    let paper =
-        ["fit", "campaign", "--offset", "lowest-speed", "--partial-f", "paper", "--figures", "figures"];
+    assert!(
+        text.contains("fitted together with β") && text.contains("F(α; 1; n − p)"),
+        "{text}"
+    );
+    let paper = [
+        "fit",
+        "campaign",
+        "--offset",
+        "lowest-speed",
+        "--partial-f",
+        "paper",
+        "--figures",
+        "figures",
+    ];
     let text = String::from_utf8(giotto(directory.path(), &paper).stdout).unwrap();
-    assert!(text.contains("as the paper does") && text.contains("divided by p"), "{text}");
-    for figure in ["figure08.svg", "figure09.svg", "figure10.svg", "figure11.svg"] {
+    assert!(
+        text.contains("as the paper does") && text.contains("divided by p"),
+        "{text}"
+    );
+    for figure in [
+        "figure08.svg",
+        "figure09.svg",
+        "figure10.svg",
+        "figure11.svg",
+    ] {
         assert!(directory.path().join("figures").join(figure).is_file());
     }
 }
@@ -110,10 +179,22 @@ fn offsets_and_partial_f_are_named_in_words() {
 fn what_is_wrong_is_said_with_the_right_code() {
     let directory = written();
     for (arguments, code, words) in [
-        (vec!["fit", "campaign", "--train-radius", "120"], 2, "has [100.0, 150.0, 300.0] mm"),
-        (vec!["fit", "campaign", "--alpha", "1.5"], 2, "significance 1.5"),
+        (
+            vec!["fit", "campaign", "--train-radius", "120"],
+            2,
+            "has [100.0, 150.0, 300.0] mm",
+        ),
+        (
+            vec!["fit", "campaign", "--alpha", "1.5"],
+            2,
+            "significance 1.5",
+        ),
         (vec!["fit", "nowhere"], 3, "nowhere"),
-        (vec!["fit", "campaign", "-o", "no/such/place.toml"], 3, "place.toml"),
+        (
+            vec!["fit", "campaign", "-o", "no/such/place.toml"],
+            3,
+            "place.toml",
+        ),
     ] {
         let output = giotto(directory.path(), &arguments);
         let said = String::from_utf8_lossy(&output.stderr).into_owned();

@@ -1,6 +1,10 @@
 //! The report in a real browser: no word on the console, and every control does what it says. Skipped, with a
 //! message, where there is no Chromium. `GIOTTO_CAMPAIGNS=DIR` tries every campaign in DIR as well.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of a test fail as the test does")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of a test fail as the test does"
+)]
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -62,12 +66,21 @@ const DRIVER: &str = r##"<script>
 fn chromium() -> Option<&'static str> {
     ["chromium", "chromium-browser", "google-chrome"]
         .into_iter()
-        .find(|name| Command::new(name).arg("--version").output().is_ok_and(|o| o.status.success()))
+        .find(|name| {
+            Command::new(name)
+                .arg("--version")
+                .output()
+                .is_ok_and(|o| o.status.success())
+        })
 }
 
 fn giotto(arguments: &[&str]) -> Output {
     let output = Command::new(GIOTTO).args(arguments).output().unwrap();
-    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.status.success(),
+        "{arguments:?}: {}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     output
 }
 
@@ -101,26 +114,46 @@ fn the_controls_work_and_the_console_is_silent() {
     let at = |name: &str| folder.path().join(name);
     std::fs::write(at("plan.toml"), PLAN).unwrap();
     let text = |path: &PathBuf| path.to_str().unwrap().to_owned();
-    giotto(&["simulate", &text(&at("plan.toml")), "-o", &text(&at("campaign"))]);
+    giotto(&[
+        "simulate",
+        &text(&at("plan.toml")),
+        "-o",
+        &text(&at("campaign")),
+    ]);
     let mut campaigns = vec![at("campaign")];
     if let Some(more) = std::env::var_os("GIOTTO_CAMPAIGNS") {
-        let all = std::fs::read_dir(more).unwrap().map(|entry| entry.unwrap().path());
+        let all = std::fs::read_dir(more)
+            .unwrap()
+            .map(|entry| entry.unwrap().path());
         campaigns.extend(all.filter(|path| path.join("campaign.toml").exists()));
     }
     for (i, campaign) in campaigns.iter().enumerate() {
         let page = at(&format!("{i}.html"));
         giotto(&["report", &text(campaign), "-o", &text(&page)]);
         let html = std::fs::read_to_string(&page).unwrap();
-        assert!(html.len() < 3_000_000, "{}: {} bytes", campaign.display(), html.len());
+        assert!(
+            html.len() < 3_000_000,
+            "{}: {} bytes",
+            campaign.display(),
+            html.len()
+        );
         let catcher = "<head><script>window.failures=[];addEventListener('error',(e)=>failures.push(e.message))</script>";
-        let driven = html.replacen("<head>", catcher, 1).replacen("</body>", &format!("{DRIVER}</body>"), 1);
+        let driven =
+            html.replacen("<head>", catcher, 1)
+                .replacen("</body>", &format!("{DRIVER}</body>"), 1);
         std::fs::write(&page, driven).unwrap();
         let (dom, log) = browse(browser, &page, &at(&format!("profile{i}")));
         assert!(!log.contains("CONSOLE"), "{}: {log}", campaign.display());
-        let probe =
-            dom.split("<pre id=\"probe\">").nth(1).unwrap_or_else(|| unreachable!("no answer: {log}"));
+        let probe = dom
+            .split("<pre id=\"probe\">")
+            .nth(1)
+            .unwrap_or_else(|| unreachable!("no answer: {log}"));
         let probe = probe.split("</pre>").next().unwrap();
         assert_eq!(probe.lines().count(), 13, "{probe}");
-        assert!(probe.lines().all(|line| line.starts_with("ok ")), "{}:\n{probe}", campaign.display());
+        assert!(
+            probe.lines().all(|line| line.starts_with("ok ")),
+            "{}:\n{probe}",
+            campaign.display()
+        );
     }
 }

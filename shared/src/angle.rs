@@ -54,7 +54,10 @@ const fn places() -> [[i32; 2]; 1 << BITS] {
     while k < places.len() {
         let angle = TAU * k as f64 / places.len() as f64 - PI;
         // cos and sin of an angle less half a turn are those of the angle with their signs changed.
-        places[k] = [to_fixed(-series(angle, 1.0, 0), 31), to_fixed(-series(angle, angle, 1), 31)];
+        places[k] = [
+            to_fixed(-series(angle, 1.0, 0), 31),
+            to_fixed(-series(angle, angle, 1), 31),
+        ];
         k += 1;
     }
     places
@@ -86,19 +89,22 @@ mod tests {
         let (c, s) = sincos(phase);
         let angle = f64::from(phase) * RAD_PER_UNIT;
         let full = 2_147_483_648.0;
-        (f64::from(c) / full - libm::cos(angle)).abs().max((f64::from(s) / full - libm::sin(angle)).abs())
+        (f64::from(c) / full - libm::cos(angle))
+            .abs()
+            .max((f64::from(s) / full - libm::sin(angle)).abs())
     }
 
     /// 2²⁴ phases, one in each stratum, its place in the stratum stirred so that all low bits are met.
     #[test]
     fn sincos_error_on_a_stratified_sweep() {
-        let worst = (0..1u32 << 20)
-            .map(|i| (i << 12) | (i.wrapping_mul(2_654_435_769) >> 20))
-            .chain(
-                (0..32u32).flat_map(|k| (0..64u32).map(move |j| (k << 27).wrapping_add(j).wrapping_sub(32))),
-            )
-            .map(error_at)
-            .fold(0.0, f64::max);
+        let worst =
+            (0..1u32 << 20)
+                .map(|i| (i << 12) | (i.wrapping_mul(2_654_435_769) >> 20))
+                .chain((0..32u32).flat_map(|k| {
+                    (0..64u32).map(move |j| (k << 27).wrapping_add(j).wrapping_sub(32))
+                }))
+                .map(error_at)
+                .fold(0.0, f64::max);
         std::println!("largest sincos error {worst:.3e}");
         assert!(worst <= SINCOS_ERROR, "{worst:e}");
     }

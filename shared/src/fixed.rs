@@ -25,7 +25,11 @@ pub const fn mulh_sub(acc: i32, a: i32, b: i32) -> i32 {
 pub const fn to_fixed(value: f64, bits: u32) -> i32 {
     let scaled = value * (1u64 << bits) as f64;
     // `as` saturates and maps NaN to 0: no value can escape the range.
-    (if scaled < 0.0 { scaled - 0.5 } else { scaled + 0.5 }) as i32
+    (if scaled < 0.0 {
+        scaled - 0.5
+    } else {
+        scaled + 0.5
+    }) as i32
 }
 
 /// [`to_fixed`] from single precision, as exact as 24 bits are. For planning, which has time for a call: sixty places of it
@@ -33,7 +37,11 @@ pub const fn to_fixed(value: f64, bits: u32) -> i32 {
 #[inline(never)]
 pub const fn single_to_fixed(value: f32, bits: u32) -> i32 {
     let scaled = value * (1u64 << bits) as f32;
-    (if scaled < 0.0 { scaled - 0.5 } else { scaled + 0.5 }) as i32
+    (if scaled < 0.0 {
+        scaled - 0.5
+    } else {
+        scaled + 0.5
+    }) as i32
 }
 
 /// `value`·`scale` to the nearest whole number, halves within 1/256 of one to either side; saturates beyond ±2⁵⁵, 0 for
@@ -52,17 +60,36 @@ mod tests {
         for i in -100_000..100_000i32 {
             let value = f64::from(i) * 0.017;
             let nearest = rounded(value, 1.0) as f64;
-            assert!((nearest - value).abs() <= 0.5 + 1.0 / 256.0, "{value}: {nearest}");
+            assert!(
+                (nearest - value).abs() <= 0.5 + 1.0 / 256.0,
+                "{value}: {nearest}"
+            );
             assert_eq!(rounded(f64::from(i), 1e9), i64::from(i) * 1_000_000_000);
         }
         assert_eq!(rounded(f64::NAN, 1.0), 0);
-        assert!(rounded(f64::INFINITY, 1.0) > 1 << 54 && rounded(f64::NEG_INFINITY, 1.0) < -(1 << 54));
+        assert!(
+            rounded(f64::INFINITY, 1.0) > 1 << 54 && rounded(f64::NEG_INFINITY, 1.0) < -(1 << 54)
+        );
     }
 
     #[test]
     fn single_precision_saturates_and_rounds_as_double_does() {
-        for value in [0.0f32, 0.3, -0.3, 1.5e-4, -0.25, 3.0, -3.0, f32::NAN, f32::INFINITY] {
-            assert_eq!(single_to_fixed(value, 8), to_fixed(f64::from(value), 8), "{value}");
+        for value in [
+            0.0f32,
+            0.3,
+            -0.3,
+            1.5e-4,
+            -0.25,
+            3.0,
+            -3.0,
+            f32::NAN,
+            f32::INFINITY,
+        ] {
+            assert_eq!(
+                single_to_fixed(value, 8),
+                to_fixed(f64::from(value), 8),
+                "{value}"
+            );
         }
     }
 }

@@ -93,28 +93,59 @@ impl<T: Copy> Term<T> {
     /// The same term with each of its numbers passed through `f`: from the host's `f64` to the table's `f32`.
     pub fn map<U>(self, f: impl Fn(T) -> U) -> Term<U> {
         match self {
-            Self::RadiusOffset { offset_m } => Term::RadiusOffset { offset_m: f(offset_m) },
-            Self::ScaleError { relative } => Term::ScaleError { relative: f(relative) },
-            Self::ScaleMismatch { relative } => Term::ScaleMismatch { relative: f(relative) },
-            Self::Squareness { shear_rad } => Term::Squareness { shear_rad: f(shear_rad) },
-            Self::ServoMismatch { delta_tau_s } => Term::ServoMismatch { delta_tau_s: f(delta_tau_s) },
-            Self::BandwidthMismatch { delta_kappa2_s2 } => {
-                Term::BandwidthMismatch { delta_kappa2_s2: f(delta_kappa2_s2) }
-            }
-            Self::Backlash { axis, step_m } => Term::Backlash { axis, step_m: f(step_m) },
-            Self::LateralPlay { axis, shift_m } => Term::LateralPlay { axis, shift_m: f(shift_m) },
-            Self::ReversalSpike { axis, peak_m, decay_s } => {
-                Term::ReversalSpike { axis, peak_m: f(peak_m), decay_s: f(decay_s) }
-            }
-            Self::Cyclic { axis, amplitude_m, pitch_m, phase_rad } => Term::Cyclic {
+            Self::RadiusOffset { offset_m } => Term::RadiusOffset {
+                offset_m: f(offset_m),
+            },
+            Self::ScaleError { relative } => Term::ScaleError {
+                relative: f(relative),
+            },
+            Self::ScaleMismatch { relative } => Term::ScaleMismatch {
+                relative: f(relative),
+            },
+            Self::Squareness { shear_rad } => Term::Squareness {
+                shear_rad: f(shear_rad),
+            },
+            Self::ServoMismatch { delta_tau_s } => Term::ServoMismatch {
+                delta_tau_s: f(delta_tau_s),
+            },
+            Self::BandwidthMismatch { delta_kappa2_s2 } => Term::BandwidthMismatch {
+                delta_kappa2_s2: f(delta_kappa2_s2),
+            },
+            Self::Backlash { axis, step_m } => Term::Backlash {
+                axis,
+                step_m: f(step_m),
+            },
+            Self::LateralPlay { axis, shift_m } => Term::LateralPlay {
+                axis,
+                shift_m: f(shift_m),
+            },
+            Self::ReversalSpike {
+                axis,
+                peak_m,
+                decay_s,
+            } => Term::ReversalSpike {
+                axis,
+                peak_m: f(peak_m),
+                decay_s: f(decay_s),
+            },
+            Self::Cyclic {
+                axis,
+                amplitude_m,
+                pitch_m,
+                phase_rad,
+            } => Term::Cyclic {
                 axis,
                 amplitude_m: f(amplitude_m),
                 pitch_m: f(pitch_m),
                 phase_rad: f(phase_rad),
             },
-            Self::Straightness { axis, curvature_per_m } => {
-                Term::Straightness { axis, curvature_per_m: f(curvature_per_m) }
-            }
+            Self::Straightness {
+                axis,
+                curvature_per_m,
+            } => Term::Straightness {
+                axis,
+                curvature_per_m: f(curvature_per_m),
+            },
         }
     }
 }

@@ -10,7 +10,11 @@ pub fn write(case: &Case, dir: &Path) -> std::io::Result<()> {
     std::fs::create_dir_all(dir)?;
     let mut toml = String::from("[campaign]\nname = \"blind\"\nmachine = \"machine under test\"\n");
     for run in &case.campaign.runs {
-        let direction = if run.direction == Direction::Ccw { "ccw" } else { "cw" };
+        let direction = if run.direction == Direction::Ccw {
+            "ccw"
+        } else {
+            "cw"
+        };
         let _ = write!(
             toml,
             "\n[[run]]\nfile = \"{}\"\nradius_mm = {:?}\nfeed_mm_s = {:?}\ndirection = \"{direction}\"\nstart_angle_deg = {:?}\n",
@@ -37,8 +41,9 @@ pub fn write(case: &Case, dir: &Path) -> std::io::Result<()> {
     if let Some([omega_n, zeta]) = case.model {
         let feeds = case.plan.tests.iter().map(|t| t.feed_m_s * 1e3);
         let radii = case.plan.tests.iter().map(|t| t.radius_m * 1e3);
-        let range =
-            |v: &mut dyn Iterator<Item = f64>| v.fold((f64::MAX, 0.0_f64), |(a, b), x| (a.min(x), b.max(x)));
+        let range = |v: &mut dyn Iterator<Item = f64>| {
+            v.fold((f64::MAX, 0.0_f64), |(a, b), x| (a.min(x), b.max(x)))
+        };
         let ((r0, r1), (f0, f1)) = (range(&mut radii.into_iter()), range(&mut feeds.into_iter()));
         let model = format!(
             "format = 1\ncampaign = \"blind\"\nmachine = \"machine under test\"\n\n[servo]\nkind = \"second_order\"\n\

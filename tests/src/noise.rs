@@ -16,7 +16,10 @@ pub struct Noise {
 impl Noise {
     /// For this target.
     pub fn new(target: &Target) -> Self {
-        Self { seeds: (target.seeds)(), talks: target.name == "server" }
+        Self {
+            seeds: (target.seeds)(),
+            talks: target.name == "server",
+        }
     }
 
     /// The bytes of one execution: a seed of the target with some of it changed, cut, repeated, or nothing but noise.

@@ -54,19 +54,32 @@ const TALKERS: [&str; 9] = [
 ];
 
 fn run(folder: &Path, line: &str) -> (i32, String, String) {
-    outcome(&giotto().args(line.split(' ')).current_dir(folder).output().unwrap())
+    outcome(
+        &giotto()
+            .args(line.split(' '))
+            .current_dir(folder)
+            .output()
+            .unwrap(),
+    )
 }
 
 fn lay_out(folder: &Path) {
     fs::write(folder.join("plan.toml"), PLAN).unwrap();
     fs::write(folder.join("model.toml"), MODEL).unwrap();
     fs::write(folder.join("part.nc"), "G0 X20 Y0\nG3 I-20 F1500\n").unwrap();
-    fs::write(folder.join("path.csv"), "time_s,x_mm,y_mm\n0,0,0\n0.001,0.01,0\n").unwrap();
+    fs::write(
+        folder.join("path.csv"),
+        "time_s,x_mm,y_mm\n0,0,0\n0.001,0.01,0\n",
+    )
+    .unwrap();
     fs::create_dir(folder.join("folder")).unwrap();
     for (name, bytes, _) in FILES {
         fs::write(folder.join(name), bytes).unwrap();
     }
-    for line in ["simulate plan.toml -o campaign", "table model.toml -o table.bin"] {
+    for line in [
+        "simulate plan.toml -o campaign",
+        "table model.toml -o table.bin",
+    ] {
         let (code, _, errors) = run(folder, line);
         assert_eq!(code, 0, "{line}: {errors}");
     }
@@ -76,10 +89,19 @@ fn lay_out(folder: &Path) {
 fn refused(folder: &Path, line: &str, code: i32, names: &str) -> String {
     let (found, stdout, errors) = run(folder, line);
     assert_eq!(found, code, "giotto {line}\n{stdout}{errors}");
-    assert!(errors.contains("error: ") && errors.contains(names), "giotto {line}\n{errors}");
-    assert!(errors.contains("help: "), "giotto {line} says not what to do\n{errors}");
+    assert!(
+        errors.contains("error: ") && errors.contains(names),
+        "giotto {line}\n{errors}"
+    );
+    assert!(
+        errors.contains("help: "),
+        "giotto {line} says not what to do\n{errors}"
+    );
     assert!(!errors.contains("panicked"), "giotto {line}\n{errors}");
-    assert!(!folder.join("new").exists(), "giotto {line} leaves something behind");
+    assert!(
+        !folder.join("new").exists(),
+        "giotto {line} leaves something behind"
+    );
     errors
 }
 
@@ -103,15 +125,35 @@ fn every_command_refuses_what_is_not_its_file() {
     assert!(errors.contains("bad.toml:2:10:"), "{errors}");
     // So with a block that no controller can run.
     fs::write(folder.join("stop.nc"), "G1 X1 F100\n M0\n").unwrap();
-    refused(folder, "run program stop.nc --port sim", 3, "stop.nc:2:2: M0 waits");
+    refused(
+        folder,
+        "run program stop.nc --port sim",
+        3,
+        "stop.nc:2:2: M0 waits",
+    );
     fs::write(folder.join("far.nc"), "G1 X1 F100\nX1e9\n").unwrap();
-    refused(folder, "run program far.nc --port sim", 3, "far.nc:2:3: a word E");
+    refused(
+        folder,
+        "run program far.nc --port sim",
+        3,
+        "far.nc:2:3: a word E",
+    );
     fs::write(folder.join("far.nc"), "G1 X1 F100\nX2500\n").unwrap();
-    refused(folder, "run program far.nc --port sim", 3, "far.nc:2:1: position");
+    refused(
+        folder,
+        "run program far.nc --port sim",
+        3,
+        "far.nc:2:1: position",
+    );
     // A measurement whose circle is not given is wrong usage, no bad input.
     fs::write(folder.join("ball.csv"), "time_s,deviation_um\n0,1\n1,2\n").unwrap();
     for command in ["analyze", "fit", "diagnose", "plan"] {
-        refused(folder, &format!("{command} ball.csv"), 2, "ball.csv is no campaign");
+        refused(
+            folder,
+            &format!("{command} ball.csv"),
+            2,
+            "ball.csv is no campaign",
+        );
     }
 }
 
@@ -125,16 +167,36 @@ fn a_port_that_is_not_there_is_no_answer() {
             refused(folder, &format!("{talker} --port {port}"), 4, port);
         }
         let (code, _, errors) = outcome(
-            &giotto().args(talker.split(' ')).args(["--port", ""]).current_dir(folder).output().unwrap(),
+            &giotto()
+                .args(talker.split(' '))
+                .args(["--port", ""])
+                .current_dir(folder)
+                .output()
+                .unwrap(),
         );
         assert_eq!(code, 2, "giotto {talker} --port ''\n{errors}");
     }
     refused(folder, "status --port qemu --image nowhere", 4, "nowhere");
-    refused(folder, "run circle --radius -5 --feed 100 --direction ccw --port sim", 4, "radius");
-    refused(folder, "run circle --radius 5000 --feed 100 --direction ccw --port sim", 4, "radius");
+    refused(
+        folder,
+        "run circle --radius -5 --feed 100 --direction ccw --port sim",
+        4,
+        "radius",
+    );
+    refused(
+        folder,
+        "run circle --radius 5000 --feed 100 --direction ccw --port sim",
+        4,
+        "radius",
+    );
     // What the controller refuses is named with its block; the part is too fast for it.
     fs::write(folder.join("fast.nc"), "F600 G1 X1\nG1 X2 F90000\n").unwrap();
-    refused(folder, "run program fast.nc --port sim", 4, "fast.nc:2:1: refused");
+    refused(
+        folder,
+        "run program fast.nc --port sim",
+        4,
+        "fast.nc:2:1: refused",
+    );
 }
 
 /// Rows that are no set-points, each with its place; and what only the controller can refuse.
@@ -145,16 +207,56 @@ fn a_stream_that_is_none_is_refused_with_the_place_of_its_fault() {
     lay_out(folder);
     for (text, code, words) in [
         ("time_s,x_mm\n0,0\n", 3, "rows.csv: lacks a column"),
-        ("time_s,x_mm,y_mm,w_mm\n0,0,0,0\n", 3, "rows.csv: has a column \"w_mm\""),
-        ("time_s,x_mm,x_mm\n0,0,0\n", 3, "rows.csv: has two columns x_mm"),
-        ("time_s,x_mm,y_mm\n0,0,0\n", 3, "rows.csv: has fewer than two rows"),
-        ("time_s,x_mm,y_mm\n0,0,0\n0.001,0\n", 3, "rows.csv:3:1: 2 fields, expected 3"),
-        ("time_s,x_mm,y_mm\n0,0,0\n0.001,0,one\n", 3, "rows.csv:3:9: \"one\", expected a number"),
-        ("time_s,x_mm,y_mm\n0,0,0\n0.001,0,nan\n", 3, "rows.csv:3:9: \"nan\""),
-        ("time_s,x_mm,y_mm\n0,0,0\n0.001,3000,0\n", 3, "rows.csv:3:7: 3000 mm"),
-        ("x_mm,y_mm,time_s\n0,0,0\n\n0,0,0.003\n", 3, "rows.csv:4:5: 0.003000 s after the first row"),
-        ("time_s,x_mm,y_mm\n0,0,0\n0.001,30,0\n0.002,0,0\n", 4, "rows.csv:3:1: to this row: refused"),
-        ("time_s,x_mm,y_mm\n0,0,0\n0.001,1.5,0\n", 4, "rows.csv:3:1: to this row: refused"),
+        (
+            "time_s,x_mm,y_mm,w_mm\n0,0,0,0\n",
+            3,
+            "rows.csv: has a column \"w_mm\"",
+        ),
+        (
+            "time_s,x_mm,x_mm\n0,0,0\n",
+            3,
+            "rows.csv: has two columns x_mm",
+        ),
+        (
+            "time_s,x_mm,y_mm\n0,0,0\n",
+            3,
+            "rows.csv: has fewer than two rows",
+        ),
+        (
+            "time_s,x_mm,y_mm\n0,0,0\n0.001,0\n",
+            3,
+            "rows.csv:3:1: 2 fields, expected 3",
+        ),
+        (
+            "time_s,x_mm,y_mm\n0,0,0\n0.001,0,one\n",
+            3,
+            "rows.csv:3:9: \"one\", expected a number",
+        ),
+        (
+            "time_s,x_mm,y_mm\n0,0,0\n0.001,0,nan\n",
+            3,
+            "rows.csv:3:9: \"nan\"",
+        ),
+        (
+            "time_s,x_mm,y_mm\n0,0,0\n0.001,3000,0\n",
+            3,
+            "rows.csv:3:7: 3000 mm",
+        ),
+        (
+            "x_mm,y_mm,time_s\n0,0,0\n\n0,0,0.003\n",
+            3,
+            "rows.csv:4:5: 0.003000 s after the first row",
+        ),
+        (
+            "time_s,x_mm,y_mm\n0,0,0\n0.001,30,0\n0.002,0,0\n",
+            4,
+            "rows.csv:3:1: to this row: refused",
+        ),
+        (
+            "time_s,x_mm,y_mm\n0,0,0\n0.001,1.5,0\n",
+            4,
+            "rows.csv:3:1: to this row: refused",
+        ),
     ] {
         fs::write(folder.join("rows.csv"), text).unwrap();
         refused(folder, "run stream rows.csv --port sim", code, words);
@@ -204,20 +306,35 @@ fn wrong_usage_is_two_and_json_keeps_stdout_clean() {
     ] {
         assert_eq!(run(folder, line).0, 2, "giotto {line}");
     }
-    for line in ["--json analyze missing", "--json status --port /dev/nowhere", "--json table show noise.bin"]
-    {
+    for line in [
+        "--json analyze missing",
+        "--json status --port /dev/nowhere",
+        "--json table show noise.bin",
+    ] {
         let (code, stdout, _) = run(folder, line);
-        assert!(code > 2 && stdout.is_empty(), "giotto {line}: {code} {stdout}");
+        assert!(
+            code > 2 && stdout.is_empty(),
+            "giotto {line}: {code} {stdout}"
+        );
     }
-    for line in
-        ["--json completions zsh", "--json man -o pages", "--json", "--json monitor --port sim --count 1"]
-    {
+    for line in [
+        "--json completions zsh",
+        "--json man -o pages",
+        "--json",
+        "--json monitor --port sim --count 1",
+    ] {
         let (code, stdout, errors) = run(folder, line);
         assert_eq!(code, 0, "giotto {line}\n{errors}");
-        assert!(serde_json::from_str::<serde_json::Value>(&stdout).is_ok(), "giotto {line}\n{stdout}");
+        assert!(
+            serde_json::from_str::<serde_json::Value>(&stdout).is_ok(),
+            "giotto {line}\n{stdout}"
+        );
     }
     let (code, stdout, errors) = run(folder, "--quiet fit campaign -o quiet.toml");
-    assert!(code == 0 && errors.is_empty() && !stdout.contains('\x1b'), "{stdout}{errors}");
+    assert!(
+        code == 0 && errors.is_empty() && !stdout.contains('\x1b'),
+        "{stdout}{errors}"
+    );
     let (_, stdout, _) = run(folder, "monitor --port sim --count 2 --interval 0.01");
     assert!(
         !stdout.contains('\x1b') && stdout.matches("motion").count() == 2,

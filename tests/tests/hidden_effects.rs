@@ -1,6 +1,10 @@
 //! The fast part of the study of hidden effects: fixed seeds, small campaigns, one of each kind.
 //! `cargo run --release -p giotto-tests --bin power` runs the rest.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of a test fail as the test does")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of a test fail as the test does"
+)]
 use giotto::diagnosis::{Options, diagnose};
 use giotto_tests::effects::{Case, Keep, Kind, Null};
 use giotto_tests::files;
@@ -31,7 +35,8 @@ fn all_exact(kinds: &[Kind]) {
         .filter_map(|(row, kind)| {
             let seed = 100 + row as u64;
             let (_, v) = ask(kind, 3.0, seed);
-            (!v.exact || !v.false_findings.is_empty()).then(|| format!("{kind}, seed {seed}: {}", v.said))
+            (!v.exact || !v.false_findings.is_empty())
+                .then(|| format!("{kind}, seed {seed}: {}", v.said))
         })
         .collect();
     assert!(wrong.is_empty(), "{wrong:#?}");
@@ -39,7 +44,10 @@ fn all_exact(kinds: &[Kind]) {
 
 #[test]
 fn single_effects_at_three_times_the_noise_are_named() {
-    let kinds: Vec<Kind> = giotto_tests::effects::LISTED.iter().map(|n| effects(&[n])).collect();
+    let kinds: Vec<Kind> = giotto_tests::effects::LISTED
+        .iter()
+        .map(|n| effects(&[n]))
+        .collect();
     all_exact(&kinds);
 }
 
@@ -64,8 +72,16 @@ fn teeth_hide_nothing_else() {
     let (case, _) = ask(&effects(&["squareness", "stick_slip"]), 3.0, 11);
     let outcome = answer(&case);
     let noise_um = case.instrument.noise_m * 1e6;
-    assert!(outcome.baseline_um < 8.0 * noise_um, "the centre is free: {} µm", outcome.baseline_um);
-    assert!(outcome.extended_um < 0.8 * outcome.baseline_um, "{} µm", outcome.extended_um);
+    assert!(
+        outcome.baseline_um < 8.0 * noise_um,
+        "the centre is free: {} µm",
+        outcome.baseline_um
+    );
+    assert!(
+        outcome.extended_um < 0.8 * outcome.baseline_um,
+        "{} µm",
+        outcome.extended_um
+    );
 }
 
 /// Amounts that bend a signature end where the machine has them, whatever grid they started from.
@@ -74,18 +90,32 @@ fn shapes_are_climbed_to_the_truth() {
     let found = |name: &str, seed: u64| {
         let case = Case::new(&effects(&[name]), 10.0, seed, Variety::Small).unwrap();
         let diagnosis = diagnose(&case.campaign, &Options::default()).unwrap();
-        let finding = diagnosis.findings.into_iter().find(|f| f.cause.id() == name);
-        (case, finding.unwrap_or_else(|| panic!("{name} was not found")))
+        let finding = diagnosis
+            .findings
+            .into_iter()
+            .find(|f| f.cause.id() == name);
+        (
+            case,
+            finding.unwrap_or_else(|| panic!("{name} was not found")),
+        )
     };
     for seed in [1, 2, 3] {
         let (case, spike) = found("reversal_spike", seed);
-        let friction = case.machine.axes[case.truth[0].axis.unwrap_or(0)].friction.unwrap();
+        let friction = case.machine.axes[case.truth[0].axis.unwrap_or(0)]
+            .friction
+            .unwrap();
         let decay = spike.params["decay_s"] / friction.decay_s;
-        assert!((decay - 1.0).abs() < 0.05, "decay, seed {seed}: {decay} of the truth");
+        assert!(
+            (decay - 1.0).abs() < 0.05,
+            "decay, seed {seed}: {decay} of the truth"
+        );
         let (case, cyclic) = found("cyclic_error", seed);
         let truth = case.machine.geometry.cyclic[case.truth[0].axis.unwrap_or(0)].unwrap();
         let pitch = 1e-3 * cyclic.params["pitch_mm"] / truth.pitch_m;
-        assert!((pitch - 1.0).abs() < 1e-3, "pitch, seed {seed}: {pitch} of the truth");
+        assert!(
+            (pitch - 1.0).abs() < 1e-3,
+            "pitch, seed {seed}: {pitch} of the truth"
+        );
     }
 }
 
@@ -96,16 +126,30 @@ fn nothing_is_found_where_nothing_is() {
 
 #[test]
 fn what_has_no_name_is_left_unexplained() {
-    all_exact(&[effects(&["unknown_third"]), effects(&["unknown_bump"]), effects(&["unknown_four_lobes"])]);
+    all_exact(&[
+        effects(&["unknown_third"]),
+        effects(&["unknown_bump"]),
+        effects(&["unknown_four_lobes"]),
+    ]);
 }
 
 /// A loud tone is found where teeth make everything rough: its own leakage does not hide it.
 #[test]
 fn a_loud_vibration_beside_teeth_is_named() {
     for seed in [13_665_450_784_219_763_352, 13_665_450_784_219_763_345] {
-        let case = Case::new(&effects(&["vibration", "stick_slip"]), 3.0, seed, Variety::Broad).unwrap();
+        let case = Case::new(
+            &effects(&["vibration", "stick_slip"]),
+            3.0,
+            seed,
+            Variety::Broad,
+        )
+        .unwrap();
         let verdict = judge(&case, &answer(&case));
-        assert!(verdict.exact && verdict.false_findings.is_empty(), "seed {seed}: {}", verdict.said);
+        assert!(
+            verdict.exact && verdict.false_findings.is_empty(),
+            "seed {seed}: {}",
+            verdict.said
+        );
     }
 }
 
@@ -115,7 +159,11 @@ fn a_piece_of_what_has_no_name_gets_none() {
     for seed in [1_910_744_070_355_028_229, 1_910_744_070_355_028_237] {
         let case = Case::new(&effects(&["unknown_transient"]), 3.0, seed, Variety::Usual).unwrap();
         let verdict = judge(&case, &answer(&case));
-        assert!(verdict.exact && verdict.false_findings.is_empty(), "seed {seed}: {}", verdict.said);
+        assert!(
+            verdict.exact && verdict.false_findings.is_empty(),
+            "seed {seed}: {}",
+            verdict.said
+        );
     }
 }
 
@@ -123,7 +171,10 @@ fn a_piece_of_what_has_no_name_gets_none() {
 fn the_papers_machine_shows_its_higher_order() {
     let (case, v) = ask(&effects(&["higher_order_dynamics"]), 30.0, 3);
     assert!(v.top_right && v.exact, "{}", v.said);
-    assert!(case.truth[0].value < 0.0, "κ4/24 − κ2²/4 of a well damped second order is negative");
+    assert!(
+        case.truth[0].value < 0.0,
+        "κ4/24 − κ2²/4 of a well damped second order is negative"
+    );
 }
 
 #[test]
@@ -132,23 +183,36 @@ fn campaigns_too_poor_to_tell_get_no_guess() {
         let mut case = Case::new(&Kind::Null(Null::Lag), 0.0, 7, Variety::Small).unwrap();
         keep.thin(&mut case.campaign);
         let outcome = answer(&case);
-        assert!(outcome.findings.is_empty(), "{keep:?}: {:?}", outcome.findings);
+        assert!(
+            outcome.findings.is_empty(),
+            "{keep:?}: {:?}",
+            outcome.findings
+        );
     }
 }
 
 /// The six open campaigns, where `GIOTTO_CAMPAIGNS` says they are.
 #[test]
 fn open_campaigns_come_out_as_their_truth_says() {
-    let Some(root) = std::env::var_os("GIOTTO_CAMPAIGNS").map(std::path::PathBuf::from) else { return };
+    let Some(root) = std::env::var_os("GIOTTO_CAMPAIGNS").map(std::path::PathBuf::from) else {
+        return;
+    };
     let mut seen = 0;
     for entry in std::fs::read_dir(&root).unwrap().filter_map(Result::ok) {
-        let Ok(truth) = std::fs::read_to_string(entry.path().join("truth.json")) else { continue };
+        let Ok(truth) = std::fs::read_to_string(entry.path().join("truth.json")) else {
+            continue;
+        };
         let truth: serde_json::Value = serde_json::from_str(&truth).unwrap();
         let outcome = Outcome::of(&entry.path()).unwrap();
         let said: Vec<&str> = outcome.findings.iter().map(|f| f.cause.as_str()).collect();
         let truths = truth["truth"].as_array().unwrap();
         let accepts = |t: &serde_json::Value| -> Vec<String> {
-            t["accept"].as_array().unwrap().iter().filter_map(|a| a.as_str().map(str::to_owned)).collect()
+            t["accept"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .filter_map(|a| a.as_str().map(str::to_owned))
+                .collect()
         };
         let allowed: Vec<String> = truths.iter().flat_map(&accepts).collect();
         for cause in &said {
@@ -157,9 +221,13 @@ fn open_campaigns_come_out_as_their_truth_says() {
         }
         for t in truths {
             let any = accepts(t);
-            let found =
-                any.iter().any(|a| said.contains(&a.as_str())) || (any.is_empty() && outcome.unexplained);
-            assert!(found, "{}: {t} not found among {said:?}", entry.path().display());
+            let found = any.iter().any(|a| said.contains(&a.as_str()))
+                || (any.is_empty() && outcome.unexplained);
+            assert!(
+                found,
+                "{}: {t} not found among {said:?}",
+                entry.path().display()
+            );
         }
         seen += 1;
     }

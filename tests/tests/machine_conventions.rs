@@ -1,6 +1,10 @@
 //! The machine of the hidden-effect tests against the closed forms: sign, size, parity of every effect.
 //! `diagnose` relies on these conventions, so they are checked on a machine that knows none of them.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of a test fail as the test does")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of a test fail as the test does"
+)]
 use giotto::campaign::Direction;
 use giotto_tests::machine::run::simulate;
 use giotto_tests::machine::{AxisChain, Cyclic, Friction, Machine, Test, Thermal, Vibration};
@@ -10,12 +14,23 @@ const UM: f64 = 1e-6;
 const N: usize = 1000;
 
 fn test(radius_m: f64, feed_m_s: f64, direction: Direction) -> Test {
-    Test { radius_m, feed_m_s, direction, start_angle_rad: 0.0, started_s: 0.0, samples: N }
+    Test {
+        radius_m,
+        feed_m_s,
+        direction,
+        start_angle_rad: 0.0,
+        started_s: 0.0,
+        samples: N,
+    }
 }
 
 /// Radial deviation, m, sample by sample; the angles of a CCW run grow, those of a CW run fall.
 fn profile(machine: &Machine, test: &Test) -> Vec<f64> {
-    simulate(machine, test, 1000.0, 0.0).position_m.iter().map(|p| p[0].hypot(p[1]) - test.radius_m).collect()
+    simulate(machine, test, 1000.0, 0.0)
+        .position_m
+        .iter()
+        .map(|p| p[0].hypot(p[1]) - test.radius_m)
+        .collect()
 }
 
 /// Amplitudes of cos kθ and sin kθ; the mean for order 0.
@@ -37,7 +52,10 @@ fn both(check: impl Fn(Direction, f64)) {
 }
 
 fn near(got: f64, want: f64, within: f64, what: &str) {
-    assert!((got - want).abs() <= within, "{what}: {got:e}, expected {want:e} ± {within:e}");
+    assert!(
+        (got - want).abs() <= within,
+        "{what}: {got:e}, expected {want:e} ± {within:e}"
+    );
 }
 
 fn chain(change: impl Fn(&mut AxisChain)) -> Machine {
@@ -52,9 +70,18 @@ fn linear_chains_shrink_the_circle_by_their_gain() {
     let (x, zeta): (f64, f64) = (w / 38.0, 0.72);
     let gains = [
         (chain(|a| a.lag_s = 0.01), 1.0 / (w * 0.01).hypot(1.0)),
-        (chain(|a| a.exponential_s = 0.02), 1.0 / (w * 0.02).hypot(1.0)),
-        (chain(|a| a.average_s = 0.0413), (w * 0.0413 / 2.0).sin() / (w * 0.0413 / 2.0)),
-        (chain(|a| a.mechanics = Some([38.0, zeta])), 1.0 / (1.0 - x * x).hypot(2.0 * zeta * x)),
+        (
+            chain(|a| a.exponential_s = 0.02),
+            1.0 / (w * 0.02).hypot(1.0),
+        ),
+        (
+            chain(|a| a.average_s = 0.0413),
+            (w * 0.0413 / 2.0).sin() / (w * 0.0413 / 2.0),
+        ),
+        (
+            chain(|a| a.mechanics = Some([38.0, zeta])),
+            1.0 / (1.0 - x * x).hypot(2.0 * zeta * x),
+        ),
         (chain(|a| a.dead_time_s = 0.01), 1.0),
         (
             chain(|a| (a.lag_s, a.average_s) = (0.01, 0.02)),
@@ -76,14 +103,20 @@ fn linear_chains_shrink_the_circle_by_their_gain() {
 #[test]
 fn cumulants_give_the_radius_law() {
     let m = chain(|a| {
-        (a.lag_s, a.average_s, a.mechanics, a.exponential_s) = (0.004, 0.01, Some([90.0, 0.6]), 0.003);
+        (a.lag_s, a.average_s, a.mechanics, a.exponential_s) =
+            (0.004, 0.01, Some([90.0, 0.6]), 0.003);
     });
     let [k2, k4] = m.axes[0].cumulants();
     let t = test(0.1, 0.4, Direction::Ccw);
     let w2: f64 = 16.0;
     let got = (harmonic(&profile(&m, &t), &t, 0.0)[0] / 0.1).ln_1p();
     // κ4 is a tenth of a percent of κ2 here; the bound is a tenth of κ4's own share.
-    near(got, -k2 * w2 / 2.0 + k4 * w2 * w2 / 24.0, 0.1 * (k4 * w2 * w2 / 24.0).abs(), "ln(Rm/R)");
+    near(
+        got,
+        -k2 * w2 / 2.0 + k4 * w2 * w2 / 24.0,
+        0.1 * (k4 * w2 * w2 / 24.0).abs(),
+        "ln(Rm/R)",
+    );
 }
 
 #[test]
@@ -100,7 +133,12 @@ fn servo_mismatch_is_odd_and_follows_the_feed() {
             both(|direction, d| {
                 let t = test(radius, feed, direction);
                 let want = d * 0.5 * feed * tau;
-                near(harmonic(&profile(&m, &t), &t, 2.0)[1], want, 0.005 * want.abs(), "d·½fΔτ·sin2θ");
+                near(
+                    harmonic(&profile(&m, &t), &t, 2.0)[1],
+                    want,
+                    0.005 * want.abs(),
+                    "d·½fΔτ·sin2θ",
+                );
             });
         }
     }
@@ -131,21 +169,42 @@ fn geometry_has_its_ovals_lobes_and_chirp() {
     both(|direction, _| {
         let t = test(0.3, 0.1, direction);
         let r = profile(&m, &t);
-        near(harmonic(&r, &t, 0.0)[0], 0.5 * 0.3 * 70e-6, 4e-9, "½R(sx+sy)");
-        near(harmonic(&r, &t, 2.0)[0], 0.5 * 0.3 * 30e-6, 4e-9, "½R(sx−sy)·cos2θ");
-        near(harmonic(&r, &t, 2.0)[1], 0.5 * 0.3 * 40e-6, 4e-9, "½εR·sin2θ");
+        near(
+            harmonic(&r, &t, 0.0)[0],
+            0.5 * 0.3 * 70e-6,
+            4e-9,
+            "½R(sx+sy)",
+        );
+        near(
+            harmonic(&r, &t, 2.0)[0],
+            0.5 * 0.3 * 30e-6,
+            4e-9,
+            "½R(sx−sy)·cos2θ",
+        );
+        near(
+            harmonic(&r, &t, 2.0)[1],
+            0.5 * 0.3 * 40e-6,
+            4e-9,
+            "½εR·sin2θ",
+        );
         let bow = 3e-4 * 0.09;
         near(harmonic(&r, &t, 1.0)[1], bow / 4.0, 4e-9, "S/4·sinθ");
         near(harmonic(&r, &t, 3.0)[1], bow / 4.0, 4e-9, "S/4·sin3θ");
     });
     let (amplitude_m, pitch_m, phase_rad) = (4.0 * UM, 0.02, 0.6);
     let mut m = Machine::default();
-    m.geometry.cyclic[0] = Some(Cyclic { amplitude_m, pitch_m, phase_rad });
+    m.geometry.cyclic[0] = Some(Cyclic {
+        amplitude_m,
+        pitch_m,
+        phase_rad,
+    });
     both(|direction, d| {
         let t = test(0.1, 0.1, direction);
         for (k, x) in profile(&m, &t).into_iter().enumerate() {
             let theta = d * 2.0 * PI * k as f64 / N as f64;
-            let want = amplitude_m * theta.cos() * (2.0 * PI * 0.1 * theta.cos() / pitch_m + phase_rad).sin();
+            let want = amplitude_m
+                * theta.cos()
+                * (2.0 * PI * 0.1 * theta.cos() / pitch_m + phase_rad).sin();
             near(x, want, 1e-9, "A·cosθ·sin(2πR cosθ/P + φ)");
         }
     });
@@ -163,8 +222,11 @@ fn backlash_steps_outward_on_both_axes_both_ways() {
                 for (k, x) in profile(&m, &t).into_iter().enumerate() {
                     let theta = d * 2.0 * PI * k as f64 / N as f64;
                     let (s, c) = theta.sin_cos();
-                    let (speed, want) =
-                        if axis == 0 { (s, d * s.signum() * c) } else { (c, -d * c.signum() * s) };
+                    let (speed, want) = if axis == 0 {
+                        (s, d * s.signum() * c)
+                    } else {
+                        (c, -d * c.signum() * s)
+                    };
                     // The gap is taken up within √(2B/R) = 0.011 rad.
                     if speed.abs() > 0.02 {
                         near(x, sign * 0.5 * b * want, 1e-9, "d(B/2)sgn(sinθ)cosθ");
@@ -183,7 +245,12 @@ fn lateral_play_moves_the_mean_against_the_direction() {
         both(|direction, d| {
             let t = test(0.15, 0.1, direction);
             let r = profile(&m, &t);
-            near(harmonic(&r, &t, 0.0)[0], -d * 5.0 * UM / PI, 0.01 * UM, "−dL/π");
+            near(
+                harmonic(&r, &t, 0.0)[0],
+                -d * 5.0 * UM / PI,
+                0.01 * UM,
+                "−dL/π",
+            );
             for (k, x) in r.into_iter().enumerate() {
                 let (s, c) = (2.0 * PI * k as f64 / N as f64).sin_cos();
                 let lever = if axis == 0 { s.abs() } else { c.abs() };
@@ -199,7 +266,12 @@ fn lateral_play_moves_the_mean_against_the_direction() {
 fn friction_spikes_come_after_the_reversal_and_point_outward() {
     let (peak_m, decay_s) = (10.0 * UM, 0.03);
     let mut m = Machine::default();
-    m.axes[0].friction = Some(Friction { peak_m, decay_s, rise_s: 0.0005, presliding_m: 0.1 * UM });
+    m.axes[0].friction = Some(Friction {
+        peak_m,
+        decay_s,
+        rise_s: 0.0005,
+        presliding_m: 0.1 * UM,
+    });
     both(|direction, _| {
         let t = test(0.1, 0.5, direction);
         let r = profile(&m, &t);
@@ -215,7 +287,10 @@ fn friction_spikes_come_after_the_reversal_and_point_outward() {
                     "A·exp(−t/τi)",
                 );
             }
-            assert!(r[(start + N - 30) % N].abs() < 0.1 * peak_m, "quiet before the reversal");
+            assert!(
+                r[(start + N - 30) % N].abs() < 0.1 * peak_m,
+                "quiet before the reversal"
+            );
         }
         // Two spikes a turn, each of area A·ωτi (before the lever of cosθ).
         let area = peak_m * 5.0 * decay_s / PI;
@@ -226,12 +301,25 @@ fn friction_spikes_come_after_the_reversal_and_point_outward() {
 #[test]
 fn chords_cut_the_circle() {
     let dt: f64 = 0.01;
-    let m = Machine { interpolation_s: dt, ..Machine::default() };
+    let m = Machine {
+        interpolation_s: dt,
+        ..Machine::default()
+    };
     let t = test(0.1, 0.5, Direction::Ccw);
     let r = profile(&m, &t);
-    near(harmonic(&r, &t, 0.0)[0], -0.25 * dt * dt / (12.0 * 0.1), 0.3 * UM, "mean −f²Δt²/(12R)");
+    near(
+        harmonic(&r, &t, 0.0)[0],
+        -0.25 * dt * dt / (12.0 * 0.1),
+        0.3 * UM,
+        "mean −f²Δt²/(12R)",
+    );
     let least = r.iter().copied().fold(f64::MAX, f64::min);
-    near(least, -0.25 * dt * dt / (8.0 * 0.1), 0.5 * UM, "peak −f²Δt²/(8R)");
+    near(
+        least,
+        -0.25 * dt * dt / (8.0 * 0.1),
+        0.5 * UM,
+        "peak −f²Δt²/(8R)",
+    );
 }
 
 #[test]
@@ -240,25 +328,66 @@ fn the_clamp_saturates_the_error_and_lengthens_the_turn() {
     m.centripetal_limit_m_s2 = 1.0;
     let t = test(0.1, 0.7, Direction::Cw);
     let feed = 0.1_f64.sqrt();
-    near(simulate(&m, &t, 1.0, 0.0).turn_s, 2.0 * PI * 0.1 / feed, 1e-9, "duration");
-    near(harmonic(&profile(&m, &t), &t, 0.0)[0], -0.008_f64.powi(2) / 2.0, 0.1 * UM, "−κ2·a_max/2");
+    near(
+        simulate(&m, &t, 1.0, 0.0).turn_s,
+        2.0 * PI * 0.1 / feed,
+        1e-9,
+        "duration",
+    );
+    near(
+        harmonic(&profile(&m, &t), &t, 0.0)[0],
+        -0.008_f64.powi(2) / 2.0,
+        0.1 * UM,
+        "−κ2·a_max/2",
+    );
     let slow = test(0.1, 0.2, Direction::Cw);
-    near(simulate(&m, &slow, 1.0, 0.0).turn_s, PI, 1e-9, "runs below the limit keep their feed");
+    near(
+        simulate(&m, &slow, 1.0, 0.0).turn_s,
+        PI,
+        1e-9,
+        "runs below the limit keep their feed",
+    );
 }
 
 #[test]
 fn heat_and_vibration_belong_to_time() {
-    let m = Machine { thermal: Some(Thermal { total: 100e-6, curvature: 0.0 }), ..Machine::default() };
+    let m = Machine {
+        thermal: Some(Thermal {
+            total: 100e-6,
+            curvature: 0.0,
+        }),
+        ..Machine::default()
+    };
     let mut t = test(0.2, 0.5, Direction::Ccw);
     t.started_s = 500.0;
     let half_lap = 0.5 * 2.0 * PI * 0.2 / 0.5 / 1000.0;
-    near(harmonic(&profile(&m, &t), &t, 0.0)[0], 0.2 * 100e-6 * (0.5 + half_lap), 0.01 * UM, "R·α·ΔT(t)");
-    let warm = Thermal { total: 100e-6, curvature: 2.0 };
-    near(warm.growth(1.0), 100e-6, 1e-15, "the total is reached at the end");
+    near(
+        harmonic(&profile(&m, &t), &t, 0.0)[0],
+        0.2 * 100e-6 * (0.5 + half_lap),
+        0.01 * UM,
+        "R·α·ΔT(t)",
+    );
+    let warm = Thermal {
+        total: 100e-6,
+        curvature: 2.0,
+    };
+    near(
+        warm.growth(1.0),
+        100e-6,
+        1e-15,
+        "the total is reached at the end",
+    );
     assert!(warm.growth(0.5) > 60e-6, "a warm-up is fast at first");
 
-    let vibration = Some(Vibration { frequency_hz: 12.0, amplitude_m: 3.0 * UM, axis: None });
-    let m = Machine { vibration, ..Machine::default() };
+    let vibration = Some(Vibration {
+        frequency_hz: 12.0,
+        amplitude_m: 3.0 * UM,
+        axis: None,
+    });
+    let m = Machine {
+        vibration,
+        ..Machine::default()
+    };
     // One turn lasts 1.25 s: the vibration makes 15 waves of it.
     let t = test(0.1, 2.0 * PI * 0.1 / 1.25, Direction::Ccw);
     let [c, s] = harmonic(&profile(&m, &t), &t, 15.0);

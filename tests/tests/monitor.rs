@@ -1,6 +1,10 @@
 //! `giotto monitor` over a real pty: the controller goes, another comes back under the same name, the watch goes on.
 #![cfg(unix)]
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may fail where it stands")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test may fail where it stands"
+)]
 use giotto_tests::command::giotto;
 use serde_json::Value;
 use std::io::{BufRead, BufReader};
@@ -38,9 +42,16 @@ fn next(lines: &Receiver<String>) -> String {
 
 /// Starts a virtual controller and lets `name` lead to its port.
 fn controller(name: &Path) -> Running {
-    let mut child = giotto().args(["controller", "sim"]).stdout(Stdio::piped()).spawn().unwrap();
+    let mut child = giotto()
+        .args(["controller", "sim"])
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
     let first = next(&lines(child.stdout.take().unwrap()));
-    let port = first.strip_prefix("port: ").unwrap_or_else(|| panic!("{first}")).to_owned();
+    let port = first
+        .strip_prefix("port: ")
+        .unwrap_or_else(|| panic!("{first}"))
+        .to_owned();
     let _ = std::fs::remove_file(name);
     std::os::unix::fs::symlink(port, name).unwrap();
     Running(child)
@@ -65,16 +76,31 @@ fn the_watch_outlives_its_controller() {
         "1000",
         "--port",
     ]);
-    let mut watch = Running(watch.arg(&name).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap());
+    let mut watch = Running(
+        watch
+            .arg(&name)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap(),
+    );
     let told = lines(watch.0.stdout.take().unwrap());
     let look = || serde_json::from_str::<Value>(&next(&told)).unwrap();
-    let moving = std::iter::repeat_with(look).take(200).find(|l| l["motion"] == "running");
+    let moving = std::iter::repeat_with(look)
+        .take(200)
+        .find(|l| l["motion"] == "running");
     let before = moving.unwrap()["ticks"].as_u64().unwrap();
     drop(first);
     let _second = controller(&name);
     // The second began to count anew and runs nothing: a run is not begun twice by itself.
-    let after = std::iter::repeat_with(look).take(2000).find(|l| l["motion"] == "idle").unwrap();
-    assert!(after["ticks"].as_u64().unwrap() < before + 60_000, "{before} {after}");
+    let after = std::iter::repeat_with(look)
+        .take(2000)
+        .find(|l| l["motion"] == "idle")
+        .unwrap();
+    assert!(
+        after["ticks"].as_u64().unwrap() < before + 60_000,
+        "{before} {after}"
+    );
     assert!(watch.0.try_wait().unwrap().is_none(), "it watches still");
 }
 
@@ -94,9 +120,21 @@ impl Terminal {
         use std::io::Read;
         use std::sync::{Arc, Mutex};
         let mut command = std::process::Command::new("script");
-        command.args(["--quiet", "--return", "--command", &format!("sh {}", script.display()), "/dev/null"]);
-        command.env("TERM", "xterm-256color").env("SHELL", "/bin/sh");
-        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+        command.args([
+            "--quiet",
+            "--return",
+            "--command",
+            &format!("sh {}", script.display()),
+            "/dev/null",
+        ]);
+        command
+            .env("TERM", "xterm-256color")
+            .env("SHELL", "/bin/sh");
+        let mut child = command
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
         let (keys, mut out) = (child.stdin.take().unwrap(), child.stdout.take().unwrap());
         let [rows, columns] = [40, 120].map(|n| std::num::NonZero::new(n).unwrap());
         let screen = Arc::new(Mutex::new(vt100::Parser::new(rows, columns, 0)));
@@ -107,7 +145,12 @@ impl Terminal {
                 drawn.lock().unwrap().process(&bytes[..count]);
             }
         });
-        Self { child: Running(child), keys, screen, reader: Some(reader) }
+        Self {
+            child: Running(child),
+            keys,
+            screen,
+            reader: Some(reader),
+        }
     }
 
     fn shown(&self) -> String {
@@ -144,15 +187,24 @@ fn the_picture_lives_and_leaves_the_terminal_clean() {
     );
     std::fs::write(&script, text).unwrap();
     let mut terminal = Terminal::run(&script);
-    terminal.wait(|s| s.contains("motion       running") && s.contains("q quit"), "a running state");
+    terminal.wait(
+        |s| s.contains("motion       running") && s.contains("q quit"),
+        "a running state",
+    );
     assert!(terminal.screen.lock().unwrap().screen().alternate_screen());
     // Live: ticks go on, and the trace is drawn.
     let ticks = |s: &str| -> u64 {
-        let number = s.split("ticks        ").nth(1).and_then(|rest| rest.split_whitespace().next());
+        let number = s
+            .split("ticks        ")
+            .nth(1)
+            .and_then(|rest| rest.split_whitespace().next());
         number.and_then(|n| n.parse().ok()).unwrap_or(0)
     };
     let then = ticks(&terminal.shown());
-    terminal.wait(|s| ticks(s) > then && s.contains("corrected, ×"), "a later tick and a trace");
+    terminal.wait(
+        |s| ticks(s) > then && s.contains("corrected, ×"),
+        "a later tick and a trace",
+    );
     drop(first);
     terminal.wait(|s| s.contains("LOST"), "the loss");
     let _second = controller(&name);
@@ -161,11 +213,22 @@ fn the_picture_lives_and_leaves_the_terminal_clean() {
         "its return",
     );
     terminal.keys.write_all(b"q").unwrap();
-    terminal.wait(|s| s.contains("the terminal is as it was"), "the shell's last word");
+    terminal.wait(
+        |s| s.contains("the terminal is as it was"),
+        "the shell's last word",
+    );
     assert!(terminal.child.0.wait().unwrap().success());
     terminal.reader.take().unwrap().join().unwrap();
     let parser = terminal.screen.lock().unwrap();
     let screen = parser.screen();
-    assert!(screen.contents().contains("it ended with 0"), "{}", screen.contents());
-    assert!(!screen.alternate_screen() && !screen.hide_cursor(), "{}", screen.contents());
+    assert!(
+        screen.contents().contains("it ended with 0"),
+        "{}",
+        screen.contents()
+    );
+    assert!(
+        !screen.alternate_screen() && !screen.hide_cursor(),
+        "{}",
+        screen.contents()
+    );
 }

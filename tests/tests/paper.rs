@@ -1,13 +1,22 @@
 //! The paper's claims on simulated campaigns with its coefficients.
 //! The full study, sample by sample with 1000 samples a turn: `cargo run --release -p giotto-tests --bin paper`.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of a test fail as the test does")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of a test fail as the test does"
+)]
 use giotto::fit::{Offset, critical_f};
 use giotto_tests::paper::Measurement;
 use giotto_tests::paper::printed::{F1, F2, F21, HALF_BETA1, HALF_BETA2, follows};
 use giotto_tests::paper::study::study;
 
 /// Fewer samples than an instrument takes, so that 1000 seeds are quick: their noise weighs four times as much in the radius.
-const QUICK: Measurement = Measurement { samples: 60, noise_m: 1e-6, spread_m: 0.5e-6, resolution_m: 0.1e-6 };
+const QUICK: Measurement = Measurement {
+    samples: 60,
+    noise_m: 1e-6,
+    spread_m: 0.5e-6,
+    resolution_m: 0.1e-6,
+};
 
 #[test]
 fn radii_not_fitted_are_predicted_and_intervals_hold_what_they_promise() {

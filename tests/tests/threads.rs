@@ -28,7 +28,10 @@ order = "random"
 /// What a command prints with so many threads.
 fn printed(threads: u32, folder: &Path, arguments: &[&str]) -> String {
     let mut command = giotto();
-    command.args(arguments).current_dir(folder).env("RAYON_NUM_THREADS", threads.to_string());
+    command
+        .args(arguments)
+        .current_dir(folder)
+        .env("RAYON_NUM_THREADS", threads.to_string());
     let (code, out, err) = outcome(&command.output().unwrap());
     assert_eq!(code, 0, "{arguments:?} with {threads} threads: {err}");
     out
@@ -47,20 +50,46 @@ fn any_number_of_threads_prints_the_same() {
         let radius = 100.03 + 0.002 * (f64::from(k) * 0.618).sin() + 0.01 * (2.0 * turn).cos();
         let (sin, cos) = turn.sin_cos();
         let (x, t) = (radius * cos, turn * 5.0);
-        writeln!(text, "{t:.6},{:.6},{:.6},{:.6}", 40.0 + x, radius * sin, 7.0 + 0.02 * x).unwrap();
+        writeln!(
+            text,
+            "{t:.6},{:.6},{:.6},{:.6}",
+            40.0 + x,
+            radius * sin,
+            7.0 + 0.02 * x
+        )
+        .unwrap();
     }
     std::fs::write(at.join("long.csv"), text).unwrap();
     let once = |threads: u32| -> Vec<String> {
         let name = format!("campaign{threads}");
-        printed(threads, at, &["simulate", "plan.toml", "--seed", "3", "-o", &name]);
-        let mut files: Vec<_> =
-            std::fs::read_dir(at.join(&name)).unwrap().map(|e| e.unwrap().path()).collect();
+        printed(
+            threads,
+            at,
+            &["simulate", "plan.toml", "--seed", "3", "-o", &name],
+        );
+        let mut files: Vec<_> = std::fs::read_dir(at.join(&name))
+            .unwrap()
+            .map(|e| e.unwrap().path())
+            .collect();
         files.sort();
-        let mut all: Vec<String> = files.iter().map(|f| std::fs::read_to_string(f).unwrap()).collect();
+        let mut all: Vec<String> = files
+            .iter()
+            .map(|f| std::fs::read_to_string(f).unwrap())
+            .collect();
         for command in [&["analyze"][..], &["fit"], &["diagnose", "--seed", "5"]] {
-            all.push(printed(threads, at, &[command, &[&name, "--json"]].concat()));
+            all.push(printed(
+                threads,
+                at,
+                &[command, &[&name, "--json"]].concat(),
+            ));
         }
-        all.push(printed(threads, at, &["analyze", "long.csv", "--radius", "100", "--feed", "20", "--json"]));
+        all.push(printed(
+            threads,
+            at,
+            &[
+                "analyze", "long.csv", "--radius", "100", "--feed", "20", "--json",
+            ],
+        ));
         all
     };
     let one = once(1);

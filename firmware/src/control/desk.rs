@@ -44,7 +44,10 @@ impl Streamed {
         while !bytes.is_empty() {
             bytes = self.steps.read(bytes)?;
             let place_nm = self.steps.place_nm;
-            if place_nm.iter().any(|nm| nm.unsigned_abs() > MAX_POSITION_NM) {
+            if place_nm
+                .iter()
+                .any(|nm| nm.unsigned_abs() > MAX_POSITION_NM)
+            {
                 return None;
             }
             *points.place_nm.get_mut(usize::from(points.count))? = place_nm;
@@ -64,7 +67,14 @@ where
 {
     /// Plans for the tick at the other end of these queues.
     pub fn new(planner: P, shared: S, segments: O, set_points: I) -> Self {
-        Self { planner, shared, segments, set_points, accepted_at: None, stream: None }
+        Self {
+            planner,
+            shared,
+            segments,
+            set_points,
+            accepted_at: None,
+            stream: None,
+        }
     }
 
     /// A run may begin; it is planned from where the machine stands.
@@ -86,17 +96,29 @@ where
     /// Something is open: a program, or a stream.
     fn open(&self, stream: bool) -> Result<(), MotionRefusal> {
         let open = self.shared.program_open(self.shared.epoch()) && self.stream.is_some() == stream;
-        if open { Ok(()) } else { Err(MotionRefusal::NoProgram) }
+        if open {
+            Ok(())
+        } else {
+            Err(MotionRefusal::NoProgram)
+        }
     }
 
     /// Before the work of planning.
     fn room(&self) -> Result<(), MotionRefusal> {
-        if self.segments.waiting() < SEGMENTS { Ok(()) } else { Err(MotionRefusal::QueueFull) }
+        if self.segments.waiting() < SEGMENTS {
+            Ok(())
+        } else {
+            Err(MotionRefusal::QueueFull)
+        }
     }
 
     fn accepted(&mut self, sent: bool) -> Result<(), MotionRefusal> {
         self.accepted_at = Some(self.shared.snapshot().tick);
-        if sent { Ok(()) } else { Err(MotionRefusal::QueueFull) }
+        if sent {
+            Ok(())
+        } else {
+            Err(MotionRefusal::QueueFull)
+        }
     }
 
     /// Plans a segment where the queue will take it from.
@@ -105,7 +127,9 @@ where
         plan: impl FnOnce(&mut Planner, &mut Planned) -> Result<bool, Refused>,
     ) -> Result<(), MotionRefusal> {
         let mut job = Job::blank();
-        let Some(planned) = job.planned() else { return Ok(()) };
+        let Some(planned) = job.planned() else {
+            return Ok(());
+        };
         let sent = !plan(&mut self.planner, planned).map_err(in_words)? || self.segments.send(&job);
         self.accepted(sent)
     }
@@ -128,7 +152,9 @@ fn in_words(refused: Refused) -> MotionRefusal {
     match refused {
         Refused::Busy => MotionRefusal::Busy,
         Refused::Fault => MotionRefusal::Fault,
-        Refused::NotANumber(quantity) | Refused::OutOfBounds(quantity) => MotionRefusal::Path(quantity),
+        Refused::NotANumber(quantity) | Refused::OutOfBounds(quantity) => {
+            MotionRefusal::Path(quantity)
+        }
     }
 }
 
@@ -156,17 +182,25 @@ where
     }
 
     fn install(&mut self, image: Option<&[u8]>) -> Result<(), Refusal> {
-        if matches!(self.snapshot().state, MotionState::Running | MotionState::Stopping) {
+        if matches!(
+            self.snapshot().state,
+            MotionState::Running | MotionState::Stopping
+        ) {
             return Err(Refusal::Motion(MotionRefusal::Busy));
         }
         let Some(image) = image else {
-            return self.planner.set_table(None).map_err(|_| Refusal::Motion(MotionRefusal::Terms));
+            return self
+                .planner
+                .set_table(None)
+                .map_err(|_| Refusal::Motion(MotionRefusal::Terms));
         };
         let fill = |table: &mut Table| table::decode_into(image, table).map_err(Unusable::Table);
-        self.planner.load_table(fill).map_err(|unusable| match unusable {
-            Unusable::Table(error) => Refusal::Table(error),
-            Unusable::Terms => Refusal::Motion(MotionRefusal::Terms),
-        })
+        self.planner
+            .load_table(fill)
+            .map_err(|unusable| match unusable {
+                Unusable::Table(error) => Refusal::Table(error),
+                Unusable::Terms => Refusal::Motion(MotionRefusal::Terms),
+            })
     }
 
     fn bypass(&mut self, on: bool) {
@@ -198,7 +232,10 @@ where
     #[inline(never)]
     fn begin_stream(&mut self, feed_m_s: f32, ahead: u16) -> Result<(), MotionRefusal> {
         self.ready()?;
-        let plan = self.planner.stream(feed_m_s, STREAM_PLACES).map_err(in_words)?;
+        let plan = self
+            .planner
+            .stream(feed_m_s, STREAM_PLACES)
+            .map_err(in_words)?;
         self.plan(|planner, planned| {
             planner.clear(planned);
             Ok(true)
@@ -206,7 +243,12 @@ where
         self.shared.go.store(false, Relaxed);
         let sent = self.segments.send(&Job::Stream(plan));
         let place_nm = self.planner.position_nm();
-        self.stream = Some(Streamed { steps: Steps::from(place_nm), next: 0, ahead, batches: 0 });
+        self.stream = Some(Streamed {
+            steps: Steps::from(place_nm),
+            next: 0,
+            ahead,
+            batches: 0,
+        });
         self.shared.set_program(true);
         self.accepted(sent)
     }
@@ -215,10 +257,14 @@ where
     fn points(&mut self, bytes: &[u8]) -> Result<(), MotionRefusal> {
         self.open(true)?;
         self.room()?;
-        let Some(mut streamed) = self.stream else { return Err(MotionRefusal::NoProgram) };
+        let Some(mut streamed) = self.stream else {
+            return Err(MotionRefusal::NoProgram);
+        };
         let mut job = Job::Points(Points::NONE);
         if let Job::Points(points) = &mut job {
-            streamed.read(bytes, points).ok_or(MotionRefusal::Path(Quantity::Position))?;
+            streamed
+                .read(bytes, points)
+                .ok_or(MotionRefusal::Path(Quantity::Position))?;
         }
         let sent = self.segments.send(&job);
         streamed.batches = streamed.batches.saturating_add(1);
@@ -236,7 +282,11 @@ where
         if self.open(true).is_ok() {
             self.room()?;
             let first = self.stream.map_or(0, |streamed| streamed.next);
-            self.segments.send(&Job::Points(Points { first, last: true, ..Points::NONE }));
+            self.segments.send(&Job::Points(Points {
+                first,
+                last: true,
+                ..Points::NONE
+            }));
             self.shared.go.store(true, Relaxed);
         } else {
             self.open(false)?;

@@ -29,7 +29,12 @@ pub struct Points {
 }
 
 impl Points {
-    pub(super) const NONE: Self = Self { first: 0, count: 0, last: false, place_nm: [[0; 3]; BATCH] };
+    pub(super) const NONE: Self = Self {
+        first: 0,
+        count: 0,
+        last: false,
+        place_nm: [[0; 3]; BATCH],
+    };
 }
 
 impl Job {
@@ -40,8 +45,15 @@ impl Job {
 
     /// Where to plan it.
     pub(super) fn planned(&mut self) -> Option<&mut Planned> {
-        if let Self::Segment(planned) = self { Some(planned) } else { None }
+        if let Self::Segment(planned) = self {
+            Some(planned)
+        } else {
+            None
+        }
     }
 }
 
-const _: () = assert!(size_of::<Points>() <= size_of::<Planned>(), "a batch costs the queue nothing");
+const _: () = assert!(
+    size_of::<Points>() <= size_of::<Planned>(),
+    "a batch costs the queue nothing"
+);

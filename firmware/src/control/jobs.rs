@@ -25,7 +25,14 @@ enum Head {
 
 impl<I> Jobs<I> {
     pub(super) const fn new(queue: I) -> Self {
-        Self { queue, closed: false, go: false, epoch: 0, dropped: 0, stream: None }
+        Self {
+            queue,
+            closed: false,
+            go: false,
+            epoch: 0,
+            dropped: 0,
+            stream: None,
+        }
     }
 
     /// What holds in this tick.
@@ -60,16 +67,23 @@ impl<I: Receiver<Job>> Jobs<I> {
     #[inline]
     pub(super) fn point(&mut self, expected: u16) -> (Option<StreamSample>, bool, u32) {
         let found = self.queue.look(|job| {
-            let Job::Points(points) = job else { return (None, true, false, 0) };
+            let Job::Points(points) = job else {
+                return (None, true, false, 0);
+            };
             let (at, count) = (expected.wrapping_sub(points.first), u16::from(points.count));
             let sample = points.place_nm.get(usize::from(at)).filter(|_| at < count);
-            let sample = sample.map(|&position_nm| StreamSample { sequence: expected, position_nm });
+            let sample = sample.map(|&position_nm| StreamSample {
+                sequence: expected,
+                position_nm,
+            });
             // A batch is done with its last set-point, or when all of them are too late.
             let done = at.wrapping_add(1) >= count;
             let late = if at < count { 0 } else { u32::from(count) };
             (sample, done, done && points.last, late)
         });
-        let Some((sample, done, last, late)) = found else { return (None, false, 0) };
+        let Some((sample, done, last, late)) = found else {
+            return (None, false, 0);
+        };
         if done {
             self.queue.discard();
         }

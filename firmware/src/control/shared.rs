@@ -1,7 +1,9 @@
 //! Words that the tick writes and the background reads, and the other way round.
 use crate::engine::{Counters, Fault, Output, StreamCounters};
 use crate::server::Snapshot;
-use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU8, AtomicU16, AtomicU32, Ordering::Relaxed};
+use core::sync::atomic::{
+    AtomicBool, AtomicI32, AtomicU8, AtomicU16, AtomicU32, Ordering::Relaxed,
+};
 use core::sync::atomic::{Ordering, compiler_fence};
 use giotto_shared::wire::{FaultCause, MotionState};
 
@@ -156,12 +158,20 @@ impl Shared {
 
     /// Counts a set-point that found no room.
     pub(super) fn drop_one(&self) {
-        self.dropped.store(self.dropped.load(Relaxed).wrapping_add(1), Relaxed);
+        self.dropped
+            .store(self.dropped.load(Relaxed).wrapping_add(1), Relaxed);
     }
 
     /// Opens a program in the present epoch, or closes it.
     pub(super) fn set_program(&self, open: bool) {
-        self.program.store(if open { u16::from(self.epoch()) } else { NO_PROGRAM }, Relaxed);
+        self.program.store(
+            if open {
+                u16::from(self.epoch())
+            } else {
+                NO_PROGRAM
+            },
+            Relaxed,
+        );
     }
 
     /// Whether a program is open in this epoch.

@@ -55,16 +55,29 @@ where
     #[inline]
     pub fn tick(&mut self, late: bool) -> Output {
         self.wishes(late);
-        let output = if self.streaming { self.stream_tick() } else { self.executor.tick(&mut self.jobs) };
+        let output = if self.streaming {
+            self.stream_tick()
+        } else {
+            self.executor.tick(&mut self.jobs)
+        };
         if let Some(plan) = self.jobs.begins() {
-            self.stream.start(&plan, self.executor.rest_nm(), 0, self.bypass);
+            self.stream
+                .start(&plan, self.executor.rest_nm(), 0, self.bypass);
             self.streaming = true;
         }
         self.now = self.now.wrapping_add(1);
         let state = self.state();
         self.record(&output, state);
         let (epoch, fault) = (self.executor.epoch(), self.executor.fault());
-        self.shared.publish(self.now, state, epoch, fault, &output, &self.counters(), self.stream.counters());
+        self.shared.publish(
+            self.now,
+            state,
+            epoch,
+            fault,
+            &output,
+            &self.counters(),
+            self.stream.counters(),
+        );
         output
     }
 
@@ -111,10 +124,13 @@ where
             || shared.stop_input.load(Relaxed) != self.stop_input
             || shared.bypass.load(Relaxed) != self.bypass;
         let state = self.state();
-        let still =
-            matches!(state, MotionState::Idle | MotionState::Fault) && shared.snapshot().state == state;
-        let rests =
-            still && self.jobs.waiting() == 0 && !self.executor.blending() && !self.recording && !wishes;
+        let still = matches!(state, MotionState::Idle | MotionState::Fault)
+            && shared.snapshot().state == state;
+        let rests = still
+            && self.jobs.waiting() == 0
+            && !self.executor.blending()
+            && !self.recording
+            && !wishes;
         if rests {
             self.now = self.now.wrapping_add(count);
             self.shared.pass(self.now);
@@ -140,7 +156,8 @@ where
             }
         }
         let closed = active || self.shared.hold.load(Relaxed);
-        self.jobs.look_at(closed, self.shared.go.load(Relaxed), self.executor.epoch());
+        self.jobs
+            .look_at(closed, self.shared.go.load(Relaxed), self.executor.epoch());
         let bypass = self.shared.bypass.load(Relaxed);
         if bypass != self.bypass {
             self.bypass = bypass;
@@ -157,11 +174,19 @@ where
     #[inline]
     fn state(&self) -> MotionState {
         if self.streaming {
-            return if self.stream.takes() { MotionState::Running } else { MotionState::Stopping };
+            return if self.stream.takes() {
+                MotionState::Running
+            } else {
+                MotionState::Stopping
+            };
         }
         let at_rest = self.executor.idle() && self.jobs.waiting() == 0;
         if !at_rest {
-            if self.executor.stopping() { MotionState::Stopping } else { MotionState::Running }
+            if self.executor.stopping() {
+                MotionState::Stopping
+            } else {
+                MotionState::Running
+            }
         } else if self.executor.fault().is_some() {
             MotionState::Fault
         } else if self.shared.program_open(self.executor.epoch()) {
@@ -194,8 +219,15 @@ where
         }
         self.until_next = every;
         let (raw_nm, corrected_nm) = (output.nominal_nm, output.corrected_nm);
-        let point = SetPoint { raw_nm, corrected_nm };
-        let timed = TimedSetPoint { tick: self.now, point, last: !moving };
+        let point = SetPoint {
+            raw_nm,
+            corrected_nm,
+        };
+        let timed = TimedSetPoint {
+            tick: self.now,
+            point,
+            last: !moving,
+        };
         if self.set_points.send(&timed) {
             // The last one is tried again: without it the reader would wait for ever.
             self.recording = moving;

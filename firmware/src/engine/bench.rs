@@ -17,22 +17,52 @@ const CENTRE_M: [f64; 3] = [0.1, -0.2, 0.3];
 const RADIUS_M: f64 = 0.1;
 const FEED_M_S: f64 = 0.5;
 /// The source paper's robot.
-const CUMULANTS: Cumulants<f32> = Cumulants { kappa2_s2: 46.58e-6, kappa4_s4: -5.5265e-6 };
+const CUMULANTS: Cumulants<f32> = Cumulants {
+    kappa2_s2: 46.58e-6,
+    kappa4_s4: -5.5265e-6,
+};
 
 /// Eight profile terms, the dearest there are: reversal pulses and play of both axes, a periodic error.
 pub const TERMS: [Term<f32>; 8] = [
     Term::Squareness { shear_rad: 80e-6 },
-    Term::ServoMismatch { delta_tau_s: 100e-6 },
-    Term::BandwidthMismatch { delta_kappa2_s2: 5e-6 },
-    Term::Backlash { axis: Axis::X, step_m: 10e-6 },
-    Term::Backlash { axis: Axis::Y, step_m: 12e-6 },
-    Term::ReversalSpike { axis: Axis::X, peak_m: 8e-6, decay_s: 0.05 },
-    Term::ReversalSpike { axis: Axis::Y, peak_m: 6e-6, decay_s: 0.04 },
-    Term::Cyclic { axis: Axis::X, amplitude_m: 2e-6, pitch_m: 0.01, phase_rad: 0.5 },
+    Term::ServoMismatch {
+        delta_tau_s: 100e-6,
+    },
+    Term::BandwidthMismatch {
+        delta_kappa2_s2: 5e-6,
+    },
+    Term::Backlash {
+        axis: Axis::X,
+        step_m: 10e-6,
+    },
+    Term::Backlash {
+        axis: Axis::Y,
+        step_m: 12e-6,
+    },
+    Term::ReversalSpike {
+        axis: Axis::X,
+        peak_m: 8e-6,
+        decay_s: 0.05,
+    },
+    Term::ReversalSpike {
+        axis: Axis::Y,
+        peak_m: 6e-6,
+        decay_s: 0.04,
+    },
+    Term::Cyclic {
+        axis: Axis::X,
+        amplitude_m: 2e-6,
+        pitch_m: 0.01,
+        phase_rad: 0.5,
+    },
 ];
 
 fn table(extended: bool) -> Table {
-    let terms = if extended { TERMS.iter().copied().collect() } else { heapless::Vec::new() };
+    let terms = if extended {
+        TERMS.iter().copied().collect()
+    } else {
+        heapless::Vec::new()
+    };
     let zone = Zone {
         place_m: None,
         radius_m: [0.001, 1.0],
@@ -41,8 +71,15 @@ fn table(extended: bool) -> Table {
         cumulants: CUMULANTS,
         terms,
     };
-    let limits = Limits { offset_m: 0.02, slew_m_s: 0.2 };
-    Table { machine: heapless::String::new(), zones: [zone].into_iter().collect(), limits }
+    let limits = Limits {
+        offset_m: 0.02,
+        slew_m_s: 0.2,
+    };
+    Table {
+        machine: heapless::String::new(),
+        zones: [zone].into_iter().collect(),
+        limits,
+    }
 }
 
 /// A planned arc and the executor that runs it (first, where one load reaches two of its words).
@@ -68,7 +105,13 @@ impl Arc {
         let mut planner = Planner::new(&config, start);
         let mut queue = heapless::spsc::Queue::new();
         let sweep_rad = 3.0 * core::f64::consts::PI;
-        let arc = Segment::Arc { centre_m: CENTRE_M, normal, sweep_rad, rise_m, feed_m_s: FEED_M_S };
+        let arc = Segment::Arc {
+            centre_m: CENTRE_M,
+            normal,
+            sweep_rad,
+            rise_m,
+            feed_m_s: FEED_M_S,
+        };
         if planner.set_table(Some(&table(extended))).is_ok()
             && let Ok(exact) = arc.exact(start)
         {
@@ -77,7 +120,10 @@ impl Arc {
             let _ = planner.segment(&exact, &mut planned);
             let _ = queue.enqueue(planned);
         }
-        Self { executor: Executor::new(start, config.engage_ticks(), false), queue }
+        Self {
+            executor: Executor::new(start, config.engage_ticks(), false),
+            queue,
+        }
     }
 
     /// What is counted.
@@ -110,12 +156,18 @@ impl Streamed {
         let mut planner = Planner::new(&Config::robot(1000), position(0));
         planner.set_table(Some(&table(false))).ok()?;
         let plan = planner.stream(1.0, PLACES).ok()?;
-        Some(Self { stream: Stream::new(&plan, position(0), 0, false), sequence: 0 })
+        Some(Self {
+            stream: Stream::new(&plan, position(0), 0, false),
+            sequence: 0,
+        })
     }
 
     /// The next set-point; not counted.
     pub fn sample(&mut self) -> StreamSample {
-        let sample = StreamSample { sequence: self.sequence, position_nm: position(self.sequence) };
+        let sample = StreamSample {
+            sequence: self.sequence,
+            position_nm: position(self.sequence),
+        };
         self.sequence = self.sequence.wrapping_add(1);
         sample
     }
@@ -136,9 +188,15 @@ impl Streamed {
 /// Set-point `n` of a circle that starts smoothly, nm.
 fn position(n: u16) -> [i32; 3] {
     let (t, start) = (f64::from(n) * TICK_S, 0.3);
-    let angle = FEED_M_S / RADIUS_M * (start * smoothstep(t / start).integral + (t - start).max(0.0));
+    let angle =
+        FEED_M_S / RADIUS_M * (start * smoothstep(t / start).integral + (t - start).max(0.0));
     let (s, c) = libm::sincos(angle);
-    [CENTRE_M[0] + RADIUS_M * c, CENTRE_M[1] + RADIUS_M * s, CENTRE_M[2]].map(|m| (m * 1e9) as i32)
+    [
+        CENTRE_M[0] + RADIUS_M * c,
+        CENTRE_M[1] + RADIUS_M * s,
+        CENTRE_M[2],
+    ]
+    .map(|m| (m * 1e9) as i32)
 }
 
 /// How a plain tick turns.
@@ -185,7 +243,10 @@ impl<T: Turning> Plain<T> {
         let s = smoothstep(u);
         let full = (FEED_M_S / RADIUS_M) as f32;
         let (w, a) = (full * s.value, full * s.first / RAMP_S);
-        let (j, n) = (full * s.second / (RAMP_S * RAMP_S), full * s.third / (RAMP_S * RAMP_S * RAMP_S));
+        let (j, n) = (
+            full * s.second / (RAMP_S * RAMP_S),
+            full * s.third / (RAMP_S * RAMP_S * RAMP_S),
+        );
         self.turning.advance(w * dt);
         let (k2, k4) = (CUMULANTS.kappa2_s2, CUMULANTS.kappa4_s4);
         let fourth = k2 * k2 / 8.0 - k4 / 24.0;
@@ -196,12 +257,20 @@ impl<T: Turning> Plain<T> {
         let (up, along) = (0.447_213_6_f32, 0.894_427_2_f32);
         let nm = |[c, s]: [f32; 2]| {
             let mut out = [0; 3];
-            for ((o, p), centre) in out.iter_mut().zip([r * c, r * s * along, -r * s * up]).zip(CENTRE_M) {
+            for ((o, p), centre) in out
+                .iter_mut()
+                .zip([r * c, r * s * along, -r * s * up])
+                .zip(CENTRE_M)
+            {
                 *o = ((p + centre as f32) * 1e9) as i32;
             }
             out
         };
         let [nominal, corrected] = self.turning.turned(re, im);
-        Output { nominal_nm: nm(nominal), corrected_nm: nm(corrected), flags: 0 }
+        Output {
+            nominal_nm: nm(nominal),
+            corrected_nm: nm(corrected),
+            flags: 0,
+        }
     }
 }

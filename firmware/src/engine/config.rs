@@ -36,7 +36,11 @@ impl Config {
     pub const fn robot(rate_hz: u32) -> Self {
         Self {
             rate_hz,
-            motion: MotionLimits { feed_m_s: 1.0, acceleration_m_s2: 5.0, jerk_m_s3: 100.0 },
+            motion: MotionLimits {
+                feed_m_s: 1.0,
+                acceleration_m_s2: 5.0,
+                jerk_m_s3: 100.0,
+            },
             positioning_m_s: 0.5,
             offset_m: 0.02,
             slew_m_s: 0.2,
@@ -54,9 +58,17 @@ impl Config {
         }
         let upper_bounds = [
             (self.motion.feed_m_s, 10.0, "motion.feed_m_s"),
-            (self.motion.acceleration_m_s2, 1e3, "motion.acceleration_m_s2"),
+            (
+                self.motion.acceleration_m_s2,
+                1e3,
+                "motion.acceleration_m_s2",
+            ),
             (self.motion.jerk_m_s3, 1e6, "motion.jerk_m_s3"),
-            (self.positioning_m_s, self.motion.feed_m_s, "positioning_m_s"),
+            (
+                self.positioning_m_s,
+                self.motion.feed_m_s,
+                "positioning_m_s",
+            ),
             (self.offset_m, 0.05, "offset_m"),
             (self.slew_m_s, 1.0, "slew_m_s"),
             (self.engage_s, 10.0, "engage_s"),

@@ -21,7 +21,15 @@ impl Engage {
     /// Settled on or off.
     pub(crate) fn new(ticks: u32, on: bool) -> Self {
         let share_q31 = if on { i32::MAX } else { 0 };
-        Self { full: on, share_q31, wanted: on, heading: on, blending: false, ticks, clock: Clock::default() }
+        Self {
+            full: on,
+            share_q31,
+            wanted: on,
+            heading: on,
+            blending: false,
+            ticks,
+            clock: Clock::default(),
+        }
     }
 
     /// Whether it is, or is to be, on.
@@ -52,7 +60,11 @@ impl Engage {
         if self.heading != self.wanted {
             self.heading = self.wanted;
             let step = clock_step(self.ticks);
-            self.clock = if self.heading { Clock::rising(step) } else { Clock::falling(step) };
+            self.clock = if self.heading {
+                Clock::rising(step)
+            } else {
+                Clock::falling(step)
+            };
             self.blending = true;
             self.full = false;
         }
@@ -64,7 +76,11 @@ impl Engage {
             return offset;
         }
         if self.blending {
-            let (x, end) = if self.heading { self.clock.rise() } else { self.clock.fall() };
+            let (x, end) = if self.heading {
+                self.clock.rise()
+            } else {
+                self.clock.fall()
+            };
             self.share_q31 = match (end, self.heading) {
                 (true, true) => i32::MAX,
                 (true, false) => 0,

@@ -82,7 +82,9 @@ impl Extra {
         let t = &self.turning;
         let [[a, b], [c, d]] = t.side;
         let ([e, f], [g, h]) = (self.constant_fine, t.spike);
-        [a, b, c, d, e, f, g, h].iter().all(|fine| fine.unsigned_abs() < 1 << 28)
+        [a, b, c, d, e, f, g, h]
+            .iter()
+            .all(|fine| fine.unsigned_abs() < 1 << 28)
     }
 
     /// Indicators of the sense of X and Y. Asked for before anything branches: a product whose factors come from
@@ -128,7 +130,10 @@ impl Cyclic {
         // cost four instructions a product instead of one.
         compiler_fence(Ordering::AcqRel);
         let ([px, py], [rx, ry]) = (self.per_nm, self.rest_q32);
-        let whole = nx.wrapping_mul(px).wrapping_add(ny.wrapping_mul(py)).wrapping_add(self.phase as i32);
+        let whole = nx
+            .wrapping_mul(px)
+            .wrapping_add(ny.wrapping_mul(py))
+            .wrapping_add(self.phase as i32);
         let phase = mulh_add(mulh_add(whole, nx, rx), ny, ry);
         let (_, sine) = sincos_with(*sincos, phase as u32);
         let [ax, ay] = self.amplitude;
@@ -140,7 +145,10 @@ impl Linear {
     /// On an arc at constant rate, nm·2: there they cost the tick nothing.
     pub(crate) fn steady(&self) -> (i32, i32) {
         let ([a0, a1, a2, _], [b0, b1, b2, _]) = (self.a, self.b);
-        (a0.wrapping_add(a1).wrapping_add(a2), b0.wrapping_add(b1).wrapping_add(b2))
+        (
+            a0.wrapping_add(a1).wrapping_add(a2),
+            b0.wrapping_add(b1).wrapping_add(b2),
+        )
     }
 
     /// Offset on an arc in a ramp (`rate` and `rate2` are W and W² in Q31, `turning` w⁴ in Q31 with the sign of the ramp), nm.
@@ -162,6 +170,10 @@ impl Linear {
     /// Offset on a line, nm, without the constant.
     #[inline(always)]
     pub(crate) fn on_line(&self, share: i32, rate: i32, turning: i32) -> i32 {
-        mulh_add(mulh_add(mulh(self.a[0], share), self.a[1], rate), self.a[3], turning)
+        mulh_add(
+            mulh_add(mulh(self.a[0], share), self.a[1], rate),
+            self.a[3],
+            turning,
+        )
     }
 }

@@ -15,7 +15,11 @@ pub(crate) struct Guard {
 
 /// The largest power of two not above a bound; 0 for 0.
 const fn easy(bound: i32) -> u32 {
-    if bound <= 0 { 0 } else { 1 << (31 - bound.leading_zeros()) }
+    if bound <= 0 {
+        0
+    } else {
+        1 << (31 - bound.leading_zeros())
+    }
 }
 
 /// What the gate had to do.
@@ -31,12 +35,23 @@ impl Guard {
     /// Bounds in nm and nm per tick.
     pub(crate) const fn new(offset_nm: i32, slew_nm: i32) -> Self {
         let (easy_offset_nm, easy_slew_nm) = (easy(offset_nm), easy(slew_nm));
-        Self { last_nm: [0; 3], easy_offset_nm, easy_slew_nm, offset_nm, slew_nm, stale: false }
+        Self {
+            last_nm: [0; 3],
+            easy_offset_nm,
+            easy_slew_nm,
+            offset_nm,
+            slew_nm,
+            stale: false,
+        }
     }
 
     /// New bounds; the offset stays where it is.
     pub(crate) fn set(&mut self, offset_nm: i32, slew_nm: i32) {
-        *self = Self { last_nm: self.last_nm, stale: self.stale, ..Self::new(offset_nm, slew_nm) };
+        *self = Self {
+            last_nm: self.last_nm,
+            stale: self.stale,
+            ..Self::new(offset_nm, slew_nm)
+        };
     }
 
     /// While watched, nothing passes easily.
@@ -100,7 +115,10 @@ impl Guard {
     #[inline(always)]
     pub(crate) fn weigh(wanted: i32, last: i32, (sizes, changes): (u32, u32)) -> (u32, u32) {
         let size = |v: i32| (v ^ (v >> 31)) as u32;
-        (sizes | size(wanted), changes | size(wanted.wrapping_sub(last)))
+        (
+            sizes | size(wanted),
+            changes | size(wanted.wrapping_sub(last)),
+        )
     }
 
     /// Whether offsets and changes are easily seen to be within the bounds.
@@ -143,7 +161,9 @@ mod tests {
     fn what_passes_easily_is_within_the_bounds() {
         for v in [0, 511, -512, 512, -513, 1000, -1000, i32::MAX, i32::MIN] {
             let mut guard = Guard::new(1000, i32::MAX);
-            let weights = [0, v, 0].into_iter().fold((0, 0), |w, v| Guard::weigh(v, 0, w));
+            let weights = [0, v, 0]
+                .into_iter()
+                .fold((0, 0), |w, v| Guard::weigh(v, 0, w));
             let weighed = guard.easy(weights);
             let easy = guard.pass_easily([0, v, 0]);
             assert_eq!(weighed, easy);
@@ -156,10 +176,19 @@ mod tests {
     #[test]
     fn nothing_passes_beyond_its_bounds_and_everything_within_passes_unchanged() {
         let mut guard = Guard::new(1000, 100);
-        assert_eq!(guard.pass([100, -100, 0]), ([100, -100, 0], Verdict::default()));
+        assert_eq!(
+            guard.pass([100, -100, 0]),
+            ([100, -100, 0], Verdict::default())
+        );
         let (out, verdict) = guard.pass([i32::MAX, i32::MIN, 50]);
         assert_eq!(out, [200, -200, 50]);
-        assert_eq!(verdict, Verdict { offset_cut: true, slew_cut: true });
+        assert_eq!(
+            verdict,
+            Verdict {
+                offset_cut: true,
+                slew_cut: true
+            }
+        );
         for _ in 0..50 {
             guard.pass([i32::MAX, i32::MIN, 50]);
         }

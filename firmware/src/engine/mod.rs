@@ -46,8 +46,8 @@ mod zones;
 pub use config::{Config, ConfigError, MIN_RAMP_TICKS, RATE_HZ};
 pub use executor::{Executor, Inbox};
 pub use giotto_shared::path::{
-    CircleRun, ExactArc, ExactCircle, ExactSegment, MAX_POSITION_M, MAX_RADIUS_M, MotionLimits, Quantity,
-    Segment,
+    CircleRun, ExactArc, ExactCircle, ExactSegment, MAX_POSITION_M, MAX_RADIUS_M, MotionLimits,
+    Quantity, Segment,
 };
 pub use planned::Planned;
 pub use planner::{Planner, Refused};
@@ -86,8 +86,16 @@ impl Output {
     #[inline(always)]
     fn new(nominal_nm: [i32; 3], offset_nm: [i32; 3], flags: u16) -> Self {
         let ([nx, ny, nz], [ox, oy, oz]) = (nominal_nm, offset_nm);
-        let corrected_nm = [nx.wrapping_add(ox), ny.wrapping_add(oy), nz.wrapping_add(oz)];
-        Self { nominal_nm, corrected_nm, flags }
+        let corrected_nm = [
+            nx.wrapping_add(ox),
+            ny.wrapping_add(oy),
+            nz.wrapping_add(oz),
+        ];
+        Self {
+            nominal_nm,
+            corrected_nm,
+            flags,
+        }
     }
 }
 
@@ -195,7 +203,8 @@ impl Engine {
             return Err(Refused::Busy);
         }
         if self.idle() {
-            self.planner.resync(self.executor.rest_nm(), self.executor.epoch());
+            self.planner
+                .resync(self.executor.rest_nm(), self.executor.epoch());
         }
         Ok(())
     }

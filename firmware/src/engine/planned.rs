@@ -145,14 +145,21 @@ impl Law {
     /// Offset along a line, nm·2.
     #[inline(always)]
     pub(crate) fn along(&self, f: &Shapes) -> i32 {
-        mulh_add(mulh_add(mulh(self.k5, f.w4_q31), self.k7, f.w2_q31), self.k8, f.w3_q30)
+        mulh_add(
+            mulh_add(mulh(self.k5, f.w4_q31), self.k7, f.w2_q31),
+            self.k8,
+            f.w3_q30,
+        )
     }
 }
 
 /// (δ + ib)(c + is) in Q31, from Q32 and Q31.
 #[inline(always)]
 pub(crate) fn turn(radial: i32, tangential: i32, c: i32, s: i32) -> (i32, i32) {
-    (mulh_sub(mulh(radial, c), tangential, s), mulh_add(mulh(radial, s), tangential, c))
+    (
+        mulh_sub(mulh(radial, c), tangential, s),
+        mulh_add(mulh(radial, s), tangential, c),
+    )
 }
 
 /// A segment ready to run.

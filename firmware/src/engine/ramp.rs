@@ -16,8 +16,12 @@ pub(crate) const THIRD: f32 = 945.0 / 2.0;
 /// Coefficients of (S − ½)/x: 1/2 (Q30), w² 3/16 (Q31), w³ 5/32 (Q32), w⁴ 35/256 (Q31). The tick keeps a copy in its own
 /// state: one multiple load brings them all, where immediate operands would cost two instructions each. The half is
 /// less by what rounding adds: at its very ends S must neither be negative nor pass 1 (test).
-pub(crate) const POLYNOMIAL: [i32; 4] =
-    [(1 << 29) - 2, to_fixed(3.0 / 16.0, 31), to_fixed(5.0 / 32.0, 32), to_fixed(35.0 / 256.0, 31)];
+pub(crate) const POLYNOMIAL: [i32; 4] = [
+    (1 << 29) - 2,
+    to_fixed(3.0 / 16.0, 31),
+    to_fixed(5.0 / 32.0, 32),
+    to_fixed(35.0 / 256.0, 31),
+];
 
 /// The ramp at one tick. S‴ is `THIRD`·(w² − 7w³/6).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -57,7 +61,11 @@ pub(crate) fn shapes(p: &[i32; 4], x: i32) -> Shapes {
     let w4_q31 = mulh(w2_q31, w2_q31).wrapping_mul(2);
     let [p0, p2, p3, p4] = *p;
     let straight = p0.wrapping_add(w >> 3);
-    let slope_q30 = mulh_add(mulh_add(mulh_add(straight, p2, w2_q31), p3, w3_q30), p4, w4_q31);
+    let slope_q30 = mulh_add(
+        mulh_add(mulh_add(straight, p2, w2_q31), p3, w3_q30),
+        p4,
+        w4_q31,
+    );
     // ±½ in Q29.
     let half = mulh(x, slope_q30);
     Shapes {
@@ -85,12 +93,18 @@ impl Clock {
 
     /// At the start of a falling ramp.
     pub(crate) const fn falling(step: u64) -> Self {
-        Self { u: u64::MAX, du: step }
+        Self {
+            u: u64::MAX,
+            du: step,
+        }
     }
 
     /// The falling ramp that goes through the same values of 1 − S as this rising one goes on to.
     pub(crate) const fn mirrored(self) -> Self {
-        Self { u: !self.u, du: self.du }
+        Self {
+            u: !self.u,
+            du: self.du,
+        }
     }
 
     /// Ticks since the start of a rising ramp. Not for the tick: it divides.
@@ -146,15 +160,22 @@ mod tests {
                 f64::from(f.s_q31) / 2f64.powi(31),
                 f64::from(f.w4_q31) / 2f64.powi(31) * f64::from(FIRST),
                 -f64::from(f.xw3_q29) / 2f64.powi(29) * f64::from(SECOND),
-                (f64::from(f.w2_q31) / 2f64.powi(31) - 7.0 / 6.0 * f64::from(f.w3_q30) / 2f64.powi(30))
+                (f64::from(f.w2_q31) / 2f64.powi(31)
+                    - 7.0 / 6.0 * f64::from(f.w3_q30) / 2f64.powi(30))
                     * f64::from(THIRD),
             ];
-            for (w, (g, e)) in worst.iter_mut().zip(got.iter().zip([s.value, s.first, s.second, s.third])) {
+            for (w, (g, e)) in worst
+                .iter_mut()
+                .zip(got.iter().zip([s.value, s.first, s.second, s.third]))
+            {
                 *w = w.max((g - e).abs());
             }
         }
         std::println!("errors of S, S', S'', S''': {worst:?}");
-        assert!(worst[0] < 8e-9 && worst[1] < 3e-8 && worst[2] < 6e-7 && worst[3] < 4e-6, "{worst:?}");
+        assert!(
+            worst[0] < 8e-9 && worst[1] < 3e-8 && worst[2] < 6e-7 && worst[3] < 4e-6,
+            "{worst:?}"
+        );
     }
 
     #[test]
@@ -173,7 +194,11 @@ mod tests {
             let step = clock_step(ticks);
             let (mut up, mut down) = (Clock::rising(step), Clock::falling(step));
             for n in 1..=ticks {
-                assert_eq!((up.rise().1, down.fall().1), (n == ticks, n == ticks), "tick {n} of {ticks}");
+                assert_eq!(
+                    (up.rise().1, down.fall().1),
+                    (n == ticks, n == ticks),
+                    "tick {n} of {ticks}"
+                );
                 assert!(n == ticks || up.elapsed() == n);
             }
         }

@@ -49,16 +49,22 @@ impl Sides {
     pub(crate) fn begin(&mut self, extra: &Extra, ahead: [i32; 2]) {
         let t = &extra.turning;
         for (axis, side) in self.side.iter_mut().enumerate() {
-            let moves = extra.ahead[axis].iter().any(|nm| nm.unsigned_abs() > DEAD_NM as u32);
+            let moves = extra.ahead[axis]
+                .iter()
+                .any(|nm| nm.unsigned_abs() > DEAD_NM as u32);
             if !side.known && moves {
                 (side.known, side.mask) = (true, if ahead[axis] >= 0 { 0 } else { -1 });
             }
-            side.limit = if extra.sided && moves { DEAD_NM.wrapping_neg() } else { i32::MIN };
+            side.limit = if extra.sided && moves {
+                DEAD_NM.wrapping_neg()
+            } else {
+                i32::MIN
+            };
             side.fade = t.fade[axis];
             side.jump = t.jump[axis].map(|jump| jump ^ side.mask);
         }
-        self.settled =
-            [[0, 0], [-1, 0], [0, -1], [-1, -1]].map(|[x, y]| self.offset(extra, [sense(x), sense(y)]));
+        self.settled = [[0, 0], [-1, 0], [0, -1], [-1, -1]]
+            .map(|[x, y]| self.offset(extra, [sense(x), sense(y)]));
         self.base = self.offset(extra, self.side.map(|side| side.sense(t.dx)));
     }
 
@@ -77,7 +83,10 @@ impl Sides {
     pub(crate) fn standing(&self) -> [i32; 2] {
         let [x, y] = &self.side;
         let [bx, by] = self.base;
-        [bx.wrapping_add(x.pulse) >> FINE, by.wrapping_add(y.pulse) >> FINE]
+        [
+            bx.wrapping_add(x.pulse) >> FINE,
+            by.wrapping_add(y.pulse) >> FINE,
+        ]
     }
 
     /// Offset of X and Y, nm, one tick later, at these weights of the curve's vectors.
@@ -146,7 +155,9 @@ impl Side {
         let slope = 1_006_632_960i32
             .wrapping_sub(mulh(x2, 1_342_177_280))
             .wrapping_add(mulh(mulh(x2, x2).wrapping_mul(2), 402_653_184));
-        let share = mulh(x, slope).clamp(-(1 << 28), (1 << 28) - 1).wrapping_mul(8);
+        let share = mulh(x, slope)
+            .clamp(-(1 << 28), (1 << 28) - 1)
+            .wrapping_mul(8);
         share ^ self.mask
     }
 }
@@ -167,7 +178,12 @@ mod tests {
             for mask in [0, -1] {
                 let at = f64::from(i) / 2048.0;
                 let x = (at * 2_147_483_648.0) as i32;
-                let side = Side { left: 1, x: x + (dx >> 1), mask, ..Side::default() };
+                let side = Side {
+                    left: 1,
+                    x: x + (dx >> 1),
+                    mask,
+                    ..Side::default()
+                };
                 let way = 1.875 * (at - 2.0 / 3.0 * at.powi(3) + at.powi(5) / 5.0);
                 let expected = if mask == 0 { way } else { -way };
                 let got = f64::from(side.sense(dx)) / 2_147_483_648.0;

@@ -117,7 +117,10 @@ impl<const N: usize> Stream<N> {
     pub fn idle() -> Self {
         Self {
             plan: StreamPlan::default(),
-            kept: [Kept { axes: [[0; 4]; 3], offset: [0; 4] }; N],
+            kept: [Kept {
+                axes: [[0; 4]; 3],
+                offset: [0; 4],
+            }; N],
             place: 0,
             regular: CARE,
             velocity: [0; 3],
@@ -149,7 +152,10 @@ impl<const N: usize> Stream<N> {
         let [x, y, z] = position_nm;
         self.plan = *plan;
         for kept in &mut self.kept {
-            *kept = Kept { axes: [[x; 4], [y; 4], [z; 4]], offset: [0; 4] };
+            *kept = Kept {
+                axes: [[x; 4], [y; 4], [z; 4]],
+                offset: [0; 4],
+            };
         }
         self.engage = Engage::new(plan.engage_ticks, !bypass);
         self.guard = Guard::new(plan.offset_nm, plan.slew_nm);
@@ -162,7 +168,11 @@ impl<const N: usize> Stream<N> {
 
     /// Number of the set-point that the next tick is for.
     pub const fn expected(&self) -> u16 {
-        if self.regular == CARE { self.sequence } else { self.regular as u16 }
+        if self.regular == CARE {
+            self.sequence
+        } else {
+            self.regular as u16
+        }
     }
 
     /// Set-points are taken.
@@ -215,7 +225,10 @@ impl<const N: usize> Stream<N> {
     /// One tick with the set-point that came for it, if any.
     #[inline]
     pub fn tick(&mut self, sample: Option<StreamSample>) -> Output {
-        if let Some(StreamSample { sequence, position_nm: [x, y, z] }) = sample
+        if let Some(StreamSample {
+            sequence,
+            position_nm: [x, y, z],
+        }) = sample
             && u32::from(sequence) == self.regular
         {
             let last = &self.kept[self.place as usize & Self::MASK].axes;
@@ -239,7 +252,11 @@ impl<const N: usize> Stream<N> {
         }
         let [x, y, z] = self.irregular(sample);
         let regular = self.state == StreamState::Running && !self.joining;
-        self.regular = if regular { u32::from(self.sequence) } else { CARE };
+        self.regular = if regular {
+            u32::from(self.sequence)
+        } else {
+            CARE
+        };
         self.filter(x, y, z)
     }
 
@@ -251,7 +268,10 @@ impl<const N: usize> Stream<N> {
         let place = if next == self.plan.stride { 0 } else { next };
         self.place = place;
         compiler_fence(Ordering::AcqRel);
-        let Kept { axes: [kx, ky, kz], offset } = &mut self.kept[place as usize & Self::MASK];
+        let Kept {
+            axes: [kx, ky, kz],
+            offset,
+        } = &mut self.kept[place as usize & Self::MASK];
         // One axis after the other and its result put away: all at once they do not fit into the registers.
         let wx = self.plan.axis(kx, x);
         offset[1] = wx;
@@ -281,7 +301,9 @@ impl<const N: usize> Stream<N> {
     fn back(&self, ticks: u32) -> [i32; 3] {
         let (mut place, mut strides) = (self.place, 0);
         for _ in 0..ticks {
-            place = place.checked_sub(1).unwrap_or(self.plan.stride.wrapping_sub(1));
+            place = place
+                .checked_sub(1)
+                .unwrap_or(self.plan.stride.wrapping_sub(1));
             strides += usize::from(place == self.place);
         }
         let [x, y, z] = &self.kept[place as usize & Self::MASK].axes;
@@ -300,7 +322,10 @@ impl<const N: usize> Stream<N> {
     /// As [`Self::filter`] when bounds or engagement may change what goes out.
     #[inline(never)]
     fn with_care(&mut self, last: [i32; 3]) -> Output {
-        let Kept { axes: [x, y, z], offset: [_, wx, wy, wz] } = self.kept[self.place as usize & Self::MASK];
+        let Kept {
+            axes: [x, y, z],
+            offset: [_, wx, wy, wz],
+        } = self.kept[self.place as usize & Self::MASK];
         let (nominal, wanted) = ([x[2], y[2], z[2]], [wx, wy, wz]);
         let wanted = self.engage.apply(wanted);
         self.guard.watch(!self.engage.full());
@@ -308,9 +333,15 @@ impl<const N: usize> Stream<N> {
         let [ox, oy, oz] = offset;
         self.kept[self.place as usize & Self::MASK].offset = [0, ox, oy, oz];
         let bounds = &mut self.counters.bounds;
-        bounds.offset_cuts = bounds.offset_cuts.wrapping_add(u32::from(verdict.offset_cut));
+        bounds.offset_cuts = bounds
+            .offset_cuts
+            .wrapping_add(u32::from(verdict.offset_cut));
         bounds.slew_cuts = bounds.slew_cuts.wrapping_add(u32::from(verdict.slew_cut));
-        let cut = if verdict.offset_cut | verdict.slew_cut { flag::CUT } else { 0 };
+        let cut = if verdict.offset_cut | verdict.slew_cut {
+            flag::CUT
+        } else {
+            0
+        };
         Output::new(nominal, offset, flag::MOVING | cut)
     }
 
@@ -364,7 +395,11 @@ impl<const N: usize> Stream<N> {
     fn joined(&mut self, position: [i32; 3]) -> [i32; 3] {
         let (x, end) = self.join.rise();
         self.joining = !end;
-        let left = if end { 0 } else { i32::MAX - shapes(&POLYNOMIAL, x).s_q31 };
+        let left = if end {
+            0
+        } else {
+            i32::MAX - shapes(&POLYNOMIAL, x).s_q31
+        };
         let mut taken = position;
         for (t, b) in taken.iter_mut().zip(self.bias_nm) {
             *t = t.wrapping_add((i64::from(b).wrapping_mul(i64::from(left)) >> 31) as i32);
@@ -380,10 +415,17 @@ impl<const N: usize> Stream<N> {
     /// joined the path is not quite where the set-points are: a tick more.
     fn plausible(&self, s: &StreamSample) -> bool {
         let apart = self.missing > 0 || self.joining;
-        let ticks = if apart { self.missing.saturating_add(2) } else { 1 };
+        let ticks = if apart {
+            self.missing.saturating_add(2)
+        } else {
+            1
+        };
         let most = self.plan.step_nm.saturating_mul(ticks);
         let last = self.last_nm();
-        s.position_nm.iter().zip(last).all(|(p, last)| p.wrapping_sub(last).unsigned_abs() <= most)
+        s.position_nm
+            .iter()
+            .zip(last)
+            .all(|(p, last)| p.wrapping_sub(last).unsigned_abs() <= most)
     }
 
     fn carry_on(&mut self) -> [i32; 3] {
@@ -402,14 +444,22 @@ impl<const N: usize> Stream<N> {
         self.bias_nm = [0; 3];
         self.state = then;
         // After ten time constants 5e-5 of the velocity are left; then the filter empties, the correction fades.
-        let braking = if self.velocity == [0; 3] { 0 } else { 10u32 << self.plan.brake_shift };
+        let braking = if self.velocity == [0; 3] {
+            0
+        } else {
+            10u32 << self.plan.brake_shift
+        };
         self.settling = braking.saturating_add(self.emptying());
     }
 
     /// Velocity fades along the tangent.
     fn brake(&mut self) -> [i32; 3] {
         let mut taken = self.last_nm();
-        for ((t, v), rest) in taken.iter_mut().zip(&mut self.velocity).zip(&mut self.bias_nm) {
+        for ((t, v), rest) in taken
+            .iter_mut()
+            .zip(&mut self.velocity)
+            .zip(&mut self.bias_nm)
+        {
             *v = v.wrapping_sub(*v >> self.plan.brake_shift);
             // `bias_nm` keeps what is below a nanometre.
             *rest = rest.wrapping_add(*v);

@@ -41,7 +41,12 @@ impl Built {
         if !(numbers.copied().all(f32::is_finite)
             && cumulants.kappa2_s2.is_finite()
             && cumulants.kappa4_s4.is_finite()
-            && zone.place_m.iter().flatten().flatten().all(|v| v.is_finite()))
+            && zone
+                .place_m
+                .iter()
+                .flatten()
+                .flatten()
+                .all(|v| v.is_finite()))
         {
             return Err(ZoneError::Value(Some(index)));
         }
@@ -50,11 +55,16 @@ impl Built {
         } else {
             Some(Profile::new(&zone.terms).map_err(|e| ZoneError::Term(index, e))?)
         };
-        let reference_m = zone
-            .place_m
-            .map(|[[x0, y0, z0], [x1, y1, z1]]| [0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (z0 + z1)]);
+        let reference_m = zone.place_m.map(|[[x0, y0, z0], [x1, y1, z1]]| {
+            [0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (z0 + z1)]
+        });
         let third_s3 = cumulants.third_of_lag_and_average() / 6.0;
-        Ok(Self { operator: Operator::new(&cumulants), third_s3, profile, reference_m })
+        Ok(Self {
+            operator: Operator::new(&cumulants),
+            third_s3,
+            profile,
+            reference_m,
+        })
     }
 }
 
@@ -67,7 +77,9 @@ pub(crate) struct Zones {
 
 impl Default for Zones {
     fn default() -> Self {
-        Self { table: Table::empty() }
+        Self {
+            table: Table::empty(),
+        }
     }
 }
 
@@ -87,7 +99,10 @@ impl Zones {
     /// No table.
     pub(crate) fn clear(&mut self) {
         self.table.zones.clear();
-        self.table.limits = Limits { offset_m: 0.0, slew_m_s: 0.0 };
+        self.table.limits = Limits {
+            offset_m: 0.0,
+            slew_m_s: 0.0,
+        };
     }
 
     /// The first zone that fits.
@@ -109,7 +124,11 @@ pub(crate) fn check(table: &Table) -> Result<(), ZoneError> {
     if !(limit(table.limits.offset_m) && limit(table.limits.slew_m_s)) {
         return Err(ZoneError::Value(None));
     }
-    table.zones.iter().enumerate().try_for_each(|(index, zone)| Built::new(zone, index).map(drop))
+    table
+        .zones
+        .iter()
+        .enumerate()
+        .try_for_each(|(index, zone)| Built::new(zone, index).map(drop))
 }
 
 fn fits(zone: &Zone, asked: &Asked) -> bool {
@@ -124,8 +143,15 @@ fn fits(zone: &Zone, asked: &Asked) -> bool {
         (Travel::Cw, Some(ccw)) => !ccw,
     };
     let place = zone.place_m.is_none_or(|[low, high]| {
-        asked.place_m.iter().zip(low).zip(high).all(|((&c, low), high)| inside(c, [low, high]))
+        asked
+            .place_m
+            .iter()
+            .zip(low)
+            .zip(high)
+            .all(|((&c, low), high)| inside(c, [low, high]))
     });
-    let radius = asked.radius_m.is_none_or(|radius| inside(radius, zone.radius_m));
+    let radius = asked
+        .radius_m
+        .is_none_or(|radius| inside(radius, zone.radius_m));
     travel && place && radius && inside(asked.feed_m_s, zone.feed_m_s)
 }

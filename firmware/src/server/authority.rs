@@ -23,7 +23,9 @@ fn check(image: &[u8], key: &StoredKey) -> Result<(), TableError> {
     };
     let signed = signed_parts(image).ok_or(TableError::Unsigned)?;
     let bad = |_| TableError::BadSignature;
-    let mut verification = key.verify_incremental(&Signature::new(*signed.signature)).map_err(bad)?;
+    let mut verification = key
+        .verify_incremental(&Signature::new(*signed.signature))
+        .map_err(bad)?;
     verification.absorb(signed.head);
     verification.absorb(signed.body);
     verification.verify().map_err(bad)
@@ -32,7 +34,11 @@ fn check(image: &[u8], key: &StoredKey) -> Result<(), TableError> {
 /// An image without signatures built in must not act as if no key had been provisioned.
 #[cfg(not(feature = "signed"))]
 fn check(_: &[u8], key: &StoredKey) -> Result<(), TableError> {
-    if *key == StoredKey::None { Ok(()) } else { Err(TableError::BadSignature) }
+    if *key == StoredKey::None {
+        Ok(())
+    } else {
+        Err(TableError::BadSignature)
+    }
 }
 
 impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {

@@ -17,7 +17,12 @@ fn within(quantity: Quantity, value: f32, lo: f32, hi: f32) -> Result<(), Motion
     if value >= lo - 1e-6 * lo.abs() && value <= hi + 1e-6 * hi.abs() {
         Ok(())
     } else {
-        Err(MotionRefusal::OutOfBounds { quantity, value, lo, hi })
+        Err(MotionRefusal::OutOfBounds {
+            quantity,
+            value,
+            lo,
+            hi,
+        })
     }
 }
 
@@ -34,15 +39,30 @@ pub(super) fn check_segment(segment: &ExactSegment) -> Result<(), MotionRefusal>
 
 /// Checks a feed alone.
 pub(super) fn check_feed(feed_m_s: f32) -> Result<(), MotionRefusal> {
-    within(Quantity::Feed, feed_m_s, bounds::FEED_MIN_M_S, bounds::FEED_MAX_M_S)
+    within(
+        Quantity::Feed,
+        feed_m_s,
+        bounds::FEED_MIN_M_S,
+        bounds::FEED_MAX_M_S,
+    )
 }
 
 /// Checks a run against the bounds of the image.
 pub(super) fn check_run(run: &ExactCircle) -> Result<(), MotionRefusal> {
     let (radius_m, feed_m_s) = (run.radius_half_nm as f32 * 0.5e-9, run.feed_m_s);
-    within(Quantity::Radius, radius_m, bounds::RADIUS_MIN_M, bounds::RADIUS_MAX_M)?;
+    within(
+        Quantity::Radius,
+        radius_m,
+        bounds::RADIUS_MIN_M,
+        bounds::RADIUS_MAX_M,
+    )?;
     check_feed(feed_m_s)?;
     within(Quantity::Laps, run.laps as f32, 1.0, MAX_LAPS as f32)?;
     let centripetal = feed_m_s * feed_m_s / radius_m;
-    within(Quantity::Acceleration, centripetal, 0.0, CENTRIPETAL_MAX_M_S2)
+    within(
+        Quantity::Acceleration,
+        centripetal,
+        0.0,
+        CENTRIPETAL_MAX_M_S2,
+    )
 }

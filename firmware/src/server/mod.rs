@@ -27,9 +27,9 @@ use core::ops::DerefMut;
 use embedded_storage::nor_flash::NorFlash;
 use giotto_shared::table::{FORMAT_VERSION, MAX_IMAGE_BYTES, SCHEMA_HASH};
 use giotto_shared::wire::{
-    self, Accumulator, CHUNK, Chunk, Command, Counters, ExactCircle, ExactSegment, FromController, Identity,
-    MAX_FRAME, MotionState, PROTOCOL_VERSION, Probation, Refusal, Reply, SET_POINTS, SUPERVISE_MS, SetPoints,
-    Status,
+    self, Accumulator, CHUNK, Chunk, Command, Counters, ExactCircle, ExactSegment, FromController,
+    Identity, MAX_FRAME, MotionState, PROTOCOL_VERSION, Probation, Refusal, Reply, SET_POINTS,
+    SUPERVISE_MS, SetPoints, Status,
 };
 use session::{Session, Turn};
 use supervision::Supervision;
@@ -179,7 +179,9 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
 
     /// Looks whether the link is still alive; to be called again and again.
     pub fn supervise(&mut self) {
-        if self.supervision.silent(self.motion.now()) && self.supervision.dead(self.motion.snapshot().state) {
+        if self.supervision.silent(self.motion.now())
+            && self.supervision.dead(self.motion.snapshot().state)
+        {
             self.motion.hold();
         }
     }
@@ -201,7 +203,11 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             Turn::Late => return None,
             // Not remembered: a stranger does not disturb whoever has the session.
             Turn::Unknown => {
-                return session::frame(head, Reply::Refused(Refusal::NoSession), &mut self.buffers.frame);
+                return session::frame(
+                    head,
+                    Reply::Refused(Refusal::NoSession),
+                    &mut self.buffers.frame,
+                );
             }
             Turn::New => {
                 let reply = match command {
@@ -218,13 +224,21 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
 
     /// The next frame of set-points, once it is full or the run has ended.
     fn set_points(&mut self) -> Option<&[u8]> {
-        let moving = matches!(self.motion.snapshot().state, MotionState::Running | MotionState::Stopping);
+        let moving = matches!(
+            self.motion.snapshot().state,
+            MotionState::Running | MotionState::Stopping
+        );
         if moving && self.motion.set_points_waiting() < SET_POINTS {
             return None;
         }
         let first = self.held.take().or_else(|| self.motion.next_set_point())?;
         let (tick, every) = (first.tick, self.every);
-        let mut batch = SetPoints { tick, every, last: first.last, points: heapless::Vec::new() };
+        let mut batch = SetPoints {
+            tick,
+            every,
+            last: first.last,
+            points: heapless::Vec::new(),
+        };
         let mut due = first.tick;
         let mut next = Some(first);
         while let Some(point) = next.take() {
@@ -239,7 +253,9 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             }
             next = self.motion.next_set_point();
         }
-        wire::encode(&FromController::SetPoints(batch), &mut self.buffers.frame).ok().map(|frame| &*frame)
+        wire::encode(&FromController::SetPoints(batch), &mut self.buffers.frame)
+            .ok()
+            .map(|frame| &*frame)
     }
 
     #[inline(never)]
@@ -255,7 +271,11 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
                 self.upload.chunk(*offset, data, &mut self.buffers.image)?
             }
             Command::WriteEnd => return self.program().map(|slot| Reply::Written { slot }),
-            Command::ReadBack { slot, offset, length } => return self.read_back(*slot, *offset, *length),
+            Command::ReadBack {
+                slot,
+                offset,
+                length,
+            } => return self.read_back(*slot, *offset, *length),
             Command::Commit => self.commit()?,
             Command::Confirm => self.confirm()?,
             Command::Rollback => self.roll_back()?,
@@ -268,7 +288,10 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             }
             Command::RunCircle(run) => self.run_circle(run)?,
             Command::Begin => self.begin()?,
-            Command::Append { segment, tolerance_nm } => self.append(segment, *tolerance_nm)?,
+            Command::Append {
+                segment,
+                tolerance_nm,
+            } => self.append(segment, *tolerance_nm)?,
             Command::End => self.motion.end().map_err(Refusal::Motion)?,
             Command::BeginStream { feed_m_s, ahead } => self.begin_stream(*feed_m_s, *ahead)?,
             Command::Points { steps } => self.motion.points(steps).map_err(Refusal::Motion)?,
@@ -313,7 +336,9 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
         }
         let mut data = Chunk::new();
         data.resize(length, 0).map_err(|_| Refusal::NoSuchPlace)?;
-        self.store.read(slot, u32::from(offset), &mut data).map_err(|_| Refusal::NoSuchPlace)?;
+        self.store
+            .read(slot, u32::from(offset), &mut data)
+            .map_err(|_| Refusal::NoSuchPlace)?;
         Ok(Reply::Data { offset, data })
     }
 
@@ -355,7 +380,11 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     /// At rest, and a table on probation has not had its run yet.
     fn may_run(&self) -> Result<(), Refusal> {
         self.idle()?;
-        if self.probation == Probation::FirstRun { Err(Refusal::ProbationOver) } else { Ok(()) }
+        if self.probation == Probation::FirstRun {
+            Err(Refusal::ProbationOver)
+        } else {
+            Ok(())
+        }
     }
 
     fn has_run(&mut self) {

@@ -48,7 +48,11 @@ pub(super) struct Session {
 
 impl Session {
     pub(super) const fn new() -> Self {
-        Self { last: None, repeated: 0, malformed: 0 }
+        Self {
+            last: None,
+            repeated: 0,
+            malformed: 0,
+        }
     }
 
     /// The request with this head is the one whose reply is remembered.
@@ -90,6 +94,10 @@ impl Session {
 #[inline(never)]
 pub(super) fn frame(head: Head, reply: Reply, out: &mut [u8; MAX_FRAME]) -> Option<&[u8]> {
     let Head { session, seq } = head;
-    let message = FromController::Reply { session, seq, reply };
+    let message = FromController::Reply {
+        session,
+        seq,
+        reply,
+    };
     wire::encode(&message, out).ok().map(|frame| &*frame)
 }

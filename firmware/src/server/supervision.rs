@@ -16,7 +16,13 @@ pub(super) struct Supervision {
 
 impl Supervision {
     pub(super) const fn new(tick_hz: u32) -> Self {
-        let mut new = Self { tick_hz, allowed: 0, heard_at: 0, dead: false, losses: 0 };
+        let mut new = Self {
+            tick_hz,
+            allowed: 0,
+            heard_at: 0,
+            dead: false,
+            losses: 0,
+        };
         new.set(SUPERVISE_MS);
         new
     }

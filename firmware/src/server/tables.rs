@@ -10,7 +10,10 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     #[inline(never)]
     fn install(&mut self, slot: u8) -> Result<(), Refusal> {
         self.upload.abort();
-        let image = self.store.load(slot, &mut self.buffers.image).map_err(Refusal::Flash)?;
+        let image = self
+            .store
+            .load(slot, &mut self.buffers.image)
+            .map_err(Refusal::Flash)?;
         table::check(image).map_err(Refusal::Table)?;
         let length = image.len();
         self.authorised(length)?;
@@ -29,7 +32,11 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     pub(super) fn install_last_good(&mut self) {
         self.probation = Probation::None;
         let confirmed = self.store.confirmed();
-        if confirmed.into_iter().flatten().any(|slot| self.install(slot).is_ok()) {
+        if confirmed
+            .into_iter()
+            .flatten()
+            .any(|slot| self.install(slot).is_ok())
+        {
             return;
         }
         self.active = None;
@@ -42,7 +49,9 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     fn last_good(&self) -> Option<u8> {
         match self.probation {
             Probation::None => self.active,
-            Probation::Fresh | Probation::FirstRun => self.store.confirmed().into_iter().flatten().next(),
+            Probation::Fresh | Probation::FirstRun => {
+                self.store.confirmed().into_iter().flatten().next()
+            }
         }
     }
 
@@ -51,7 +60,11 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     pub(super) fn program(&mut self) -> Result<u8, Refusal> {
         self.idle()?;
         let length = self.upload.end(&self.buffers.image)?;
-        let image = self.buffers.image.get(..length).ok_or(Refusal::UploadIncomplete)?;
+        let image = self
+            .buffers
+            .image
+            .get(..length)
+            .ok_or(Refusal::UploadIncomplete)?;
         table::check(image).map_err(Refusal::Table)?;
         self.authorised(length)?;
         let slot = match self.last_good() {
@@ -93,7 +106,9 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
         };
         let slot = slot.ok_or(Refusal::NothingToConfirm)?;
         self.upload.abort();
-        self.store.confirm(slot, &mut self.buffers.image).map_err(Refusal::Flash)?;
+        self.store
+            .confirm(slot, &mut self.buffers.image)
+            .map_err(Refusal::Flash)?;
         self.probation = Probation::None;
         Ok(())
     }
@@ -107,7 +122,12 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             return Ok(());
         }
         let in_use = self.active;
-        let other = self.store.confirmed().into_iter().flatten().find(|slot| Some(*slot) != in_use);
+        let other = self
+            .store
+            .confirmed()
+            .into_iter()
+            .flatten()
+            .find(|slot| Some(*slot) != in_use);
         let other = other.ok_or(Refusal::NothingToRollBack)?;
         self.upload.abort();
         // Read before it is confirmed: a table this image cannot use must not become the one that boots.

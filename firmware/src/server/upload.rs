@@ -13,12 +13,17 @@ pub(super) struct Upload {
 
 impl Upload {
     pub(super) const fn new() -> Self {
-        Self { announced: None, received: 0 }
+        Self {
+            announced: None,
+            received: 0,
+        }
     }
 
     pub(super) const fn begin(&mut self, length: u16, crc: u32) -> Result<(), Refusal> {
         if length as usize > MAX_IMAGE_BYTES {
-            return Err(Refusal::UploadTooLong { max: MAX_IMAGE_BYTES as u16 });
+            return Err(Refusal::UploadTooLong {
+                max: MAX_IMAGE_BYTES as u16,
+            });
         }
         self.announced = Some((length as usize, crc));
         self.received = 0;
@@ -34,7 +39,9 @@ impl Upload {
     ) -> Result<(), Refusal> {
         let (length, _) = self.announced.ok_or(Refusal::NoUpload)?;
         if usize::from(offset) != self.received {
-            return Err(Refusal::OutOfOrder { expected: self.received as u16 });
+            return Err(Refusal::OutOfOrder {
+                expected: self.received as u16,
+            });
         }
         let end = self.received + data.len();
         let too_long = Refusal::UploadTooLong { max: length as u16 };

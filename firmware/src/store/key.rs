@@ -21,7 +21,11 @@ pub enum StoredKey {
 }
 
 fn check(key: &PublicKey) -> [u8; 4] {
-    Crc32::new().with(b"giotto key").with(key).value().to_le_bytes()
+    Crc32::new()
+        .with(b"giotto key")
+        .with(key)
+        .value()
+        .to_le_bytes()
 }
 
 pub(super) fn read(bytes: &[u8; KEY_BYTES]) -> Option<PublicKey> {
@@ -31,7 +35,12 @@ pub(super) fn read(bytes: &[u8; KEY_BYTES]) -> Option<PublicKey> {
 
 pub(super) fn write(key: &PublicKey) -> [u8; KEY_BYTES] {
     let mut bytes = [0xff; KEY_BYTES];
-    let parts = key.iter().chain(&check(key)).copied().enumerate().collect::<heapless::Vec<_, 36>>();
+    let parts = key
+        .iter()
+        .chain(&check(key))
+        .copied()
+        .enumerate()
+        .collect::<heapless::Vec<_, 36>>();
     for (at, byte) in parts {
         if let Some(place) = bytes.get_mut(at) {
             *place = byte;
@@ -53,7 +62,11 @@ mod tests {
     type Cells = RamFlash<4608, 512>;
 
     fn open(cells: Cells, after: Option<u32>, tear: Tear) -> Store<PowerCut<4608, 512>> {
-        Store::open(PowerCut::new(cells, after, tear), LAYOUT, &mut [0; MAX_IMAGE_BYTES])
+        Store::open(
+            PowerCut::new(cells, after, tear),
+            LAYOUT,
+            &mut [0; MAX_IMAGE_BYTES],
+        )
     }
 
     /// Power fails in every byte, torn in every way: the key is there or it is not, and it can be given again.

@@ -63,9 +63,16 @@ impl Layout {
     /// # Panics
     /// At compile time, if used for a constant: slots that overlap or are too short for any table.
     pub const fn new(base: [u32; 2], size: u32) -> Self {
-        assert!(size >= MAX_IMAGE_BYTES as u32 + RECORDS_BYTES, "slot too short");
+        assert!(
+            size >= MAX_IMAGE_BYTES as u32 + RECORDS_BYTES,
+            "slot too short"
+        );
         assert!(base[0] + size <= base[1], "slots overlap");
-        Self { base, size, key: None }
+        Self {
+            base,
+            size,
+            key: None,
+        }
     }
 
     /// With a place for a key at `at`, in an erase unit of its own.
@@ -73,8 +80,14 @@ impl Layout {
     /// # Panics
     /// At compile time, if used for a constant: a place inside a slot.
     pub const fn with_key(self, at: u32) -> Self {
-        assert!(at < self.base[0] || at >= self.base[1] + self.size, "key inside a slot");
-        Self { key: Some(at), ..self }
+        assert!(
+            at < self.base[0] || at >= self.base[1] + self.size,
+            "key inside a slot"
+        );
+        Self {
+            key: Some(at),
+            ..self
+        }
     }
 }
 
@@ -106,8 +119,15 @@ impl<F: NorFlash> Store<F> {
     /// Looks at both slots. A flash that cannot be read shows as two invalid slots.
     pub fn open(flash: F, layout: Layout, buffer: &mut ImageBuffer) -> Self {
         let () = Self::FITS;
-        let unknown = Slot { state: SlotState::Invalid, next_record: RECORDS };
-        let mut store = Self { flash, layout, slots: [unknown; 2] };
+        let unknown = Slot {
+            state: SlotState::Invalid,
+            next_record: RECORDS,
+        };
+        let mut store = Self {
+            flash,
+            layout,
+            slots: [unknown; 2],
+        };
         store.scan(0, buffer);
         store.scan(1, buffer);
         store
@@ -125,7 +145,9 @@ impl<F: NorFlash> Store<F> {
 
     /// What slot 0 or 1 holds; any other number: invalid.
     pub fn state(&self, slot: u8) -> SlotState {
-        self.slots.get(usize::from(slot)).map_or(SlotState::Invalid, |slot| slot.state)
+        self.slots
+            .get(usize::from(slot))
+            .map_or(SlotState::Invalid, |slot| slot.state)
     }
 
     /// The table in a slot, if it holds one.
@@ -159,10 +181,16 @@ impl<F: NorFlash> Store<F> {
 
     /// The key that tables have to be signed with. One that cannot be read is not one that is not there.
     pub fn key(&mut self) -> StoredKey {
-        let Some(base) = self.layout.key else { return StoredKey::None };
+        let Some(base) = self.layout.key else {
+            return StoredKey::None;
+        };
         for place in 0..KEYS {
             let mut bytes = [0; KEY_BYTES];
-            if self.flash.read(base + (place * KEY_BYTES) as u32, &mut bytes).is_err() {
+            if self
+                .flash
+                .read(base + (place * KEY_BYTES) as u32, &mut bytes)
+                .is_err()
+            {
                 return StoredKey::Unreadable;
             }
             if let Some(key) = key::read(&bytes) {
@@ -182,11 +210,15 @@ impl<F: NorFlash> Store<F> {
         for place in 0..KEYS {
             let at = base + (place * KEY_BYTES) as u32;
             let mut bytes = [0; KEY_BYTES];
-            self.flash.read(at, &mut bytes).map_err(|_| FlashFault::Read)?;
+            self.flash
+                .read(at, &mut bytes)
+                .map_err(|_| FlashFault::Read)?;
             if bytes != [0xff; KEY_BYTES] {
                 continue;
             }
-            self.flash.write(at, &key::write(key)).map_err(|_| FlashFault::Program)?;
+            self.flash
+                .write(at, &key::write(key))
+                .map_err(|_| FlashFault::Program)?;
             return match self.key() {
                 StoredKey::Key(found) if found == *key => Ok(()),
                 _ => Err(FlashFault::ReadBack { offset: at }),
@@ -211,7 +243,11 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// [`FlashFault::Read`] if there is none.
-    pub fn load<'a>(&mut self, slot: u8, buffer: &'a mut ImageBuffer) -> Result<&'a [u8], FlashFault> {
+    pub fn load<'a>(
+        &mut self,
+        slot: u8,
+        buffer: &'a mut ImageBuffer,
+    ) -> Result<&'a [u8], FlashFault> {
         let length = usize::from(self.table(slot).ok_or(FlashFault::Read)?.length);
         let image = buffer.get_mut(..length).ok_or(FlashFault::Read)?;
         self.read(slot, 0, image)?;
@@ -220,8 +256,10 @@ impl<F: NorFlash> Store<F> {
 
     /// Looks at a slot anew.
     fn scan(&mut self, slot: u8, buffer: &mut ImageBuffer) {
-        let found =
-            self.look(slot, buffer).unwrap_or(Slot { state: SlotState::Invalid, next_record: RECORDS });
+        let found = self.look(slot, buffer).unwrap_or(Slot {
+            state: SlotState::Invalid,
+            next_record: RECORDS,
+        });
         if let Some(known) = self.slots.get_mut(usize::from(slot)) {
             *known = found;
         }
@@ -236,7 +274,9 @@ impl<F: NorFlash> Store<F> {
         for index in 0..RECORDS {
             let mut bytes = [0; RECORD_BYTES];
             let at = self.record_at(slot, index);
-            self.flash.read(at, &mut bytes).map_err(|_| FlashFault::Read)?;
+            self.flash
+                .read(at, &mut bytes)
+                .map_err(|_| FlashFault::Read)?;
             if Record::is_blank(bytes) {
                 continue;
             }
@@ -247,12 +287,14 @@ impl<F: NorFlash> Store<F> {
         let state = match header {
             Err(_) if blank => SlotState::Empty,
             Err(_) => SlotState::Invalid,
-            Ok(header) if header.version != FORMAT_VERSION => {
-                SlotState::OtherFormat { version: header.version }
-            }
-            Ok(header) => {
-                SlotState::Table(TableInfo { length: header.length as u16, crc: header.crc, generation })
-            }
+            Ok(header) if header.version != FORMAT_VERSION => SlotState::OtherFormat {
+                version: header.version,
+            },
+            Ok(header) => SlotState::Table(TableInfo {
+                length: header.length as u16,
+                crc: header.crc,
+                generation,
+            }),
         };
         Ok(Slot { state, next_record })
     }
@@ -262,10 +304,17 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// Any [`FlashFault`]; the slot is then invalid and the other one untouched.
-    pub fn write(&mut self, slot: u8, length: usize, buffer: &mut ImageBuffer) -> Result<(), FlashFault> {
+    pub fn write(
+        &mut self,
+        slot: u8,
+        length: usize,
+        buffer: &mut ImageBuffer,
+    ) -> Result<(), FlashFault> {
         let written = buffer
             .get(..length)
-            .map_or(Err(FlashFault::Program), |image| self.erase_and_program(slot, image));
+            .map_or(Err(FlashFault::Program), |image| {
+                self.erase_and_program(slot, image)
+            });
         self.scan(slot, buffer);
         written
     }
@@ -273,7 +322,9 @@ impl<F: NorFlash> Store<F> {
     fn erase_and_program(&mut self, slot: u8, image: &[u8]) -> Result<(), FlashFault> {
         let base = self.base(slot);
         // Erased even if it reads blank: an erasure cut short leaves cells that read FF today only.
-        self.flash.erase(base, base + self.layout.size).map_err(|_| FlashFault::Erase)?;
+        self.flash
+            .erase(base, base + self.layout.size)
+            .map_err(|_| FlashFault::Erase)?;
         for (index, piece) in image.chunks(PIECE).enumerate() {
             let at = base + (index * PIECE) as u32;
             let mut padded = [0xff; PIECE];
@@ -282,7 +333,9 @@ impl<F: NorFlash> Store<F> {
             }
             let length = piece.len().next_multiple_of(F::WRITE_SIZE);
             let padded = padded.get(..length).ok_or(FlashFault::Program)?;
-            self.flash.write(at, padded).map_err(|_| FlashFault::Program)?;
+            self.flash
+                .write(at, padded)
+                .map_err(|_| FlashFault::Program)?;
         }
         self.compare(slot, image)
     }
@@ -293,8 +346,14 @@ impl<F: NorFlash> Store<F> {
             let mut back = [0; PIECE];
             let back = back.get_mut(..piece.len()).ok_or(FlashFault::Read)?;
             self.read(slot, offset, back)?;
-            if let Some(at) = back.iter().zip(piece).position(|(back, wanted)| back != wanted) {
-                return Err(FlashFault::ReadBack { offset: offset + at as u32 });
+            if let Some(at) = back
+                .iter()
+                .zip(piece)
+                .position(|(back, wanted)| back != wanted)
+            {
+                return Err(FlashFault::ReadBack {
+                    offset: offset + at as u32,
+                });
             }
         }
         Ok(())
@@ -315,17 +374,26 @@ impl<F: NorFlash> Store<F> {
         let generation = self.newest_generation().wrapping_add(1);
         let bytes = Record { generation }.write(info.crc);
         let at = self.record_at(slot, index);
-        let programmed = self.flash.write(at, &bytes).map_err(|_| FlashFault::Program);
+        let programmed = self
+            .flash
+            .write(at, &bytes)
+            .map_err(|_| FlashFault::Program);
         self.scan(slot, buffer);
         programmed?;
         match self.table(slot).and_then(|info| info.generation) {
             Some(found) if found == generation => Ok(generation),
-            _ => Err(FlashFault::ReadBack { offset: at - self.base(slot) }),
+            _ => Err(FlashFault::ReadBack {
+                offset: at - self.base(slot),
+            }),
         }
     }
 
     fn newest_generation(&self) -> u32 {
-        let generation = |slot| self.table(slot).and_then(|info| info.generation).unwrap_or(0);
+        let generation = |slot| {
+            self.table(slot)
+                .and_then(|info| info.generation)
+                .unwrap_or(0)
+        };
         generation(0).max(generation(1))
     }
 }

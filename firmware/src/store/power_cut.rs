@@ -19,7 +19,12 @@ pub enum Tear {
 
 impl Tear {
     /// All ways to tear.
-    pub const ALL: [Self; 4] = [Self::Untouched, Self::Partly, Self::FirstHalf, Self::SecondHalf];
+    pub const ALL: [Self; 4] = [
+        Self::Untouched,
+        Self::Partly,
+        Self::FirstHalf,
+        Self::SecondHalf,
+    ];
 
     /// Bits that a torn byte has already programmed.
     const fn mask(self) -> u8 {
@@ -64,7 +69,12 @@ impl NorFlashError for PowerCutError {
 impl<const N: usize, const ERASE: usize> PowerCut<N, ERASE> {
     /// A flash with these cells whose power fails during the `after`th step (1: the first), torn so.
     pub const fn new(flash: RamFlash<N, ERASE>, after: Option<u32>, tear: Tear) -> Self {
-        Self { flash, left: after, tear, done: 0 }
+        Self {
+            flash,
+            left: after,
+            tear,
+            done: 0,
+        }
     }
 
     /// Bytes programmed and units erased so far.
@@ -111,11 +121,15 @@ impl<const N: usize, const ERASE: usize> PowerCut<N, ERASE> {
             Tear::SecondHalf => (half..ERASE as u32, 0..0),
         };
         for at in blank {
-            self.cell(from + at).into_iter().for_each(|cell| *cell = 0xff);
+            self.cell(from + at)
+                .into_iter()
+                .for_each(|cell| *cell = 0xff);
         }
         for at in noise {
             let mask = (at.wrapping_mul(0x9e37_79b9) >> 13) as u8;
-            self.cell(from + at).into_iter().for_each(|cell| *cell |= mask);
+            self.cell(from + at)
+                .into_iter()
+                .for_each(|cell| *cell |= mask);
         }
     }
 }
@@ -151,7 +165,9 @@ impl<const N: usize, const ERASE: usize> NorFlash for PowerCut<N, ERASE> {
                 self.tear_unit(unit);
                 return Err(PowerCutError::Off);
             }
-            self.flash.erase(unit, unit + ERASE as u32).map_err(PowerCutError::Flash)?;
+            self.flash
+                .erase(unit, unit + ERASE as u32)
+                .map_err(PowerCutError::Flash)?;
         }
         Ok(())
     }
@@ -161,7 +177,11 @@ impl<const N: usize, const ERASE: usize> NorFlash for PowerCut<N, ERASE> {
         check_write(self, offset, bytes.len()).map_err(range)?;
         for (at, &byte) in (offset..).zip(bytes) {
             let fails = self.step()?;
-            let programmed = if fails { byte | !self.tear.mask() } else { byte };
+            let programmed = if fails {
+                byte | !self.tear.mask()
+            } else {
+                byte
+            };
             if at % 4 == 0 && !self.flash.is_blank(at) {
                 return Err(PowerCutError::Flash(RamFlashError::NotBlank { at }));
             }

@@ -1,6 +1,7 @@
 //! NOR flash in memory: the virtual controller's, and the one that tests break.
 use embedded_storage::nor_flash::{
-    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
+    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash, check_erase, check_read,
+    check_write,
 };
 
 /// Bytes programmed at once.
@@ -47,12 +48,19 @@ impl<const N: usize, const ERASE: usize> RamFlash<N, ERASE> {
 
     /// Whether the word at `at` is blank.
     pub fn is_blank(&self, at: u32) -> bool {
-        self.bytes.iter().skip(at as usize).take(WORD).all(|&cell| cell == 0xff)
+        self.bytes
+            .iter()
+            .skip(at as usize)
+            .take(WORD)
+            .all(|&cell| cell == 0xff)
     }
 
     fn cells(&mut self, offset: u32, count: usize) -> Result<&mut [u8], RamFlashError> {
         let offset = offset as usize;
-        let cells = self.bytes.get_mut(offset..).and_then(|cells| cells.get_mut(..count));
+        let cells = self
+            .bytes
+            .get_mut(offset..)
+            .and_then(|cells| cells.get_mut(..count));
         cells.ok_or(RamFlashError::Range(NorFlashErrorKind::OutOfBounds))
     }
 
@@ -93,8 +101,13 @@ impl<const N: usize, const ERASE: usize> NorFlash for RamFlash<N, ERASE> {
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Self::Error> {
         check_write(self, offset, bytes.len()).map_err(RamFlashError::Range)?;
         let cells = self.cells(offset, bytes.len())?;
-        if let Some(word) = cells.chunks(WORD).position(|word| word.iter().any(|&cell| cell != 0xff)) {
-            return Err(RamFlashError::NotBlank { at: offset + (word * WORD) as u32 });
+        if let Some(word) = cells
+            .chunks(WORD)
+            .position(|word| word.iter().any(|&cell| cell != 0xff))
+        {
+            return Err(RamFlashError::NotBlank {
+                at: offset + (word * WORD) as u32,
+            });
         }
         cells.copy_from_slice(bytes);
         Ok(())

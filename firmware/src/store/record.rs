@@ -11,7 +11,11 @@ pub(super) struct Record {
 }
 
 fn check(generation: [u8; 4], table_crc: u32) -> [u8; 4] {
-    Crc32::new().with(&generation).with(&table_crc.to_le_bytes()).value().to_le_bytes()
+    Crc32::new()
+        .with(&generation)
+        .with(&table_crc.to_le_bytes())
+        .value()
+        .to_le_bytes()
 }
 
 impl Record {
@@ -43,7 +47,10 @@ mod tests {
         let bytes = Record { generation: 3 }.write(0x1234_5678);
         assert_eq!(bytes[..4], [3, 0, 0, 0]);
         // zlib.crc32(bytes.fromhex("0300000078563412"))
-        assert_eq!(u32::from_le_bytes([bytes[4], bytes[5], bytes[6], bytes[7]]), GOLDEN);
+        assert_eq!(
+            u32::from_le_bytes([bytes[4], bytes[5], bytes[6], bytes[7]]),
+            GOLDEN
+        );
         assert_eq!(Record::read(bytes, 0x1234_5678), Some(3));
         assert_eq!(Record::read(bytes, 0x1234_5679), None);
         for bit in 0..64 {

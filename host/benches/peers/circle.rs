@@ -33,11 +33,17 @@ fn read(x: &[f64], y: &[f64]) -> f64 {
     let sum = |values: &[f64]| {
         let mut lanes = [0.0; 16];
         for part in values.chunks_exact(16) {
-            lanes.iter_mut().zip(part).for_each(|(lane, value)| *lane += value);
+            lanes
+                .iter_mut()
+                .zip(part)
+                .for_each(|(lane, value)| *lane += value);
         }
         lanes.iter().sum::<f64>()
     };
-    x.par_chunks(32768).zip(y.par_chunks(32768)).map(|(x, y)| sum(x) + sum(y)).sum()
+    x.par_chunks(32768)
+        .zip(y.par_chunks(32768))
+        .map(|(x, y)| sum(x) + sum(y))
+        .sum()
 }
 
 /// Runs the part.
@@ -83,10 +89,18 @@ pub(crate) fn run(peers: &mut Peers) -> Result<Table, Error> {
         table.row(
             n,
             &times.each_ref(),
-            &[median[2] / median[0], median[3] / median[0], median[0] / median[1]],
+            &[
+                median[2] / median[0],
+                median[3] / median[0],
+                median[0] / median[1],
+            ],
         );
     }
-    let of_large: Vec<_> = sizes.iter().copied().filter(|(n, _)| *n >= 100_000).collect();
+    let of_large: Vec<_> = sizes
+        .iter()
+        .copied()
+        .filter(|(n, _)| *n >= 100_000)
+        .collect();
     table.remark(format!(
         "growth exponent {:.3} over all sizes, {:.3} from 1e5 points on (bar 1.02); bars: 30× the faster peer from 1e5 \
          points on, 1e7 points within 3× of the time to read them",

@@ -16,11 +16,24 @@ const FEWEST_BETA: u64 = 88;
 /// `giotto-hil NAME --json`, built if it is not.
 fn ask(name: &str) -> Result<Value, Error> {
     let out = Command::new(std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned()))
-        .args(["run", "--release", "--quiet", "-p", "giotto-hil", "--", name, "--json"])
+        .args([
+            "run",
+            "--release",
+            "--quiet",
+            "-p",
+            "giotto-hil",
+            "--",
+            name,
+            "--json",
+        ])
         .current_dir(env!("CARGO_MANIFEST_DIR"))
         .output()?;
     if !out.status.success() {
-        return Err(format!("giotto-hil {name}: {}", String::from_utf8_lossy(&out.stderr)).into());
+        return Err(format!(
+            "giotto-hil {name}: {}",
+            String::from_utf8_lossy(&out.stderr)
+        )
+        .into());
     }
     Ok(serde_json::from_slice(&out.stdout)?)
 }
@@ -38,7 +51,11 @@ pub(crate) fn ticks(_: &mut Peers) -> Result<Table, Error> {
     for (words, name, steady) in [
         ("giotto, β arc", "arc_beta", Some("arc_beta_steady")),
         ("giotto, stream", "stream", None),
-        ("giotto, eight profile terms", "arc_extended", Some("arc_extended_steady")),
+        (
+            "giotto, eight profile terms",
+            "arc_extended",
+            Some("arc_extended_steady"),
+        ),
         ("libm, β arc", "naive_libm", None),
         ("nalgebra, β arc", "naive_nalgebra", None),
         ("idsp::cossin, β arc", "naive_idsp", None),

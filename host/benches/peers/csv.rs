@@ -27,7 +27,8 @@ fn write(directory: &Path, rows: usize) -> Result<(), Error> {
             let turn = i as f64 / each as f64;
             let wobble = ((i * 7919 + run * 104_729) % 41) as f64 * 0.1 - 2.0;
             // Each run has a size of its own: the same samples twice would be a file given twice.
-            let deviation = -100.0 - 0.1 * run as f64 + 20.0 * (std::f64::consts::TAU * turn).cos() + wobble;
+            let deviation =
+                -100.0 - 0.1 * run as f64 + 20.0 * (std::f64::consts::TAU * turn).cos() + wobble;
             writeln!(text, "{:.6},{deviation:.1}", turn * turn_s)?;
         }
         std::fs::write(directory.join(format!("run{run:03}.csv")), text)?;
@@ -53,20 +54,29 @@ pub(crate) fn run(peers: &mut Peers) -> Result<Table, Error> {
             times[0].push(seconds);
             let read = read?;
             let count: usize = read.runs.iter().map(|r| r.samples.deviation_m.len()).sum();
-            let last: f64 = read.runs.iter().filter_map(|r| r.samples.deviation_m.last()).sum();
+            let last: f64 = read
+                .runs
+                .iter()
+                .filter_map(|r| r.samples.deviation_m.last())
+                .sum();
             drop(read);
             for (k, peer) in ["pandas", "polars"].into_iter().enumerate() {
                 let (seconds, found) = peers.run(peer, &data)?;
                 if found[0] != count as f64 || (found[1] * 1e-6 / last - 1.0).abs() > 1e-9 {
-                    return Err(
-                        format!("{peer} reads {found:?} where giotto reads {count} rows, {last} m").into()
-                    );
+                    return Err(format!(
+                        "{peer} reads {found:?} where giotto reads {count} rows, {last} m"
+                    )
+                    .into());
                 }
                 times[1 + k].push(seconds);
             }
         }
         let median = times.each_ref().map(Times::median);
-        table.row(rows, &times.each_ref(), &[median[1] / median[0], median[2] / median[0]]);
+        table.row(
+            rows,
+            &times.each_ref(),
+            &[median[1] / median[0], median[2] / median[0]],
+        );
     }
     table.remark("100 runs a campaign, files in the page cache; giotto checks, the peers only parse; bars 5× pandas, 0.8× polars".to_owned());
     Ok(table)

@@ -38,19 +38,34 @@ order = "random"
 
 /// Runs the part.
 pub(crate) fn run(peers: &mut Peers) -> Result<Table, Error> {
-    let mut table =
-        Table::new("Whole diagnosis", "samples", &["giotto", "NumPy and SciPy"], &["over the script"]);
+    let mut table = Table::new(
+        "Whole diagnosis",
+        "samples",
+        &["giotto", "NumPy and SciPy"],
+        &["over the script"],
+    );
     let campaign = simulation::campaign(&Plan::parse(PLAN, Path::new("bench.toml"))?, 1);
-    let samples = campaign.runs.first().map_or(0, |run| run.samples.deviation_m.len());
-    if campaign.runs.iter().any(|run| run.samples.deviation_m.len() != samples) {
+    let samples = campaign
+        .runs
+        .first()
+        .map_or(0, |run| run.samples.deviation_m.len());
+    if campaign
+        .runs
+        .iter()
+        .any(|run| run.samples.deviation_m.len() != samples)
+    {
         return Err("the script needs runs of equal length".into());
     }
     let directory = tempfile::tempdir()?;
-    let column = |name: &str, of: &dyn Fn(&giotto::campaign::Run) -> Vec<f64>| -> Result<_, Error> {
-        let path = directory.path().join(format!("{name}.bin"));
-        store(&path, &campaign.runs.iter().flat_map(of).collect::<Vec<_>>())?;
-        Ok(path)
-    };
+    let column =
+        |name: &str, of: &dyn Fn(&giotto::campaign::Run) -> Vec<f64>| -> Result<_, Error> {
+            let path = directory.path().join(format!("{name}.bin"));
+            store(
+                &path,
+                &campaign.runs.iter().flat_map(of).collect::<Vec<_>>(),
+            )?;
+            Ok(path)
+        };
     let data = json!({
         "radius": column("radius", &|r| vec![r.radius_m])?,
         "feed": column("feed", &|r| vec![r.feed_m_s])?,
@@ -110,7 +125,8 @@ impl Agreement {
     /// axis (−1: none), estimate and half-width. Answers that are not the same are an error.
     fn of(ours: &Diagnosis, theirs: &[f64]) -> Result<Self, Error> {
         let gain = ours.gain.as_ref().ok_or("giotto leaves no run out")?;
-        let Some(([percent, _, _, by_radius, by_feed], findings)) = theirs.split_first_chunk() else {
+        let Some(([percent, _, _, by_radius, by_feed], findings)) = theirs.split_first_chunk()
+        else {
             return Err("the script says too little".into());
         };
         let (findings, []) = findings.as_chunks::<4>() else {
@@ -123,20 +139,30 @@ impl Agreement {
             ..Self::default()
         };
         for finding in &ours.findings {
-            let place = finding.axis.map_or(-1.0, |axis| if axis == Axis::X { 0.0 } else { 1.0 });
+            let place = finding
+                .axis
+                .map_or(-1.0, |axis| if axis == Axis::X { 0.0 } else { 1.0 });
             let cause = f64::from(finding.cause as u8);
-            let same = findings.iter().find(|other| other[0] == cause && other[1] == place);
+            let same = findings
+                .iter()
+                .find(|other| other[0] == cause && other[1] == place);
             let Some([_, _, value, half]) = same else {
                 return Err(format!("the script does not find {:?}", finding.cause).into());
             };
             let estimate = &finding.estimate;
             let half_width = 0.5 * (estimate.ci95[1] - estimate.ci95[0]);
-            agreement.estimates = agreement.estimates.max((value / estimate.value - 1.0).abs());
+            agreement.estimates = agreement
+                .estimates
+                .max((value / estimate.value - 1.0).abs());
             agreement.half_widths = agreement.half_widths.max((half / half_width - 1.0).abs());
         }
         let same = findings.len() == ours.findings.len()
             && agreement.estimates < SAME
             && (percent - gain.percent).abs() < SAME_GAIN;
-        if same { Ok(agreement) } else { Err(format!("answers differ: {agreement:?}").into()) }
+        if same {
+            Ok(agreement)
+        } else {
+            Err(format!("answers differ: {agreement:?}").into())
+        }
     }
 }

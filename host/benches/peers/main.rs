@@ -34,7 +34,10 @@ fn main() -> Result<(), Error> {
     if !std::env::args().any(|a| a == "--bench") {
         return Ok(());
     }
-    let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
+    let wanted: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|a| !a.starts_with("--"))
+        .collect();
     let for_page = std::env::args().any(|a| a == FOR_PAGE);
     let parts: [(&str, Part); 7] = [
         ("circle", circle::run),
@@ -49,7 +52,10 @@ fn main() -> Result<(), Error> {
         return page(&parts.map(|(name, _)| name));
     }
     let mut peers = Peers::start()?;
-    for (_, part) in parts.iter().filter(|(name, _)| wanted.iter().any(|w| w == name)) {
+    for (_, part) in parts
+        .iter()
+        .filter(|(name, _)| wanted.iter().any(|w| w == name))
+    {
         let table = part(&mut peers)?;
         if for_page {
             eprintln!("{}", table.text());
@@ -66,7 +72,10 @@ fn page(parts: &[&str]) -> Result<(), Error> {
     let mut page = table::heading(Peers::start()?.versions());
     for part in parts {
         let mut alone = Command::new(std::env::current_exe()?);
-        let done = alone.args(["--bench", FOR_PAGE, part]).stderr(Stdio::inherit()).output()?;
+        let done = alone
+            .args(["--bench", FOR_PAGE, part])
+            .stderr(Stdio::inherit())
+            .output()?;
         if !done.status.success() {
             return Err(format!("{part} failed").into());
         }

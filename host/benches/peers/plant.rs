@@ -29,15 +29,23 @@ pub(crate) fn run(peers: &mut Peers) -> Result<Table, Error> {
         &["over lsim", "over solve_ivp"],
     );
     let machine = Machine {
-        servo: [PositionLoop { kv_per_s: KV_PER_S, feed_forward: 0.0 }; 2],
-        mechanics: [Some(SecondOrder { omega_n_rad_s: OMEGA_N_RAD_S, zeta: ZETA }); 2],
+        servo: [PositionLoop {
+            kv_per_s: KV_PER_S,
+            feed_forward: 0.0,
+        }; 2],
+        mechanics: [Some(SecondOrder {
+            omega_n_rad_s: OMEGA_N_RAD_S,
+            zeta: ZETA,
+        }); 2],
         ..Machine::default()
     };
     let turn_s = TAU * RADIUS_M / FEED_M_S;
     let mut fastest: f64 = 0.0;
     for samples in SIZES {
-        let test =
-            CircleTest { samples: Some(samples), ..CircleTest::new(RADIUS_M, FEED_M_S, Direction::Ccw) };
+        let test = CircleTest {
+            samples: Some(samples),
+            ..CircleTest::new(RADIUS_M, FEED_M_S, Direction::Ccw)
+        };
         let data = json!({ "samples": samples, "radius": RADIUS_M, "feed": FEED_M_S, "kv": KV_PER_S,
                            "omega_n": OMEGA_N_RAD_S, "zeta": ZETA });
         let mut times = [Times::default(), Times::default(), Times::default()];
@@ -62,7 +70,11 @@ pub(crate) fn run(peers: &mut Peers) -> Result<Table, Error> {
         }
         let median = times.each_ref().map(Times::median);
         fastest = fastest.max(2.0 * samples as f64 / median[0]);
-        table.row(samples, &times.each_ref(), &[median[1] / median[0], median[2] / median[0]]);
+        table.row(
+            samples,
+            &times.each_ref(),
+            &[median[1] / median[0], median[2] / median[0]],
+        );
         if samples == SIZES[0] {
             table.remark(format!(
                 "machine-seconds simulated a second at {samples} steps a lap: giotto {:.0}, lsim {:.1}, solve_ivp {:.1} (a lap lasts \

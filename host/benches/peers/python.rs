@@ -26,7 +26,11 @@ fn environment() -> Result<PathBuf, Error> {
     if std::fs::read_to_string(&mark).ok().as_ref() != Some(&wanted) {
         eprintln!("making {} for the peers", home.display());
         let done = |command: &mut Command| -> Result<(), Error> {
-            if command.status()?.success() { Ok(()) } else { Err(format!("{command:?} failed").into()) }
+            if command.status()?.success() {
+                Ok(())
+            } else {
+                Err(format!("{command:?} failed").into())
+            }
         };
         done(Command::new("python3").args(["-m", "venv"]).arg(&home))?;
         done(
@@ -55,7 +59,12 @@ impl Peers {
             .spawn()?;
         let input = child.stdin.take().ok_or("no stdin")?;
         let output = BufReader::new(child.stdout.take().ok_or("no stdout")?);
-        let mut peers = Self { child, input, output, versions: Value::Null };
+        let mut peers = Self {
+            child,
+            input,
+            output,
+            versions: Value::Null,
+        };
         peers.versions = peers.answer()?["versions"].take();
         Ok(peers)
     }
@@ -86,7 +95,11 @@ impl Peers {
         times: usize,
         data: &Value,
     ) -> Result<(f64, Vec<f64>), Error> {
-        writeln!(self.input, "{}", json!({ "peer": peer, "times": times, "data": data }))?;
+        writeln!(
+            self.input,
+            "{}",
+            json!({ "peer": peer, "times": times, "data": data })
+        )?;
         let answer = self.answer()?;
         let seconds = answer["seconds"].as_f64().ok_or("no time in the answer")?;
         let value = answer["value"].as_array().ok_or("no value in the answer")?;

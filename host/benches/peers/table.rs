@@ -15,12 +15,19 @@ impl Times {
     }
 
     fn quantile(&self, q: f64) -> f64 {
-        self.0.get(((self.0.len() - 1) as f64 * q).round() as usize).copied().unwrap_or(f64::NAN)
+        self.0
+            .get(((self.0.len() - 1) as f64 * q).round() as usize)
+            .copied()
+            .unwrap_or(f64::NAN)
     }
 
     /// Median, s; NaN if there is none.
     pub(crate) fn median(&self) -> f64 {
-        if self.0.is_empty() { f64::NAN } else { self.quantile(0.5) }
+        if self.0.is_empty() {
+            f64::NAN
+        } else {
+            self.quantile(0.5)
+        }
     }
 
     fn words(&self) -> String {
@@ -51,20 +58,38 @@ pub(crate) struct Table {
 impl Table {
     /// An empty table; giotto is the first contender.
     pub(crate) fn new(title: &str, size: &str, contenders: &[&str], ratios: &[&str]) -> Self {
-        let header = [size].into_iter().chain(contenders.iter().copied()).chain(ratios.iter().copied());
+        let header = [size]
+            .into_iter()
+            .chain(contenders.iter().copied())
+            .chain(ratios.iter().copied());
         let header = header.map(str::to_owned).collect();
-        Self { title: title.to_owned(), header, rows: Vec::new(), remarks: Vec::new() }
+        Self {
+            title: title.to_owned(),
+            header,
+            rows: Vec::new(),
+            remarks: Vec::new(),
+        }
     }
 
     /// Adds a size: times of each contender, then ratios.
     pub(crate) fn row(&mut self, size: usize, times: &[&Times], ratios: &[f64]) {
-        let ratio = |r: &f64| if r.is_nan() { "–".to_owned() } else { format!("{r:.2}×") };
+        let ratio = |r: &f64| {
+            if r.is_nan() {
+                "–".to_owned()
+            } else {
+                format!("{r:.2}×")
+            }
+        };
         let row = [format!("{size}")]
             .into_iter()
             .chain(times.iter().map(|t| t.words()))
             .chain(ratios.iter().map(ratio));
         self.rows.push(row.collect());
-        eprintln!("{}: {}", self.title, self.rows[self.rows.len() - 1].join("  "));
+        eprintln!(
+            "{}: {}",
+            self.title,
+            self.rows[self.rows.len() - 1].join("  ")
+        );
     }
 
     /// Adds a row as it stands.
@@ -81,7 +106,9 @@ impl Table {
     /// For the terminal.
     pub(crate) fn text(&self) -> String {
         let mut grid = Grid::new();
-        grid.load_style(presets::NOTHING).set_header(&self.header).add_rows(&self.rows);
+        grid.load_style(presets::NOTHING)
+            .set_header(&self.header)
+            .add_rows(&self.rows);
         grid.column_iter_mut().for_each(|c| {
             c.set_cell_alignment(CellAlignment::Right);
         });
@@ -94,7 +121,12 @@ impl Table {
         let rule: Vec<String> = self.header.iter().map(|_| "--:".to_owned()).collect();
         let rows: String = self.rows.iter().map(|r| line(r)).collect();
         let remarks: String = self.remarks.iter().map(|r| format!("- {r}\n")).collect();
-        format!("\n## {}\n\n{}{}{rows}\n{remarks}", self.title, line(&self.header), line(&rule))
+        format!(
+            "\n## {}\n\n{}{}{rows}\n{remarks}",
+            self.title,
+            line(&self.header),
+            line(&rule)
+        )
     }
 }
 
@@ -108,10 +140,12 @@ pub(crate) fn growth(times: &[(usize, f64)]) -> f64 {
 
 /// What the page says before its tables.
 pub(crate) fn heading(versions: &Value) -> String {
-    let processor = std::fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| {
-        let line = text.lines().find(|l| l.starts_with("model name"))?;
-        Some(line.split(':').nth(1)?.trim().to_owned())
-    });
+    let processor = std::fs::read_to_string("/proc/cpuinfo")
+        .ok()
+        .and_then(|text| {
+            let line = text.lines().find(|l| l.starts_with("model name"))?;
+            Some(line.split(':').nth(1)?.trim().to_owned())
+        });
     let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
     let cores = std::thread::available_parallelism().map_or(0, usize::from);
     let mut page = String::from(

@@ -37,7 +37,12 @@ impl Counterparts {
 
 /// The pairs of a report that have both directions and a whole turn each.
 pub fn counterparts(report: &Report) -> Vec<Counterparts> {
-    let grouped = pairs(report.runs.iter().map(|r| (r.radius_m, r.feed_m_s, r.direction)));
+    let grouped = pairs(
+        report
+            .runs
+            .iter()
+            .map(|r| (r.radius_m, r.feed_m_s, r.direction)),
+    );
     let second = |run: &RunAnalysis| {
         let found = run.harmonics.iter().find(|h| h.order == 2)?;
         Some((found.cos_m, found.sin_m))
@@ -55,5 +60,8 @@ pub fn counterparts(report: &Report) -> Vec<Counterparts> {
         })
     };
     let flat = grouped.concat();
-    flat.iter().zip(report.iso230_4.iter().map(|i| i.g_b_m)).filter_map(of).collect()
+    flat.iter()
+        .zip(report.iso230_4.iter().map(|i| i.g_b_m))
+        .filter_map(of)
+        .collect()
 }

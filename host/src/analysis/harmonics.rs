@@ -56,7 +56,10 @@ impl Merge for Sums {
 
 /// Orders 0 to K of `residual(angle, deviation)` over the samples of one run, K at most [`HIGHEST_ORDER`] and as
 /// the number of samples allows. The samples must cover the whole turn.
-pub(super) fn solve(points: &Polar<'_>, residual: impl Fn(f64, f64) -> f64 + Sync) -> Vec<Harmonic> {
+pub(super) fn solve(
+    points: &Polar<'_>,
+    residual: impl Fn(f64, f64) -> f64 + Sync,
+) -> Vec<Harmonic> {
     let samples: usize = points.parts.iter().map(|(a, _)| a.len()).sum();
     let highest = HIGHEST_ORDER.min(samples / SAMPLES_AN_ORDER);
     let sums: Sums = points.fold(|angle, deviation| {
@@ -79,7 +82,13 @@ pub(super) fn solve(points: &Polar<'_>, residual: impl Fn(f64, f64) -> f64 + Syn
     });
     // Unknowns: order 0, then cos and sin of each order.
     let size = 2 * highest + 1;
-    let place = |k: usize, sine: bool| if k == 0 { 0 } else { 2 * k - 1 + usize::from(sine) };
+    let place = |k: usize, sine: bool| {
+        if k == 0 {
+            0
+        } else {
+            2 * k - 1 + usize::from(sine)
+        }
+    };
     let mut matrix = DMatrix::zeros(size, size);
     let mut right = DVector::zeros(size);
     for j in 0..=highest {
@@ -89,25 +98,37 @@ pub(super) fn solve(points: &Polar<'_>, residual: impl Fn(f64, f64) -> f64 + Syn
         }
         for k in 0..=highest {
             let (low, high) = (j.abs_diff(k), j + k);
-            let sine_of_difference = if k >= j { sums.sin[low] } else { -sums.sin[low] };
+            let sine_of_difference = if k >= j {
+                sums.sin[low]
+            } else {
+                -sums.sin[low]
+            };
             matrix[(place(j, false), place(k, false))] = 0.5 * (sums.cos[low] + sums.cos[high]);
             if k > 0 {
-                matrix[(place(j, false), place(k, true))] = 0.5 * (sums.sin[high] + sine_of_difference);
+                matrix[(place(j, false), place(k, true))] =
+                    0.5 * (sums.sin[high] + sine_of_difference);
             }
             if j > 0 {
-                matrix[(place(j, true), place(k, false))] = 0.5 * (sums.sin[high] - sine_of_difference);
+                matrix[(place(j, true), place(k, false))] =
+                    0.5 * (sums.sin[high] - sine_of_difference);
             }
             if j > 0 && k > 0 {
                 matrix[(place(j, true), place(k, true))] = 0.5 * (sums.cos[low] - sums.cos[high]);
             }
         }
     }
-    let Some(solved) = matrix.cholesky().map(|c| c.solve(&right)) else { return Vec::new() };
+    let Some(solved) = matrix.cholesky().map(|c| c.solve(&right)) else {
+        return Vec::new();
+    };
     (0..=highest)
         .map(|order| Harmonic {
             order,
             cos_m: solved[place(order, false)],
-            sin_m: if order == 0 { 0.0 } else { solved[place(order, true)] },
+            sin_m: if order == 0 {
+                0.0
+            } else {
+                solved[place(order, true)]
+            },
         })
         .collect()
 }
@@ -135,7 +156,11 @@ impl Tabulated {
 
     pub(super) fn of(harmonics: &[Harmonic]) -> Self {
         let angle = |k: usize| std::f64::consts::TAU * k as f64 / Self::ENTRIES as f64;
-        Self((0..=Self::ENTRIES + 1).map(|k| evaluate(harmonics, angle(k))).collect())
+        Self(
+            (0..=Self::ENTRIES + 1)
+                .map(|k| evaluate(harmonics, angle(k)))
+                .collect(),
+        )
     }
 
     pub(super) fn at(&self, angle: f64) -> f64 {

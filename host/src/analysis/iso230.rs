@@ -44,7 +44,11 @@ impl Kept {
     /// of 1 mm moves the distance by 0.05 µm.
     pub(super) fn of(angle: Vec<f64>, deviation: Vec<f64>) -> Self {
         if angle.len() <= SECTORS {
-            return Self { angle, deviation, extremes: None };
+            return Self {
+                angle,
+                deviation,
+                extremes: None,
+            };
         }
         let size = angle.len().div_ceil(SECTORS);
         let mut kept = Self::default();
@@ -54,7 +58,10 @@ impl Kept {
             kept.angle.push(a.iter().sum::<f64>() / n);
             kept.deviation.push(v.iter().sum::<f64>() / n);
             let by = |i: &usize, j: &usize| v[*i].total_cmp(&v[*j]);
-            for at in [(0..a.len()).min_by(by), (0..a.len()).max_by(by)].into_iter().flatten() {
+            for at in [(0..a.len()).min_by(by), (0..a.len()).max_by(by)]
+                .into_iter()
+                .flatten()
+            {
                 extremes.0.push(a[at]);
                 extremes.1.push(v[at]);
             }
@@ -68,7 +75,9 @@ impl Kept {
     }
 
     fn range_part(&self) -> (&[f64], &[f64]) {
-        self.extremes.as_ref().map_or(self.circle_part(), |(a, v)| (a, v))
+        self.extremes
+            .as_ref()
+            .map_or(self.circle_part(), |(a, v)| (a, v))
     }
 }
 
@@ -89,7 +98,9 @@ impl Merge for Range {
 
 /// Which runs belong together: same radius and feed, the k-th clockwise with the k-th counter-clockwise one.
 /// Indices into `runs`, in order of first appearance.
-pub fn pairs<'a>(runs: impl Iterator<Item = (f64, f64, Direction)> + 'a) -> Vec<Vec<[Option<usize>; 2]>> {
+pub fn pairs<'a>(
+    runs: impl Iterator<Item = (f64, f64, Direction)> + 'a,
+) -> Vec<Vec<[Option<usize>; 2]>> {
     let mut groups: Vec<([u64; 2], [Vec<usize>; 2])> = Vec::new();
     let mut places = std::collections::HashMap::new();
     for (index, (radius, feed, direction)) in runs.enumerate() {
@@ -101,7 +112,9 @@ pub fn pairs<'a>(runs: impl Iterator<Item = (f64, f64, Direction)> + 'a) -> Vec<
         groups[place].1[usize::from(direction == Direction::Ccw)].push(index);
     }
     let couple = |[cw, ccw]: &[Vec<usize>; 2]| {
-        (0..cw.len().max(ccw.len())).map(|k| [cw.get(k).copied(), ccw.get(k).copied()]).collect()
+        (0..cw.len().max(ccw.len()))
+            .map(|k| [cw.get(k).copied(), ccw.get(k).copied()])
+            .collect()
     };
     groups.iter().map(|(_, both)| couple(both)).collect()
 }
@@ -119,16 +132,26 @@ pub(super) fn of_pair(
         g_cw_m: cw.map(|(run, _)| run.out_of_roundness_m),
         g_ccw_m: ccw.map(|(run, _)| run.out_of_roundness_m),
         g_b_m: None,
-        f_max_m: present().map(|(run, _)| run.deviation_range_m[1]).fold(f64::NEG_INFINITY, f64::max),
-        f_min_m: present().map(|(run, _)| run.deviation_range_m[0]).fold(f64::INFINITY, f64::min),
+        f_max_m: present()
+            .map(|(run, _)| run.deviation_range_m[1])
+            .fold(f64::NEG_INFINITY, f64::max),
+        f_min_m: present()
+            .map(|(run, _)| run.deviation_range_m[0])
+            .fold(f64::INFINITY, f64::min),
         d_m: None,
     };
     if let (Some((_, a)), Some((_, b))) = (cw, ccw) {
         let radius_m = first.radius_m;
-        let together = Polar { radius_m, parts: vec![a.circle_part(), b.circle_part()] };
+        let together = Polar {
+            radius_m,
+            parts: vec![a.circle_part(), b.circle_part()],
+        };
         if let Ok(fit) = circle::fit(&together) {
             let [cx, cy] = fit.circle.centre;
-            let outline = Polar { radius_m, parts: vec![a.range_part(), b.range_part()] };
+            let outline = Polar {
+                radius_m,
+                parts: vec![a.range_part(), b.range_part()],
+            };
             let range: Range = outline.fold(|angle, deviation| {
                 let mut range = Range::default();
                 for (a, v) in angle.iter().zip(deviation) {

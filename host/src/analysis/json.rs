@@ -100,7 +100,12 @@ impl Document {
             giotto: pairs.iter().map(|p| p.get(&f.name, &f.unit)).collect(),
         };
         Self {
-            runs: report.runs.iter().zip(&report.frames).map(|(r, f)| run(r, f.as_ref())).collect(),
+            runs: report
+                .runs
+                .iter()
+                .zip(&report.frames)
+                .map(|(r, f)| run(r, f.as_ref()))
+                .collect(),
             iso230_4: report.iso230_4.iter().map(iso).collect(),
             ballbar20: ballbar.map(|b| BallbarEntry {
                 machine: b.machine.clone(),
@@ -126,7 +131,15 @@ fn run(run: &RunAnalysis, frame: Option<&Frame>) -> RunEntry {
         harmonics_um: run
             .harmonics
             .iter()
-            .map(|h| (h.order, Coefficients { cos: um(h.cos_m), sin: um(h.sin_m) }))
+            .map(|h| {
+                (
+                    h.order,
+                    Coefficients {
+                        cos: um(h.cos_m),
+                        sin: um(h.sin_m),
+                    },
+                )
+            })
             .collect(),
         noise_um: um(run.noise_m),
         samples: run.samples,

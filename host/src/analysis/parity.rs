@@ -27,7 +27,11 @@ pub fn profile(run: &Run, sectors: usize) -> Vec<f64> {
     let mut profile = vec![0.0; sectors];
     for (i, &from) in filled.iter().enumerate() {
         let to = filled[(i + 1) % filled.len()];
-        let gap = if to > from { to - from } else { to + sectors - from };
+        let gap = if to > from {
+            to - from
+        } else {
+            to + sectors - from
+        };
         for step in 0..gap {
             profile[(from + step) % sectors] =
                 mean(from) + (mean(to) - mean(from)) * step as f64 / gap as f64;
@@ -40,7 +44,9 @@ pub fn profile(run: &Run, sectors: usize) -> Vec<f64> {
 pub fn even_odd(cw: &Run, ccw: &Run, sectors: usize) -> EvenOdd {
     let (a, b) = (profile(ccw, sectors), profile(cw, sectors));
     EvenOdd {
-        angle_rad: (0..sectors).map(|k| TAU * k as f64 / sectors as f64).collect(),
+        angle_rad: (0..sectors)
+            .map(|k| TAU * k as f64 / sectors as f64)
+            .collect(),
         even_m: a.iter().zip(&b).map(|(a, b)| 0.5 * (a + b)).collect(),
         odd_m: a.iter().zip(&b).map(|(a, b)| 0.5 * (a - b)).collect(),
     }

@@ -19,12 +19,17 @@ pub struct Polar<'a> {
 impl<'a> Polar<'a> {
     /// One run.
     pub fn new(radius_m: f64, angle_rad: &'a [f64], deviation_m: &'a [f64]) -> Self {
-        Self { radius_m, parts: vec![(angle_rad, deviation_m)] }
+        Self {
+            radius_m,
+            parts: vec![(angle_rad, deviation_m)],
+        }
     }
 
     /// Means of equal numbers of neighbours, at most `sectors` of them; `None` if there are no more samples than that.
     pub(super) fn sector_means(&self, sectors: usize) -> Option<(Vec<f64>, Vec<f64>)> {
-        let [(angle, deviation)] = self.parts.as_slice() else { return None };
+        let [(angle, deviation)] = self.parts.as_slice() else {
+            return None;
+        };
         if angle.len() <= sectors {
             return None;
         }
@@ -61,7 +66,11 @@ impl<'a> Polar<'a> {
             if angle.len() <= size {
                 total.merge(&task((angle, deviation)));
             } else {
-                let sums: Vec<S> = angle.par_chunks(size).zip(deviation.par_chunks(size)).map(task).collect();
+                let sums: Vec<S> = angle
+                    .par_chunks(size)
+                    .zip(deviation.par_chunks(size))
+                    .map(task)
+                    .collect();
                 sums.iter().for_each(|s| total.merge(s));
             }
         }

@@ -37,20 +37,35 @@ pub fn of_campaign(campaign: &Campaign) -> Result<Report, (usize, CircleError)> 
         .collect();
     let runs = runs?;
     let groups = iso230::pairs(campaign.runs.iter().map(of));
-    let keep = |run: &Run| Kept::of(run.samples.angle_rad.clone(), run.samples.deviation_m.clone());
+    let keep = |run: &Run| {
+        Kept::of(
+            run.samples.angle_rad.clone(),
+            run.samples.deviation_m.clone(),
+        )
+    };
     let iso: Vec<Vec<Iso230>> = groups
         .par_iter()
         .map(|group| {
             let pair = |[cw, ccw]: &[Option<usize>; 2]| {
                 let [a, b] = [cw, ccw].map(|i| i.map(|i| (&runs[i], keep(&campaign.runs[i]))));
-                iso230::of_pair(a.as_ref().map(|(r, k)| (*r, k)), b.as_ref().map(|(r, k)| (*r, k)))
+                iso230::of_pair(
+                    a.as_ref().map(|(r, k)| (*r, k)),
+                    b.as_ref().map(|(r, k)| (*r, k)),
+                )
             };
             group.iter().filter_map(pair).collect()
         })
         .collect();
     let frames = vec![None; runs.len()];
     let (name, machine) = (campaign.name.clone(), campaign.machine.clone());
-    Ok(Report { name, machine, runs, iso230_4: iso.concat(), frames, notes: Vec::new() })
+    Ok(Report {
+        name,
+        machine,
+        runs,
+        iso230_4: iso.concat(),
+        frames,
+        notes: Vec::new(),
+    })
 }
 
 fn of(run: &Run) -> (f64, f64, crate::campaign::Direction) {
@@ -74,22 +89,45 @@ type Pair = (Option<Iso230>, Vec<Done>);
 /// # Errors
 /// As [`crate::campaign::read`].
 pub fn of_files(manifest: &Manifest, progress: impl Fn() + Sync) -> Result<Report, CampaignError> {
-    let groups = iso230::pairs(manifest.runs.iter().map(|r| (r.radius_m, r.feed_m_s, r.direction)));
+    let groups = iso230::pairs(
+        manifest
+            .runs
+            .iter()
+            .map(|r| (r.radius_m, r.feed_m_s, r.direction)),
+    );
     let pairs: Vec<[Option<usize>; 2]> = groups.concat();
     let one = |index: usize| -> Result<Done, (usize, CampaignError)> {
         let mut loaded = manifest.load(index).map_err(|e| (index, e))?;
         let mut analysis = of_run(&loaded.run, loaded.turn_s).map_err(|e| {
             let at = Place::at(&manifest.runs[index].path, 2, 1);
-            (index, CampaignError::new(at, Problem::NoCircle { reason: e.to_string() }))
+            (
+                index,
+                CampaignError::new(
+                    at,
+                    Problem::NoCircle {
+                        reason: e.to_string(),
+                    },
+                ),
+            )
         })?;
         if let Some(frame) = loaded.frame {
-            analysis.centre_m =
-                [frame.origin_m[0] + analysis.centre_m[0], frame.origin_m[1] + analysis.centre_m[1]];
+            analysis.centre_m = [
+                frame.origin_m[0] + analysis.centre_m[0],
+                frame.origin_m[1] + analysis.centre_m[1],
+            ];
         }
         let samples = &mut loaded.run.samples;
-        let kept = Kept::of(std::mem::take(&mut samples.angle_rad), std::mem::take(&mut samples.deviation_m));
+        let kept = Kept::of(
+            std::mem::take(&mut samples.angle_rad),
+            std::mem::take(&mut samples.deviation_m),
+        );
         progress();
-        Ok(Done { index, analysis, kept, loaded })
+        Ok(Done {
+            index,
+            analysis,
+            kept,
+            loaded,
+        })
     };
     let done: Vec<Result<Pair, (usize, CampaignError)>> = pairs
         .par_iter()
@@ -98,12 +136,23 @@ pub fn of_files(manifest: &Manifest, progress: impl Fn() + Sync) -> Result<Repor
             let both = [cw?, ccw?];
             let [a, b] = [0, 1].map(|i: usize| both[i].as_ref().map(|d| (&d.analysis, &d.kept)));
             let iso = iso230::of_pair(a, b);
-            let rest = both.into_iter().flatten().map(|d| Done { kept: Kept::default(), ..d }).collect();
+            let rest = both
+                .into_iter()
+                .flatten()
+                .map(|d| Done {
+                    kept: Kept::default(),
+                    ..d
+                })
+                .collect();
             Ok((iso, rest))
         })
         .collect();
     // The first problem in file order, whichever pair met it.
-    if let Some((_, error)) = done.iter().filter_map(|r| r.as_ref().err()).min_by_key(|(index, _)| *index) {
+    if let Some((_, error)) = done
+        .iter()
+        .filter_map(|r| r.as_ref().err())
+        .min_by_key(|(index, _)| *index)
+    {
         return Err(error.clone());
     }
     let mut together = Together::new(manifest);

@@ -56,7 +56,13 @@ struct Residuals {
 impl Default for Residuals {
     fn default() -> Self {
         let nothing = [f64::INFINITY, f64::NEG_INFINITY];
-        Self { distance: nothing, deviation: nothing, squares: 0.0, products: 0.0, pairs: 0.0 }
+        Self {
+            distance: nothing,
+            deviation: nothing,
+            squares: 0.0,
+            products: 0.0,
+            pairs: 0.0,
+        }
     }
 }
 
@@ -97,7 +103,11 @@ pub fn of_run(run: &Run, turn_s: Option<f64>) -> Result<RunAnalysis, CircleError
         Some(_) => Vec::new(),
     };
     let table = sectors.is_some().then(|| harmonics::Tabulated::of(&form));
-    let form_at = |a: f64| table.as_ref().map_or_else(|| harmonics::evaluate(&form, a), |t| t.at(a));
+    let form_at = |a: f64| {
+        table
+            .as_ref()
+            .map_or_else(|| harmonics::evaluate(&form, a), |t| t.at(a))
+    };
     let seen: Residuals = points.fold(|angle, deviation| {
         let mut sums = Residuals::default();
         let mut before = None;
@@ -138,7 +148,9 @@ pub fn of_run(run: &Run, turn_s: Option<f64>) -> Result<RunAnalysis, CircleError
 /// taken out, and with fewer independent samples where neighbours are alike (AR(1): n(1−ρ)/(1+ρ)).
 /// `n` is the number of samples, of which the fit may have seen the means of sectors.
 fn radius_se(fit: &circle::CircleFit, seen: &Residuals, orders: usize, n: f64) -> f64 {
-    let (Some(covariance), fitted) = (fit.covariance, fit.points as f64) else { return 0.0 };
+    let (Some(covariance), fitted) = (fit.covariance, fit.points as f64) else {
+        return 0.0;
+    };
     let free = (fitted - 3.0).max(1.0);
     if fit.rss <= 0.0 || seen.squares <= 0.0 {
         return 0.0;
@@ -149,5 +161,7 @@ fn radius_se(fit: &circle::CircleFit, seen: &Residuals, orders: usize, n: f64) -
     let rho = (seen.products / seen.pairs.max(1.0)) / (seen.squares / n);
     let rho = rho.clamp(0.0, 1.0 - 1.0 / n);
     let inflation = (1.0 + rho) / (1.0 - rho);
-    (covariance[2][2] * variance / (fit.rss / free) * inflation * fitted / n).max(0.0).sqrt()
+    (covariance[2][2] * variance / (fit.rss / free) * inflation * fitted / n)
+        .max(0.0)
+        .sqrt()
 }

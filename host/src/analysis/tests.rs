@@ -8,15 +8,28 @@ use std::f64::consts::{PI, TAU};
 const R: f64 = 0.15;
 
 /// Deviations `deviation(θ)` of a machine, seen by an instrument `e` off centre. Exact geometry.
-fn run(file: &str, direction: Direction, n: usize, e: [f64; 2], deviation: impl Fn(f64) -> f64) -> Run {
+fn run(
+    file: &str,
+    direction: Direction,
+    n: usize,
+    e: [f64; 2],
+    deviation: impl Fn(f64) -> f64,
+) -> Run {
     let d = f64::from(direction.sign());
-    let mut samples = Samples { angle_rad: vec![], deviation_m: vec![], time_s: None, angle_inferred: false };
+    let mut samples = Samples {
+        angle_rad: vec![],
+        deviation_m: vec![],
+        time_s: None,
+        angle_inferred: false,
+    };
     for k in 0..n {
         let a = d * TAU * k as f64 / n as f64;
         let r = R + deviation(a);
         let (x, y) = (r * a.cos() + e[0], r * a.sin() + e[1]);
         // The pole sees the point at a slightly other angle; keep it continuous.
-        samples.angle_rad.push(a + (y.atan2(x) - a + PI).rem_euclid(TAU) - PI);
+        samples
+            .angle_rad
+            .push(a + (y.atan2(x) - a + PI).rem_euclid(TAU) - PI);
         samples.deviation_m.push(x.hypot(y) - R);
     }
     Run {
@@ -40,7 +53,10 @@ fn with_time(mut run: Run, turn_s: f64) -> Run {
 }
 
 fn near(found: f64, expected: f64, tolerance: f64) {
-    assert!((found - expected).abs() <= tolerance, "{found} against {expected}");
+    assert!(
+        (found - expected).abs() <= tolerance,
+        "{found} against {expected}"
+    );
 }
 
 /// White normal noise of standard deviation 1, the same for the same seed.
@@ -73,18 +89,28 @@ fn a_known_form_is_found_again() {
     let grid = || (0..100_000).map(|k| profile(TAU * k as f64 / 1e5));
     let range = grid().fold(f64::MIN, f64::max) - grid().fold(f64::MAX, f64::min);
     // Between samples the profile bends by up to k²A·Δθ²/8 at either end.
-    near(found.out_of_roundness_m, range, 2.0 * (4.0 * oval + 25.0 * lobes) * (TAU / 720.0).powi(2) / 8.0);
+    near(
+        found.out_of_roundness_m,
+        range,
+        2.0 * (4.0 * oval + 25.0 * lobes) * (TAU / 720.0).powi(2) / 8.0,
+    );
     near(found.measured_feed_m_s.unwrap(), TAU * R / 3.2, 1e-12);
 }
 
 #[test]
 fn uneven_spacing_does_not_bend_the_form() {
     // Twice as dense on one half: a plain Fourier sum would be off by a large part.
-    let mut even =
-        run("a", Direction::Ccw, 900, [0.0, 0.0], |a| 7e-6 * (2.0 * a).cos() - 4e-6 * (3.0 * a).sin());
+    let mut even = run("a", Direction::Ccw, 900, [0.0, 0.0], |a| {
+        7e-6 * (2.0 * a).cos() - 4e-6 * (3.0 * a).sin()
+    });
     let keep = |k: usize| k < 450 || k.is_multiple_of(2);
-    let thin =
-        |v: &Vec<f64>| v.iter().enumerate().filter(|(k, _)| keep(*k)).map(|(_, v)| *v).collect::<Vec<_>>();
+    let thin = |v: &Vec<f64>| {
+        v.iter()
+            .enumerate()
+            .filter(|(k, _)| keep(*k))
+            .map(|(_, v)| *v)
+            .collect::<Vec<_>>()
+    };
     even.samples.angle_rad = thin(&even.samples.angle_rad);
     even.samples.deviation_m = thin(&even.samples.deviation_m);
     let found = of_run(&even, None).unwrap();
@@ -99,8 +125,15 @@ fn noise_is_measured_under_form_and_spikes() {
     let sd = 0.8e-6;
     let spike = |a: f64| 20e-6 * (-((a - 1.6) * 30.0).max(0.0)).exp() * f64::from(a > 1.6);
     for n in [1000, 20_000] {
-        let mut noisy = run("a", Direction::Ccw, n, [45e-6, 0.0], |a| 9e-6 * (2.0 * a).cos() + spike(a));
-        noisy.samples.deviation_m.iter_mut().zip(noise(1, n)).for_each(|(v, e)| *v += sd * e);
+        let mut noisy = run("a", Direction::Ccw, n, [45e-6, 0.0], |a| {
+            9e-6 * (2.0 * a).cos() + spike(a)
+        });
+        noisy
+            .samples
+            .deviation_m
+            .iter_mut()
+            .zip(noise(1, n))
+            .for_each(|(v, e)| *v += sd * e);
         let found = of_run(&noisy, None).unwrap();
         near(found.noise_m / sd, 1.0, 0.08);
         // The spike is left over: never less than the noise alone would give.
@@ -127,7 +160,8 @@ fn an_arc_gets_the_interval_it_deserves() {
         let found = of_run(&make(200f64.to_radians()), None).unwrap();
         assert!(found.harmonics.is_empty());
         near(found.arc_rad.unwrap().to_degrees(), 200.0, 0.01);
-        inside += usize::from((found.radius_error_m - 30e-6).abs() < 1.96 * found.radius_error_se_m);
+        inside +=
+            usize::from((found.radius_error_m - 30e-6).abs() < 1.96 * found.radius_error_se_m);
         arc_se += found.radius_error_se_m;
         whole_se += of_run(&make(TAU), None).unwrap().radius_error_se_m;
     }
@@ -140,12 +174,24 @@ fn an_arc_gets_the_interval_it_deserves() {
 fn iso_figures_of_a_pair() {
     // Odd 2θ of 10 µm: each direction has G = 20 µm, both together as well; D is the mean size.
     let e = [30e-6, 0.0];
-    let cw = run("cw", Direction::Cw, 1440, e, |a| -20e-6 - 10e-6 * (2.0 * a).sin());
-    let ccw = run("ccw", Direction::Ccw, 1440, e, |a| -10e-6 + 10e-6 * (2.0 * a).sin());
+    let cw = run("cw", Direction::Cw, 1440, e, |a| {
+        -20e-6 - 10e-6 * (2.0 * a).sin()
+    });
+    let ccw = run("ccw", Direction::Ccw, 1440, e, |a| {
+        -10e-6 + 10e-6 * (2.0 * a).sin()
+    });
     let raw = [&cw.samples.deviation_m, &ccw.samples.deviation_m];
-    let raw_max = raw.iter().flat_map(|v| v.iter()).copied().fold(f64::MIN, f64::max);
+    let raw_max = raw
+        .iter()
+        .flat_map(|v| v.iter())
+        .copied()
+        .fold(f64::MIN, f64::max);
     let lone = run("lone", Direction::Cw, 360, e, |_| 5e-6);
-    let campaign = Campaign { name: "c".into(), machine: "m".into(), runs: vec![cw, lone, ccw] };
+    let campaign = Campaign {
+        name: "c".into(),
+        machine: "m".into(),
+        runs: vec![cw, lone, ccw],
+    };
     let report = of_campaign(&campaign).unwrap();
     assert_eq!(report.iso230_4.len(), 2);
     let iso = report.iso230_4[0];
@@ -164,7 +210,9 @@ fn even_and_odd_parts_add_up() {
     let even = |a: f64| 6e-6 * (2.0 * a).cos() - 1e-5;
     let odd = |a: f64| 9e-6 * (2.0 * a).sin();
     let cw = run("cw", Direction::Cw, 3600, [0.0, 0.0], |a| even(a) - odd(a));
-    let ccw = run("ccw", Direction::Ccw, 3600, [0.0, 0.0], |a| even(a) + odd(a));
+    let ccw = run("ccw", Direction::Ccw, 3600, [0.0, 0.0], |a| {
+        even(a) + odd(a)
+    });
     let split = even_odd(&cw, &ccw, 360);
     for (k, a) in split.angle_rad.iter().enumerate() {
         near(split.even_m[k], even(*a), 2e-7);
@@ -181,9 +229,15 @@ fn files_and_memory_give_the_same_figures() {
     let dir = tempfile::tempdir().unwrap();
     let n = 200_000; // long enough for sectors
     let make = |file, direction| {
-        let mut r = run(file, direction, n, [40e-6, 10e-6], |a| 5e-6 * (2.0 * a).cos());
+        let mut r = run(file, direction, n, [40e-6, 10e-6], |a| {
+            5e-6 * (2.0 * a).cos()
+        });
         let seed = if direction == Direction::Cw { 2 } else { 3 };
-        r.samples.deviation_m.iter_mut().zip(noise(seed, n)).for_each(|(v, e)| *v += 1e-6 * e);
+        r.samples
+            .deviation_m
+            .iter_mut()
+            .zip(noise(seed, n))
+            .for_each(|(v, e)| *v += 1e-6 * e);
         for (k, a) in r.samples.angle_rad.iter_mut().enumerate() {
             *a = f64::from(direction.sign()) * TAU * k as f64 / n as f64;
         }
@@ -204,7 +258,11 @@ fn files_and_memory_give_the_same_figures() {
             (a.centre_m, a.radius_error_m, &a.harmonics),
             (b.centre_m, b.radius_error_m, &b.harmonics)
         );
-        near(a.measured_feed_m_s.unwrap(), b.measured_feed_m_s.unwrap(), 1e-15);
+        near(
+            a.measured_feed_m_s.unwrap(),
+            b.measured_feed_m_s.unwrap(),
+            1e-15,
+        );
     }
     // G(b) over sectors against all points about the centre of both.
     let iso = files.iso230_4[0];

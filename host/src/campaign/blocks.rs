@@ -45,18 +45,34 @@ impl Text {
     pub(super) fn open(file: File) -> std::io::Result<Self> {
         let size = file.metadata()?.len();
         // One byte more than there are shows the end.
-        let head = if size > LARGE { BLOCK } else { size as usize + 1 };
+        let head = if size > LARGE {
+            BLOCK
+        } else {
+            size as usize + 1
+        };
         let mut buffer = Vec::with_capacity(head);
         let mut file = file.take(u64::MAX);
         file.by_ref().take(head as u64).read_to_end(&mut buffer)?;
-        Ok(Self { file, buffer, skip: 0, at: 0, size })
+        Ok(Self {
+            file,
+            buffer,
+            skip: 0,
+            at: 0,
+            size,
+        })
     }
 
     /// The bytes `from` to `to` of a file, nothing read yet.
     pub(super) fn between(mut file: File, from: u64, to: u64) -> std::io::Result<Self> {
         let size = file.metadata()?.len().min(to);
         file.seek(SeekFrom::Start(from))?;
-        Ok(Self { file: file.take(to.saturating_sub(from)), buffer: Vec::new(), skip: 0, at: from, size })
+        Ok(Self {
+            file: file.take(to.saturating_sub(from)),
+            buffer: Vec::new(),
+            skip: 0,
+            at: from,
+            size,
+        })
     }
 
     /// What was read and not skipped.
@@ -91,7 +107,11 @@ impl Text {
         let mut body = self.skip;
         let rest = self.size.saturating_sub(self.at);
         let large = rest > LARGE;
-        let window = if large { BLOCK * BLOCKS } else { BLOCK.max(rest as usize) };
+        let window = if large {
+            BLOCK * BLOCKS
+        } else {
+            BLOCK.max(rest as usize)
+        };
         let block = if large { BLOCK } else { 1 };
         let mut next = Vec::new();
         let mut last = self.fill()?;
@@ -100,7 +120,10 @@ impl Text {
             let whole = if last {
                 buffer.len()
             } else {
-                buffer.iter().rposition(|&b| b == b'\n').map_or(body, |p| p + 1)
+                buffer
+                    .iter()
+                    .rposition(|&b| b == b'\n')
+                    .map_or(body, |p| p + 1)
             };
             if whole == body && !last && buffer.len() - body > LONGEST_LINE {
                 return Err(Fault::Endless(self.at + body as u64));
@@ -120,11 +143,20 @@ impl Text {
                     next.clear();
                     next.reserve_exact(buffer.len() - whole + window);
                     next.extend_from_slice(&buffer[whole..]);
-                    more = self.file.by_ref().take(window as u64).read_to_end(&mut next);
+                    more = self
+                        .file
+                        .by_ref()
+                        .take(window as u64)
+                        .read_to_end(&mut next);
                 }
             };
             if large {
-                let work = || blocks.par_iter().map(|(at, block)| parse(*at, block)).collect::<Vec<T>>();
+                let work = || {
+                    blocks
+                        .par_iter()
+                        .map(|(at, block)| parse(*at, block))
+                        .collect::<Vec<T>>()
+                };
                 for result in rayon::join(work, read).0 {
                     if take(result).map_err(Fault::Taken)?.is_break() {
                         return Ok(());
@@ -153,7 +185,11 @@ impl Text {
         if self.at + self.buffer.len() as u64 >= self.size {
             // Longer than it was when opened, or of a size that is not known: one more look tells.
             let before = self.buffer.len();
-            self.file.by_ref().take(BLOCK as u64).read_to_end(&mut self.buffer).map_err(Fault::Io)?;
+            self.file
+                .by_ref()
+                .take(BLOCK as u64)
+                .read_to_end(&mut self.buffer)
+                .map_err(Fault::Io)?;
             return Ok(self.buffer.len() == before);
         }
         Ok(false)

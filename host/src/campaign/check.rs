@@ -40,10 +40,21 @@ pub(super) fn gaps(
     field: usize,
     notes: &mut Vec<Note>,
 ) -> Result<(), CampaignError> {
-    let Some((row, gap_s)) = clock.gap else { return Ok(()) };
+    let Some((row, gap_s)) = clock.gap else {
+        return Ok(());
+    };
     let gap_deg = 360.0 * gap_s / clock.turn_s;
     if gap_deg > LARGEST_GAP_DEG {
-        return Err(err(entry, row, field, Problem::Gap { gap_s, gap_deg, limit_deg: LARGEST_GAP_DEG }));
+        return Err(err(
+            entry,
+            row,
+            field,
+            Problem::Gap {
+                gap_s,
+                gap_deg,
+                limit_deg: LARGEST_GAP_DEG,
+            },
+        ));
     }
     let lost = ((clock.turn_s / clock.spacing_s).round() - rows as f64).max(1.0);
     let at = entry.row(row);
@@ -72,7 +83,18 @@ pub(super) fn deviation(
             format!("{:.1} µm", deviation[row] * 1e6)
         };
         let (column, radius_mm) = (column.to_owned(), tidy(radius * 1e3));
-        Err(err(entry, row, field, Problem::Implausible { column, value, radius_mm, hint, expected }))
+        Err(err(
+            entry,
+            row,
+            field,
+            Problem::Implausible {
+                column,
+                value,
+                radius_mm,
+                hint,
+                expected,
+            },
+        ))
     };
     if mean.abs() > LARGEST_SIZE_ERROR * radius {
         let hint = if column == "radius_mm" {
@@ -82,19 +104,40 @@ pub(super) fn deviation(
         } else {
             "the unit may be wrong".to_owned()
         };
-        return refuse(0, hint, format!("a mean within ±{} mm", tidy(LARGEST_SIZE_ERROR * radius * 1e3)));
+        return refuse(
+            0,
+            hint,
+            format!(
+                "a mean within ±{} mm",
+                tidy(LARGEST_SIZE_ERROR * radius * 1e3)
+            ),
+        );
     }
-    if let (true, Some(row)) = (far(&lowest) || far(&highest), deviation.iter().position(far)) {
+    if let (true, Some(row)) = (
+        far(&lowest) || far(&highest),
+        deviation.iter().position(far),
+    ) {
         let few = deviation.iter().filter(|v| far(v)).count() * 20 < deviation.len();
-        let hint = if few { "an outlier" } else { "the unit may be wrong" };
-        let expected = format!("within {} mm of the mean", tidy(LARGEST_FORM * radius * 1e3));
+        let hint = if few {
+            "an outlier"
+        } else {
+            "the unit may be wrong"
+        };
+        let expected = format!(
+            "within {} mm of the mean",
+            tidy(LARGEST_FORM * radius * 1e3)
+        );
         return refuse(row, hint.to_owned(), expected);
     }
     let noise_m = sample_noise(deviation);
     if noise_m > LARGEST_NOISE * radius {
         let noise_mm = (noise_m * 1e5).round() / 1e2;
         let hint = format!("neighbours scatter by {noise_mm} mm, the unit may be wrong");
-        return refuse(0, hint, format!("noise below {} mm", tidy(LARGEST_NOISE * radius * 1e3)));
+        return refuse(
+            0,
+            hint,
+            format!("noise below {} mm", tidy(LARGEST_NOISE * radius * 1e3)),
+        );
     }
     let spike = SPIKE_M.max(0.01 * radius);
     let lone = |w: &[f64]| (w[1] - w[0]).abs().min((w[1] - w[2]).abs()) > spike;
@@ -103,7 +146,11 @@ pub(super) fn deviation(
         && let Some(k) = deviation.windows(3).position(lone)
     {
         let expected = format!("within {} mm of its neighbours", tidy(spike * 1e3));
-        return refuse(k + 1, "a single reading far from its neighbours".to_owned(), expected);
+        return refuse(
+            k + 1,
+            "a single reading far from its neighbours".to_owned(),
+            expected,
+        );
     }
     if highest.max(-lowest) >= INSTRUMENT_LIMIT_M && lowest != highest {
         at_limit(entry, deviation, field, [lowest, highest])?;
@@ -112,16 +159,30 @@ pub(super) fn deviation(
 }
 
 /// Readings that stay where none lies further out stand at the end of the instrument's range.
-fn at_limit(entry: &Entry, deviation: &[f64], field: usize, ends: [f64; 2]) -> Result<(), CampaignError> {
+fn at_limit(
+    entry: &Entry,
+    deviation: &[f64],
+    field: usize,
+    ends: [f64; 2],
+) -> Result<(), CampaignError> {
     let mut run = 1;
     for k in 1..deviation.len() {
         let value = deviation[k];
         let stays = value == deviation[k - 1] && value.abs() >= INSTRUMENT_LIMIT_M;
         run = if stays { run + 1 } else { 1 };
         if run >= ROWS_AT_LIMIT && value == ends[usize::from(value > 0.0)] {
-            let rows = run + deviation[k + 1..].iter().take_while(|&&v| v == value).count();
+            let rows = run
+                + deviation[k + 1..]
+                    .iter()
+                    .take_while(|&&v| v == value)
+                    .count();
             let value_um = tidy(value * 1e6);
-            return Err(err(entry, k + 1 - run, field, Problem::OutOfInstrumentRange { value_um, rows }));
+            return Err(err(
+                entry,
+                k + 1 - run,
+                field,
+                Problem::OutOfInstrumentRange { value_um, rows },
+            ));
         }
     }
     Ok(())
@@ -155,7 +216,11 @@ pub(super) fn slowness(entry: &Entry, turn_s: f64) -> Result<f64, CampaignError>
     let programmed_s = TAU * entry.radius_m / entry.feed_m_s;
     let ratio = turn_s / programmed_s;
     if !(1.0 / LONGEST_TURN..=LONGEST_TURN).contains(&ratio) {
-        let problem = Problem::TooLong { measured_s: turn_s, programmed_s, hint: duration_hint(ratio) };
+        let problem = Problem::TooLong {
+            measured_s: turn_s,
+            programmed_s,
+            hint: duration_hint(ratio),
+        };
         return Err(CampaignError::new(entry.row(0), problem));
     }
     Ok(ratio)
@@ -179,7 +244,11 @@ pub(super) fn duration(
 ) -> Result<Option<u32>, CampaignError> {
     let ratio = slowness(entry, turn_s)?;
     if ratio < SHORTEST_TURN {
-        let problem = Problem::TooShort { measured_s: turn_s, programmed_s: turn_s / ratio, share: ratio };
+        let problem = Problem::TooShort {
+            measured_s: turn_s,
+            programmed_s: turn_s / ratio,
+            share: ratio,
+        };
         return Err(CampaignError::new(entry.row(deviation.len() - 1), problem));
     }
     if ratio < 0.97 {
@@ -195,13 +264,23 @@ pub(super) fn duration(
 /// The refusal for a file of several laps.
 pub(super) fn several_laps(entry: &Entry, turn_s: f64, rows: usize, laps: u32) -> CampaignError {
     let programmed_s = TAU * entry.radius_m / entry.feed_m_s;
-    let problem = Problem::SeveralLaps { measured_s: turn_s, programmed_s, laps };
+    let problem = Problem::SeveralLaps {
+        measured_s: turn_s,
+        programmed_s,
+        laps,
+    };
     CampaignError::new(entry.row(rows / laps as usize), problem)
 }
 
 fn fast(entry: &Entry, ratio: f64) -> Note {
-    let text = format!("the turn took {:.0} % of the programmed time: a feed override?", 100.0 * ratio);
-    Note { at: entry.row(0), text }
+    let text = format!(
+        "the turn took {:.0} % of the programmed time: a feed override?",
+        100.0 * ratio
+    );
+    Note {
+        at: entry.row(0),
+        text,
+    }
 }
 
 fn duration_hint(ratio: f64) -> String {
@@ -238,9 +317,14 @@ fn repeats(deviation: &[f64], laps: usize) -> bool {
         2.0 / m * f64::hypot(c, s)
     };
     let noise = 6.0 * sample_noise(&used) * (2.0 / m).sqrt();
-    let all: Vec<(usize, f64)> = (1..=8 * laps).map(|order| (order, amplitude(order))).collect();
+    let all: Vec<(usize, f64)> = (1..=8 * laps)
+        .map(|order| (order, amplitude(order)))
+        .collect();
     let strongest = |multiple: bool| {
-        all.iter().filter(|(o, _)| o.is_multiple_of(laps) == multiple).map(|(_, a)| *a).fold(0.0, f64::max)
+        all.iter()
+            .filter(|(o, _)| o.is_multiple_of(laps) == multiple)
+            .map(|(_, a)| *a)
+            .fold(0.0, f64::max)
     };
     let (own, other) = (strongest(true), strongest(false));
     own > noise && (other <= noise || other < 0.02 * own)
@@ -257,11 +341,17 @@ pub fn sample_noise(values: &[f64]) -> f64 {
     }
     let stride = (values.len() - 2).div_ceil(1 << 15);
     // The order of squares is that of their bits.
-    let mut squares: Vec<u64> =
-        values.windows(3).step_by(stride).map(|w| (w[2] - 2.0 * w[1] + w[0]).powi(2).to_bits()).collect();
+    let mut squares: Vec<u64> = values
+        .windows(3)
+        .step_by(stride)
+        .map(|w| (w[2] - 2.0 * w[1] + w[0]).powi(2).to_bits())
+        .collect();
     let kept = (squares.len() as f64 * SHARE).round() as usize;
     squares.select_nth_unstable(kept - 1);
-    let smaller: Vec<f64> = squares[..kept].iter().map(|bits| f64::from_bits(*bits)).collect();
+    let smaller: Vec<f64> = squares[..kept]
+        .iter()
+        .map(|bits| f64::from_bits(*bits))
+        .collect();
     // The second difference of white noise has variance 6σ².
     (sum(&smaller) / kept as f64 / TRIMMED_VARIANCE / 6.0).sqrt()
 }
@@ -291,22 +381,49 @@ pub(super) fn angles(
 ) -> Result<(), CampaignError> {
     let n = angle.len();
     let d = f64::from(entry.direction.sign());
-    let (lowest, highest) = angle.iter().fold((f64::MAX, f64::MIN), |(l, h), &a| (l.min(a), h.max(a)));
+    let (lowest, highest) = angle
+        .iter()
+        .fold((f64::MAX, f64::MIN), |(l, h), &a| (l.min(a), h.max(a)));
     if (highest - lowest).to_degrees() < 0.5 {
-        return Err(err(entry, n - 1, field, Problem::AngleConstant { at_deg: angle[0].to_degrees() }));
+        return Err(err(
+            entry,
+            n - 1,
+            field,
+            Problem::AngleConstant {
+                at_deg: angle[0].to_degrees(),
+            },
+        ));
     }
     let span = angle[n - 1] - angle[0];
     if span * d < 0.0 {
-        let words = |up: bool| if up { "counter-clockwise (growing)" } else { "clockwise (falling)" };
+        let words = |up: bool| {
+            if up {
+                "counter-clockwise (growing)"
+            } else {
+                "clockwise (falling)"
+            }
+        };
         let ccw = entry.direction == Direction::Ccw;
         let direction = if ccw { "ccw" } else { "cw" };
-        let problem = Problem::DirectionContradicted { found: words(!ccw), expected: words(ccw), direction };
+        let problem = Problem::DirectionContradicted {
+            found: words(!ccw),
+            expected: words(ccw),
+            direction,
+        };
         return Err(err(entry, n - 1, field, problem));
     }
     let one_degree = 1f64.to_radians();
-    if let Some(k) = angle.windows(2).position(|w| d * (w[1] - w[0]) < -one_degree) {
+    if let Some(k) = angle
+        .windows(2)
+        .position(|w| d * (w[1] - w[0]) < -one_degree)
+    {
         let back_deg = (d * (angle[k] - angle[k + 1])).to_degrees();
-        return Err(err(entry, k + 1, field, Problem::AngleBackwards { back_deg }));
+        return Err(err(
+            entry,
+            k + 1,
+            field,
+            Problem::AngleBackwards { back_deg },
+        ));
     }
     let spacing = span.abs() / (n - 1) as f64;
     *covered = span.abs() + spacing;
@@ -314,7 +431,10 @@ pub(super) fn angles(
     let covered_deg = covered.to_degrees();
     match entry.arc_rad {
         Some(declared) if (*covered - declared).abs() > tolerance => {
-            let problem = Problem::ArcContradicted { covered_deg, declared_deg: tidy(declared.to_degrees()) };
+            let problem = Problem::ArcContradicted {
+                covered_deg,
+                declared_deg: tidy(declared.to_degrees()),
+            };
             return Err(err(entry, n - 1, field, problem));
         }
         Some(_) => {}
@@ -322,8 +442,18 @@ pub(super) fn angles(
             return Err(err(entry, n - 1, field, Problem::Arc { covered_deg }));
         }
         None if *covered > TAU + tolerance => {
-            let row = angle.iter().position(|a| (a - angle[0]).abs() >= TAU).unwrap_or(n - 1);
-            return Err(err(entry, row, field, Problem::SeveralTurns { turns: *covered / TAU }));
+            let row = angle
+                .iter()
+                .position(|a| (a - angle[0]).abs() >= TAU)
+                .unwrap_or(n - 1);
+            return Err(err(
+                entry,
+                row,
+                field,
+                Problem::SeveralTurns {
+                    turns: *covered / TAU,
+                },
+            ));
         }
         None => {}
     }
@@ -333,7 +463,16 @@ pub(super) fn angles(
     }) {
         let gap_deg = (angle[k + 1] - angle[k]).abs().to_degrees();
         let gap_s = gap_deg.to_radians() * entry.radius_m / entry.feed_m_s;
-        return Err(err(entry, k + 1, field, Problem::Gap { gap_s, gap_deg, limit_deg: LARGEST_GAP_DEG }));
+        return Err(err(
+            entry,
+            k + 1,
+            field,
+            Problem::Gap {
+                gap_s,
+                gap_deg,
+                limit_deg: LARGEST_GAP_DEG,
+            },
+        ));
     }
     if let Some(start) = entry.start_angle_rad {
         let off = ((angle[0] - start + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0).to_degrees();
@@ -342,7 +481,10 @@ pub(super) fn angles(
             let text = format!(
                 "start_angle_deg = {said:.1}, the first sample lies at {found:.1}°: the file is believed"
             );
-            notes.push(Note { at: entry.place(0, field), text });
+            notes.push(Note {
+                at: entry.place(0, field),
+                text,
+            });
         }
     }
     Ok(())

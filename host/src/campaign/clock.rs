@@ -33,7 +33,9 @@ pub(super) struct Stamps {
 impl Stamps {
     /// The next stamps; they are returned as time since the first one.
     pub(super) fn take(&mut self, time: &mut [f64]) {
-        let Some((&first, &last)) = time.first().zip(time.last()) else { return };
+        let Some((&first, &last)) = time.first().zip(time.last()) else {
+            return;
+        };
         // The first stamp of all has no hole before it.
         let before = (self.rows > 0).then_some(self.last_s);
         if before.is_none() {
@@ -47,7 +49,10 @@ impl Stamps {
         let skipped = time.len() - holes.len();
         let [lowest, highest] = bounds(&holes);
         if let (true, None) = (lowest < 0.0, self.backwards)
-            && let Some(k) = holes.iter().position(|hole| *hole < 0.0).map(|k| k + skipped)
+            && let Some(k) = holes
+                .iter()
+                .position(|hole| *hole < 0.0)
+                .map(|k| k + skipped)
         {
             let from_s = k.checked_sub(1).map_or(self.last_s, |k| time[k]);
             self.backwards = Some((self.rows + k, from_s, time[k]));
@@ -76,22 +81,44 @@ impl Stamps {
             return refuse(row, Problem::TimeBackwards { from_s, to_s });
         }
         if self.last_s <= 0.0 {
-            return refuse(self.rows.saturating_sub(1), Problem::TimeConstant { at_s: self.first_s });
+            return refuse(
+                self.rows.saturating_sub(1),
+                Problem::TimeConstant { at_s: self.first_s },
+            );
         }
         // Stamps are rounded to the ticks of the instrument: spacings scatter by up to a tick, a lost sample adds a spacing.
         // None is negative, so their order is that of their bits.
-        let mut spacings: Vec<u64> = self.spacings.into_values().into_iter().map(f64::to_bits).collect();
+        let mut spacings: Vec<u64> = self
+            .spacings
+            .into_values()
+            .into_iter()
+            .map(f64::to_bits)
+            .collect();
         let rank = |share: f64| (spacings.len().saturating_sub(1) as f64 * share).round() as usize;
         let (low, high) = (rank(0.05), rank(0.95));
         let longest_s = f64::from_bits(*spacings.select_nth_unstable(high).1);
         let shortest_s = f64::from_bits(*spacings[..=high].select_nth_unstable(low).1);
-        let central: Vec<f64> = spacings[low..=high].iter().map(|bits| f64::from_bits(*bits)).collect();
+        let central: Vec<f64> = spacings[low..=high]
+            .iter()
+            .map(|bits| f64::from_bits(*bits))
+            .collect();
         let spacing_s = sum(&central) / central.len() as f64;
         let limit = spacing_s + f64::max(1.05 * (longest_s - shortest_s), 0.5 * spacing_s);
-        let gap = self.largest.filter(|(_, hole)| *hole > limit).map(|(row, hole)| (row, hole - spacing_s));
+        let gap = self
+            .largest
+            .filter(|(_, hole)| *hole > limit)
+            .map(|(row, hole)| (row, hole - spacing_s));
         let (last, n) = (self.last_s, self.rows as f64);
-        let turn_s = if gap.is_some() { last + spacing_s } else { last * n / (n - 1.0) };
-        Ok(Clock { turn_s, spacing_s, gap })
+        let turn_s = if gap.is_some() {
+            last + spacing_s
+        } else {
+            last * n / (n - 1.0)
+        };
+        Ok(Clock {
+            turn_s,
+            spacing_s,
+            gap,
+        })
     }
 }
 

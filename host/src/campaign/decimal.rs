@@ -2,8 +2,9 @@
 //! fifteen digits, names of infinities) is left to `fast_float2`; the value is the same, the nearest double, either way.
 
 /// 10⁰ … 10¹⁵, exact.
-const TENS: [f64; 16] =
-    [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
+const TENS: [f64; 16] = [
+    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
+];
 
 /// The number that `bytes` begin with, and how many bytes it takes; nothing where there is none. `mark` divides the
 /// whole from the fraction.
@@ -12,7 +13,11 @@ pub(super) fn parse(bytes: &[u8], mark: u8) -> Option<(f64, usize)> {
     let negative = bytes.first() == Some(&b'-');
     let start = usize::from(negative);
     let (mut digits, mut at) = (0u64, start);
-    while let Some(digit) = bytes.get(at).map(|b| b.wrapping_sub(b'0')).filter(|d| *d < 10) {
+    while let Some(digit) = bytes
+        .get(at)
+        .map(|b| b.wrapping_sub(b'0'))
+        .filter(|d| *d < 10)
+    {
         digits = digits.wrapping_mul(10).wrapping_add(u64::from(digit));
         at += 1;
     }
@@ -21,7 +26,11 @@ pub(super) fn parse(bytes: &[u8], mark: u8) -> Option<(f64, usize)> {
     if bytes.get(at) == Some(&mark) {
         at += 1;
         let from = at;
-        while let Some(digit) = bytes.get(at).map(|b| b.wrapping_sub(b'0')).filter(|d| *d < 10) {
+        while let Some(digit) = bytes
+            .get(at)
+            .map(|b| b.wrapping_sub(b'0'))
+            .filter(|d| *d < 10)
+        {
             digits = digits.wrapping_mul(10).wrapping_add(u64::from(digit));
             at += 1;
         }
@@ -40,7 +49,9 @@ pub(super) fn parse(bytes: &[u8], mark: u8) -> Option<(f64, usize)> {
 #[cold]
 fn long(bytes: &[u8], mark: u8) -> Option<(f64, usize)> {
     if mark == b'.' {
-        return fast_float2::parse_partial::<f64, _>(bytes).ok().filter(|(_, used)| *used > 0);
+        return fast_float2::parse_partial::<f64, _>(bytes)
+            .ok()
+            .filter(|(_, used)| *used > 0);
     }
     let mut text = [0; 48];
     let used = bytes.len().min(text.len());
@@ -52,7 +63,9 @@ fn long(bytes: &[u8], mark: u8) -> Option<(f64, usize)> {
             b => b,
         };
     }
-    fast_float2::parse_partial::<f64, _>(&text[..used]).ok().filter(|(_, used)| *used > 0)
+    fast_float2::parse_partial::<f64, _>(&text[..used])
+        .ok()
+        .filter(|(_, used)| *used > 0)
 }
 
 #[cfg(test)]

@@ -28,18 +28,29 @@ pub struct Place {
 impl Place {
     /// A whole file.
     pub fn file(file: impl Into<PathBuf>) -> Self {
-        Self { file: file.into(), line: None, column: None }
+        Self {
+            file: file.into(),
+            line: None,
+            column: None,
+        }
     }
 
     /// A line and column of a file.
     pub fn at(file: impl Into<PathBuf>, line: usize, column: usize) -> Self {
-        Self { file: file.into(), line: Some(line), column: Some(column) }
+        Self {
+            file: file.into(),
+            line: Some(line),
+            column: Some(column),
+        }
     }
 
     /// The place of a byte of a text.
     pub fn of_byte(file: impl Into<PathBuf>, text: &[u8], byte: usize) -> Self {
         let before = &text[..byte.min(text.len())];
-        let start = before.iter().rposition(|&b| b == b'\n').map_or(0, |p| p + 1);
+        let start = before
+            .iter()
+            .rposition(|&b| b == b'\n')
+            .map_or(0, |p| p + 1);
         let line = 1 + before.iter().filter(|&&b| b == b'\n').count();
         let column = 1 + String::from_utf8_lossy(&before[start..]).chars().count();
         Self::at(file, line, column)
@@ -61,7 +72,10 @@ impl fmt::Display for Place {
 
 /// Everything that a campaign is refused for.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[allow(missing_docs, reason = "the message of each variant is its documentation")]
+#[allow(
+    missing_docs,
+    reason = "the message of each variant is its documentation"
+)]
 pub enum Problem {
     // The file system.
     #[error("no such file; expected {expected}")]
@@ -69,7 +83,10 @@ pub enum Problem {
     #[error("is a directory; expected {expected}")]
     IsDirectory { expected: &'static str },
     #[error("cannot be {action}: {reason}")]
-    Io { action: &'static str, reason: String },
+    Io {
+        action: &'static str,
+        reason: String,
+    },
     #[error("is empty; expected {expected}")]
     Empty { expected: &'static str },
     #[error("not UTF-8 text; expected {expected}")]
@@ -79,13 +96,24 @@ pub enum Problem {
     #[error("not valid TOML: {reason}")]
     Toml { reason: String },
     #[error("`{key}` is missing; expected {expected}")]
-    MissingKey { key: &'static str, expected: &'static str },
+    MissingKey {
+        key: &'static str,
+        expected: &'static str,
+    },
     #[error("`{key}` is {found}; expected {expected}")]
-    WrongType { key: String, found: String, expected: &'static str },
+    WrongType {
+        key: String,
+        found: String,
+        expected: &'static str,
+    },
     #[error("unknown key `{key}`; did you mean `{known}`?")]
     UnknownKey { key: String, known: &'static str },
     #[error("`{key}` is {value}; expected {expected}")]
-    OutOfRange { key: &'static str, value: String, expected: &'static str },
+    OutOfRange {
+        key: &'static str,
+        value: String,
+        expected: &'static str,
+    },
     #[error("`direction` is \"{found}\"; expected \"ccw\" or \"cw\"")]
     UnknownDirection { found: String },
     #[error("the campaign lists no runs; expected at least one [[run]]")]
@@ -109,7 +137,11 @@ pub enum Problem {
     #[error(
         "\"{text}\" has a decimal comma; expected a decimal point (row has {found} fields for {expected} columns)"
     )]
-    DecimalComma { text: String, found: usize, expected: usize },
+    DecimalComma {
+        text: String,
+        found: usize,
+        expected: usize,
+    },
     #[error("\"{text}\" is not a number; expected {column} as a number")]
     NotANumber { text: String, column: String },
     #[error("empty field; expected {column} as a number")]
@@ -129,13 +161,21 @@ pub enum Problem {
     #[error(
         "samples are missing over {gap_deg:.0}° of the turn ({gap_s:.4} s); expected no gap over {limit_deg:.0}°"
     )]
-    Gap { gap_s: f64, gap_deg: f64, limit_deg: f64 },
+    Gap {
+        gap_s: f64,
+        gap_deg: f64,
+        limit_deg: f64,
+    },
     #[error("the angle stands still at {at_deg:.3}° over all rows; expected a full turn")]
     AngleConstant { at_deg: f64 },
     #[error(
         "the angle runs {found} over the run; expected {expected}, as the campaign's direction = \"{direction}\" says"
     )]
-    DirectionContradicted { found: &'static str, expected: &'static str, direction: &'static str },
+    DirectionContradicted {
+        found: &'static str,
+        expected: &'static str,
+        direction: &'static str,
+    },
     #[error("the angle jumps back by {back_deg:.2}°; expected angles in order of travel")]
     AngleBackwards { back_deg: f64 },
     #[error("the samples cover {covered_deg:.1}° of the circle; expected one full turn of 360°")]
@@ -149,21 +189,45 @@ pub enum Problem {
     #[error(
         "the samples last {measured_s:.4} s and repeat themselves, {laps} laps of {programmed_s:.4} s; expected exactly one turn"
     )]
-    SeveralLaps { measured_s: f64, programmed_s: f64, laps: u32 },
+    SeveralLaps {
+        measured_s: f64,
+        programmed_s: f64,
+        laps: u32,
+    },
     #[error(
         "the samples last {measured_s:.4} s, one turn at the programmed feed {programmed_s:.4} s: {share:.2} of a turn; expected one full turn"
     )]
-    TooShort { measured_s: f64, programmed_s: f64, share: f64 },
+    TooShort {
+        measured_s: f64,
+        programmed_s: f64,
+        share: f64,
+    },
     #[error(
         "the samples last {measured_s:.4} s, one turn at the programmed feed {programmed_s:.6} s: {hint}; expected one turn"
     )]
-    TooLong { measured_s: f64, programmed_s: f64, hint: String },
-    #[error("{column} is {value}, far from a circle of {radius_mm} mm: {hint}; expected {expected}")]
-    Implausible { column: String, value: String, radius_mm: f64, hint: String, expected: String },
+    TooLong {
+        measured_s: f64,
+        programmed_s: f64,
+        hint: String,
+    },
+    #[error(
+        "{column} is {value}, far from a circle of {radius_mm} mm: {hint}; expected {expected}"
+    )]
+    Implausible {
+        column: String,
+        value: String,
+        radius_mm: f64,
+        hint: String,
+        expected: String,
+    },
     #[error(
         "the points fit a circle of radius {fitted_mm:.6} mm, the campaign says {programmed_mm} mm: {hint}; expected them to agree within 25 %"
     )]
-    WrongRadius { fitted_mm: f64, programmed_mm: f64, hint: String },
+    WrongRadius {
+        fitted_mm: f64,
+        programmed_mm: f64,
+        hint: String,
+    },
     #[error("no circle through the points: {reason}; expected points on a circle")]
     NoCircle { reason: String },
     #[error(
@@ -190,13 +254,23 @@ pub enum Problem {
     NotAStamp { text: String },
     #[error("the samples cover {covered_deg:.1}° of the circle; expected at least 180°")]
     ShortArc { covered_deg: f64 },
-    #[error("only {found} of {rows} points lie on the circle of {radius_mm} mm; expected a circular test")]
-    OffCircle { found: usize, rows: usize, radius_mm: f64 },
-    #[error("the direction of travel cannot be seen in deviations over time; expected --direction ccw or cw")]
+    #[error(
+        "only {found} of {rows} points lie on the circle of {radius_mm} mm; expected a circular test"
+    )]
+    OffCircle {
+        found: usize,
+        rows: usize,
+        radius_mm: f64,
+    },
+    #[error(
+        "the direction of travel cannot be seen in deviations over time; expected --direction ccw or cw"
+    )]
     DirectionUnknown,
 
     // Writing.
-    #[error("run {index} of the campaign has file name \"{file}\" already used; expected each name once")]
+    #[error(
+        "run {index} of the campaign has file name \"{file}\" already used; expected each name once"
+    )]
     DuplicateName { index: usize, file: String },
 }
 
@@ -205,7 +279,10 @@ const SHAPES: &str = "`time_s,deviation_um`, `angle_deg,deviation_um`, `time_s,x
 impl CampaignError {
     /// A problem at a place.
     pub fn new(at: Place, problem: Problem) -> Self {
-        Self { at: Box::new(at), problem: Box::new(problem) }
+        Self {
+            at: Box::new(at),
+            problem: Box::new(problem),
+        }
     }
 
     /// What the operating system said about a file.
@@ -219,7 +296,10 @@ impl CampaignError {
             std::io::ErrorKind::NotFound => Problem::Missing { expected },
             std::io::ErrorKind::IsADirectory => Problem::IsDirectory { expected },
             _ if file.is_dir() => Problem::IsDirectory { expected },
-            _ => Problem::Io { action, reason: error.to_string() },
+            _ => Problem::Io {
+                action,
+                reason: error.to_string(),
+            },
         };
         Self::new(Place::file(file), problem)
     }
@@ -230,36 +310,48 @@ impl CampaignError {
         match *self.problem {
             P::Missing { .. } | P::IsDirectory { .. } | P::Io { .. } => "check the path",
             P::Empty { .. } => "measure or export the file again",
-            P::NotUtf8 { .. } | P::Semicolons | P::DecimalComma { .. } | P::Header { .. } | P::NoHeader => {
+            P::NotUtf8 { .. }
+            | P::Semicolons
+            | P::DecimalComma { .. }
+            | P::Header { .. }
+            | P::NoHeader => {
                 "`giotto import` reads other formats (German locale, trackers, robot logs, --columns)"
             }
-            P::Toml { .. } | P::WrongType { .. } | P::OutOfRange { .. } | P::UnknownDirection { .. } => {
-                "correct this line of campaign.toml"
-            }
+            P::Toml { .. }
+            | P::WrongType { .. }
+            | P::OutOfRange { .. }
+            | P::UnknownDirection { .. } => "correct this line of campaign.toml",
             P::MissingKey { .. } | P::UnknownKey { .. } => "correct the key in campaign.toml",
             P::NoRuns => "add a run with `giotto import`",
             P::DuplicateRun { .. } | P::DuplicateName { .. } => {
                 "remove one of the two, or give the second its own file"
             }
             P::OutsideDirectory { .. } => "copy the file into the campaign's directory",
-            P::DuplicateColumn { .. } | P::Ragged { .. } | P::NotANumber { .. } | P::EmptyField { .. } => {
-                "correct or export the file again"
-            }
+            P::DuplicateColumn { .. }
+            | P::Ragged { .. }
+            | P::NotANumber { .. }
+            | P::EmptyField { .. } => "correct or export the file again",
             P::EmptyLine | P::NotFinite { .. } => "remove the row, or export the file again",
             P::TooFew { .. } => "measure a full turn, with at least 16 samples",
             P::TimeBackwards { .. } | P::TimeConstant { .. } => {
                 "export the rows in time order, time in seconds"
             }
             P::Gap { .. } => "measure the run again; the recording lost samples",
-            P::AngleConstant { .. } | P::AngleBackwards { .. } => "export the rows in order of travel",
+            P::AngleConstant { .. } | P::AngleBackwards { .. } => {
+                "export the rows in order of travel"
+            }
             P::DirectionContradicted { .. } => "correct `direction`, or the sign of the angles",
             P::Arc { .. } | P::SeveralTurns { .. } | P::SeveralLaps { .. } => {
                 "`giotto import` trims laps and feed-in, and takes arcs of 180° and more"
             }
             P::ArcContradicted { .. } => "correct `arc_deg`, or import the file again",
             P::TooShort { .. } => "record the whole turn, or correct `feed_mm_s` or `radius_mm`",
-            P::TooLong { .. } => "correct `feed_mm_s` (mm/s), `radius_mm` (mm) or the unit of time_s",
-            P::Implausible { .. } | P::WrongRadius { .. } => "correct the unit in the header, or `radius_mm`",
+            P::TooLong { .. } => {
+                "correct `feed_mm_s` (mm/s), `radius_mm` (mm) or the unit of time_s"
+            }
+            P::Implausible { .. } | P::WrongRadius { .. } => {
+                "correct the unit in the header, or `radius_mm`"
+            }
             P::NoCircle { .. } => "check which file this is",
             P::OutOfInstrumentRange { .. } => {
                 "set the instrument up again; the readings beyond its range are lost"
@@ -267,8 +359,12 @@ impl CampaignError {
             P::UnknownFormat { .. } => "name the columns: --columns time_s,x_mm,y_mm (- skips one)",
             P::Columns { .. } => "for example --columns time_s,-,x_mm,y_mm",
             P::Xml { .. } => "export the results from Ballbar 20 again",
-            P::ResultsOnly => "set its results beside giotto's: giotto analyze CAMPAIGN --ballbar FILE.b5r",
-            P::NotAStamp { .. } => "name the columns: --columns x_mm,y_mm,z_mm leaves the stamps out",
+            P::ResultsOnly => {
+                "set its results beside giotto's: giotto analyze CAMPAIGN --ballbar FILE.b5r"
+            }
+            P::NotAStamp { .. } => {
+                "name the columns: --columns x_mm,y_mm,z_mm leaves the stamps out"
+            }
             P::ShortArc { .. } => "measure a full turn, or an arc of 180° and more",
             P::OffCircle { .. } => "check --radius, its unit, and which file this is",
             P::DirectionUnknown => "add --direction",

@@ -27,8 +27,14 @@ pub(super) fn bounds(values: &[f64]) -> [f64; 2] {
             highest[k] = higher(highest[k], chunk[k]);
         }
     }
-    let least = lowest.iter().chain(rest).fold(f64::INFINITY, |a, b| lower(a, *b));
-    let most = highest.iter().chain(rest).fold(f64::NEG_INFINITY, |a, b| higher(a, *b));
+    let least = lowest
+        .iter()
+        .chain(rest)
+        .fold(f64::INFINITY, |a, b| lower(a, *b));
+    let most = highest
+        .iter()
+        .chain(rest)
+        .fold(f64::NEG_INFINITY, |a, b| higher(a, *b));
     [least, most]
 }
 
@@ -39,7 +45,9 @@ mod tests {
     #[test]
     fn are_those_of_the_values() {
         for n in [0, 1, 7, 8, 9, 100] {
-            let values: Vec<f64> = (0..n).map(|k| f64::from((k * 37 + 11) % 101) - 50.0).collect();
+            let values: Vec<f64> = (0..n)
+                .map(|k| f64::from((k * 37 + 11) % 101) - 50.0)
+                .collect();
             assert_eq!(sum(&values), values.iter().sum::<f64>());
             let least = values.iter().copied().fold(f64::INFINITY, f64::min);
             let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);

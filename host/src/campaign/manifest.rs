@@ -63,17 +63,37 @@ impl Manifest {
     /// # Errors
     /// Whatever keeps `campaign.toml` from being used; the CSVs are not touched yet.
     pub fn open(path: &Path) -> Result<Self, CampaignError> {
-        let file = if path.is_dir() { path.join("campaign.toml") } else { path.to_path_buf() };
-        let bytes = std::fs::read(&file).map_err(|e| CampaignError::io(&file, "read", EXPECTED, &e))?;
+        let file = if path.is_dir() {
+            path.join("campaign.toml")
+        } else {
+            path.to_path_buf()
+        };
+        let bytes =
+            std::fs::read(&file).map_err(|e| CampaignError::io(&file, "read", EXPECTED, &e))?;
         let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&bytes);
         let text = std::str::from_utf8(bytes).map_err(|e| {
             let at = Place::of_byte(&file, bytes, e.valid_up_to());
-            CampaignError::new(at, Problem::NotUtf8 { expected: EXPECTED_TOML })
+            CampaignError::new(
+                at,
+                Problem::NotUtf8 {
+                    expected: EXPECTED_TOML,
+                },
+            )
         })?;
         if text.trim().is_empty() {
-            return Err(CampaignError::new(Place::file(&file), Problem::Empty { expected: EXPECTED_TOML }));
+            return Err(CampaignError::new(
+                Place::file(&file),
+                Problem::Empty {
+                    expected: EXPECTED_TOML,
+                },
+            ));
         }
-        Source { file: &file, text, notes: Vec::new() }.manifest()
+        Source {
+            file: &file,
+            text,
+            notes: Vec::new(),
+        }
+        .manifest()
     }
 }
 
@@ -88,21 +108,31 @@ type Value<'a> = Spanned<DeValue<'a>>;
 
 impl Source<'_> {
     fn error(&self, span: Range<usize>, problem: Problem) -> CampaignError {
-        CampaignError::new(Place::of_byte(self.file, self.text.as_bytes(), span.start), problem)
+        CampaignError::new(
+            Place::of_byte(self.file, self.text.as_bytes(), span.start),
+            problem,
+        )
     }
 
     fn manifest(mut self) -> Result<Manifest, CampaignError> {
         let document = DeTable::parse(self.text).map_err(|e| {
             let span = e.span().unwrap_or(0..0);
-            self.error(span, Problem::Toml { reason: e.message().replace('\n', ", ") })
+            self.error(
+                span,
+                Problem::Toml {
+                    reason: e.message().replace('\n', ", "),
+                },
+            )
         })?;
         let root = document.get_ref();
         self.known_keys(root, &["campaign", "run"])?;
         let (mut name, mut machine) = (String::new(), String::new());
         match root.get("campaign") {
             None => {
-                let problem =
-                    Problem::MissingKey { key: "[campaign]", expected: "a table with name and machine" };
+                let problem = Problem::MissingKey {
+                    key: "[campaign]",
+                    expected: "a table with name and machine",
+                };
                 return Err(self.error(0..0, problem));
             }
             Some(value) => {
@@ -116,17 +146,27 @@ impl Source<'_> {
             }
         }
         if name.is_empty() {
-            let folder =
-                self.file.canonicalize().ok().and_then(|p| Some(p.parent()?.file_name()?.to_owned()));
+            let folder = self
+                .file
+                .canonicalize()
+                .ok()
+                .and_then(|p| Some(p.parent()?.file_name()?.to_owned()));
             name = folder.map_or_else(String::new, |f| f.to_string_lossy().into_owned());
         }
         let list = match root.get("run") {
             None => return Err(self.error(0..0, Problem::NoRuns)),
             Some(v) => match v.get_ref() {
-                DeValue::Array(list) if list.is_empty() => return Err(self.error(v.span(), Problem::NoRuns)),
+                DeValue::Array(list) if list.is_empty() => {
+                    return Err(self.error(v.span(), Problem::NoRuns));
+                }
                 DeValue::Array(list) => list,
                 other => {
-                    return Err(self.wrong_type(v.span(), "run", other, "[[run]] (two brackets), one a run"));
+                    return Err(self.wrong_type(
+                        v.span(),
+                        "run",
+                        other,
+                        "[[run]] (two brackets), one a run",
+                    ));
                 }
             },
         };
@@ -134,14 +174,30 @@ impl Source<'_> {
         let mut seen: HashMap<PathBuf, usize> = HashMap::new();
         for value in list {
             let (entry, span) = self.entry(value)?;
-            let plain: PathBuf = entry.path.components().filter(|c| *c != Component::CurDir).collect();
+            let plain: PathBuf = entry
+                .path
+                .components()
+                .filter(|c| *c != Component::CurDir)
+                .collect();
             if let Some(&first) = seen.get(&plain) {
-                return Err(self.error(span, Problem::DuplicateRun { file: entry.file, first }));
+                return Err(self.error(
+                    span,
+                    Problem::DuplicateRun {
+                        file: entry.file,
+                        first,
+                    },
+                ));
             }
             seen.insert(plain, entry.line);
             runs.push(entry);
         }
-        Ok(Manifest { path: self.file.to_path_buf(), name, machine, runs, notes: self.notes })
+        Ok(Manifest {
+            path: self.file.to_path_buf(),
+            name,
+            machine,
+            runs,
+            notes: self.notes,
+        })
     }
 
     fn entry(&mut self, value: &Value<'_>) -> Result<(Entry, Range<usize>), CampaignError> {
@@ -161,7 +217,9 @@ impl Source<'_> {
             ],
         )?;
         let need = |key, expected| {
-            table.get(key).ok_or_else(|| self.error(value.span(), Problem::MissingKey { key, expected }))
+            table
+                .get(key)
+                .ok_or_else(|| self.error(value.span(), Problem::MissingKey { key, expected }))
         };
         let file_value = need("file", "the name of the run's CSV")?;
         let file = self.string(file_value, "file")?;
@@ -175,37 +233,61 @@ impl Source<'_> {
             };
             return Err(self.error(span, problem));
         }
-        if !relative.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir)) {
+        if !relative
+            .components()
+            .all(|c| matches!(c, Component::Normal(_) | Component::CurDir))
+        {
             return Err(self.error(span, Problem::OutsideDirectory { file }));
         }
         let path = self.file.parent().unwrap_or(Path::new("")).join(relative);
-        let line = Place::of_byte(self.file, self.text.as_bytes(), span.start).line.unwrap_or(1);
+        let line = Place::of_byte(self.file, self.text.as_bytes(), span.start)
+            .line
+            .unwrap_or(1);
 
         let radius = need("radius_mm", "the programmed radius in mm")?;
-        let radius_mm =
-            self.within(radius, "radius_mm", "a radius of 0.1 to 100000 mm", |v| (0.1..=1e5).contains(&v))?;
+        let radius_mm = self.within(radius, "radius_mm", "a radius of 0.1 to 100000 mm", |v| {
+            (0.1..=1e5).contains(&v)
+        })?;
         let feed = need("feed_mm_s", "the programmed feed in mm/s")?;
-        let feed_mm_s =
-            self.within(feed, "feed_mm_s", "a feed above 0, up to 100000 mm/s", |v| v > 0.0 && v <= 1e5)?;
+        let feed_mm_s = self.within(
+            feed,
+            "feed_mm_s",
+            "a feed above 0, up to 100000 mm/s",
+            |v| v > 0.0 && v <= 1e5,
+        )?;
         let direction_value = need("direction", "\"ccw\" or \"cw\"")?;
         let direction = match self.string(direction_value, "direction")?.as_str() {
             "ccw" => Direction::Ccw,
             "cw" => Direction::Cw,
             other => {
-                let problem = Problem::UnknownDirection { found: other.to_owned() };
+                let problem = Problem::UnknownDirection {
+                    found: other.to_owned(),
+                };
                 return Err(self.error(direction_value.span(), problem));
             }
         };
         let optional = |key: &'static str, expected, ok: fn(f64) -> bool| {
-            table.get(key).map(|v| self.within(v, key, expected, ok)).transpose()
+            table
+                .get(key)
+                .map(|v| self.within(v, key, expected, ok))
+                .transpose()
         };
-        let start = optional("start_angle_deg", "an angle of −360 to 360°", |v| v.abs() <= 360.0)?;
-        let started_s = optional("started_s", "seconds since the campaign began, 0 or more", |v| v >= 0.0)?;
-        let temperature_c =
-            optional("temperature_c", "a temperature of −50 to 150 °C", |v| (-50.0..=150.0).contains(&v))?;
-        let arc = optional("arc_deg", "180 to 360° (leave it out for a whole turn)", |v| {
-            (SHORTEST_ARC_DEG..=360.0).contains(&v)
+        let start = optional("start_angle_deg", "an angle of −360 to 360°", |v| {
+            v.abs() <= 360.0
         })?;
+        let started_s = optional(
+            "started_s",
+            "seconds since the campaign began, 0 or more",
+            |v| v >= 0.0,
+        )?;
+        let temperature_c = optional("temperature_c", "a temperature of −50 to 150 °C", |v| {
+            (-50.0..=150.0).contains(&v)
+        })?;
+        let arc = optional(
+            "arc_deg",
+            "180 to 360° (leave it out for a whole turn)",
+            |v| (SHORTEST_ARC_DEG..=360.0).contains(&v),
+        )?;
         let centre_m = table.get("centre_mm").map(|v| self.centre(v)).transpose()?;
         let entry = Entry {
             file,
@@ -231,7 +313,11 @@ impl Source<'_> {
         };
         if list.len() != 3 {
             let value_text = format!("a list of {}", list.len());
-            let problem = Problem::OutOfRange { key: "centre_mm", value: value_text, expected: EXPECTED };
+            let problem = Problem::OutOfRange {
+                key: "centre_mm",
+                value: value_text,
+                expected: EXPECTED,
+            };
             return Err(self.error(value.span(), problem));
         }
         let mut centre = [0.0; 3];
@@ -250,17 +336,22 @@ impl Source<'_> {
     ) -> Result<f64, CampaignError> {
         let number = match value.get_ref() {
             DeValue::Float(f) => f.as_str().replace('_', "").parse::<f64>().ok(),
-            DeValue::Integer(i) => {
-                i64::from_str_radix(&i.as_str().replace('_', ""), i.radix()).ok().map(|v| v as f64)
-            }
+            DeValue::Integer(i) => i64::from_str_radix(&i.as_str().replace('_', ""), i.radix())
+                .ok()
+                .map(|v| v as f64),
             _ => None,
         };
         match number {
             None => Err(self.wrong_type(value.span(), key, value.get_ref(), expected)),
             Some(v) if v.is_finite() && ok(v) => Ok(v),
-            Some(v) => {
-                Err(self.error(value.span(), Problem::OutOfRange { key, value: v.to_string(), expected }))
-            }
+            Some(v) => Err(self.error(
+                value.span(),
+                Problem::OutOfRange {
+                    key,
+                    value: v.to_string(),
+                    expected,
+                },
+            )),
         }
     }
 
@@ -271,7 +362,11 @@ impl Source<'_> {
         }
     }
 
-    fn table<'v, 'a>(&self, value: &'v Value<'a>, key: &str) -> Result<&'v DeTable<'a>, CampaignError> {
+    fn table<'v, 'a>(
+        &self,
+        value: &'v Value<'a>,
+        key: &str,
+    ) -> Result<&'v DeTable<'a>, CampaignError> {
         match value.get_ref() {
             DeValue::Table(t) => Ok(t),
             other => Err(self.wrong_type(value.span(), key, other, "a table")),
@@ -294,20 +389,41 @@ impl Source<'_> {
             DeValue::Array(_) => "a list".to_owned(),
             DeValue::Table(_) => "a table".to_owned(),
         };
-        self.error(span, Problem::WrongType { key: key.to_owned(), found, expected })
+        self.error(
+            span,
+            Problem::WrongType {
+                key: key.to_owned(),
+                found,
+                expected,
+            },
+        )
     }
 
     /// A key that looks like a slip of a known one is refused; any other is kept for its owner and noted.
-    fn known_keys(&mut self, table: &DeTable<'_>, known: &[&'static str]) -> Result<(), CampaignError> {
-        for key in table.keys().filter(|k| !known.contains(&k.get_ref().as_ref())) {
+    fn known_keys(
+        &mut self,
+        table: &DeTable<'_>,
+        known: &[&'static str],
+    ) -> Result<(), CampaignError> {
+        for key in table
+            .keys()
+            .filter(|k| !known.contains(&k.get_ref().as_ref()))
+        {
             let name = key.get_ref().as_ref();
             if let Some(close) = known.iter().find(|k| is_slip(name, k)) {
-                return Err(
-                    self.error(key.span(), Problem::UnknownKey { key: name.to_owned(), known: close })
-                );
+                return Err(self.error(
+                    key.span(),
+                    Problem::UnknownKey {
+                        key: name.to_owned(),
+                        known: close,
+                    },
+                ));
             }
             let at = Place::of_byte(self.file, self.text.as_bytes(), key.span().start);
-            self.notes.push(Note { at, text: format!("unknown key `{name}` is not used") });
+            self.notes.push(Note {
+                at,
+                text: format!("unknown key `{name}` is not used"),
+            });
         }
         Ok(())
     }
@@ -316,11 +432,16 @@ impl Source<'_> {
 /// Whether `found` is `known` but for letter case, a missing unit, or up to two edits.
 fn is_slip(found: &str, known: &str) -> bool {
     let lower = found.to_ascii_lowercase();
-    let stem = known.trim_end_matches("_mm_s").trim_end_matches("_mm").trim_end_matches("_deg");
+    let stem = known
+        .trim_end_matches("_mm_s")
+        .trim_end_matches("_mm")
+        .trim_end_matches("_deg");
     let stem = stem.trim_end_matches("_s").trim_end_matches("_c");
     lower == known
         || lower == stem
-        || lower.strip_prefix(stem).is_some_and(|rest| rest.starts_with('_'))
+        || lower
+            .strip_prefix(stem)
+            .is_some_and(|rest| rest.starts_with('_'))
         || edits(&lower, known) <= if known.len() > 5 { 2 } else { 1 }
         || (known == "centre_mm" && lower.starts_with("center"))
 }
@@ -331,7 +452,9 @@ fn edits(a: &str, b: &str) -> usize {
     for (i, x) in a.bytes().enumerate() {
         let mut diagonal = std::mem::replace(&mut row[0], i + 1);
         for (j, y) in b.bytes().enumerate() {
-            let next = (diagonal + usize::from(x != y)).min(row[j] + 1).min(row[j + 1] + 1);
+            let next = (diagonal + usize::from(x != y))
+                .min(row[j] + 1)
+                .min(row[j + 1] + 1);
             diagonal = std::mem::replace(&mut row[j + 1], next);
         }
     }

@@ -31,8 +31,11 @@ impl Manifest {
     /// # Errors
     /// As [`read`].
     pub fn read(&self) -> Result<(Campaign, Vec<Note>), CampaignError> {
-        let loaded: Vec<Result<Loaded, CampaignError>> =
-            self.runs.par_iter().map(|entry| samples::load(entry, true)).collect();
+        let loaded: Vec<Result<Loaded, CampaignError>> = self
+            .runs
+            .par_iter()
+            .map(|entry| samples::load(entry, true))
+            .collect();
         let mut together = Together::new(self);
         let mut runs = Vec::with_capacity(loaded.len());
         let mut notes = self.notes.clone();
@@ -43,7 +46,14 @@ impl Manifest {
             runs.push(loaded.run);
         }
         together.check()?;
-        Ok((Campaign { name: self.name.clone(), machine: self.machine.clone(), runs }, notes))
+        Ok((
+            Campaign {
+                name: self.name.clone(),
+                machine: self.machine.clone(),
+                runs,
+            },
+            notes,
+        ))
     }
 
     /// Reads and checks run `index` without keeping its time stamps. What only shows across runs is for
@@ -75,13 +85,18 @@ struct Seen {
 impl<'a> Together<'a> {
     /// For the runs of this campaign.
     pub fn new(manifest: &'a Manifest) -> Self {
-        Self { manifest, seen: Vec::with_capacity(manifest.runs.len()) }
+        Self {
+            manifest,
+            seen: Vec::with_capacity(manifest.runs.len()),
+        }
     }
 
     /// Takes note of run `index`.
     pub fn add(&mut self, index: usize, loaded: &Loaded) {
         let run = &loaded.run;
-        let slow = loaded.turn_s.map(|turn| (turn, turn / (TAU * run.radius_m / run.feed_m_s)));
+        let slow = loaded
+            .turn_s
+            .map(|turn| (turn, turn / (TAU * run.radius_m / run.feed_m_s)));
         let seen = Seen {
             fingerprint: loaded.fingerprint,
             laps: loaded.laps,
@@ -97,7 +112,9 @@ impl<'a> Together<'a> {
         self.seen.sort_by_key(|(index, _)| *index);
         // A controller that slows down does so by degrees; a file of two laps lasts exactly two.
         let by_degrees = self.seen.iter().any(|(_, s)| {
-            s.slow.is_some_and(|(_, ratio)| ratio > 1.05 && (ratio / ratio.round() - 1.0).abs() > 0.05)
+            s.slow.is_some_and(|(_, ratio)| {
+                ratio > 1.05 && (ratio / ratio.round() - 1.0).abs() > 0.05
+            })
         });
         let mut known: HashMap<u64, usize> = HashMap::new();
         for (index, seen) in &self.seen {
@@ -105,10 +122,15 @@ impl<'a> Together<'a> {
             if let (Some(laps), Some((turn_s, _)), false) = (seen.laps, seen.slow, by_degrees) {
                 return Err(check::several_laps(entry, turn_s, seen.rows, laps));
             }
-            let Some(print) = seen.fingerprint else { continue };
+            let Some(print) = seen.fingerprint else {
+                continue;
+            };
             if let Some(first) = known.insert(print, *index) {
                 let other = self.manifest.runs[first].file.clone();
-                return Err(CampaignError::new(entry.row(0), Problem::DuplicateData { other }));
+                return Err(CampaignError::new(
+                    entry.row(0),
+                    Problem::DuplicateData { other },
+                ));
             }
         }
         Ok(())

@@ -35,7 +35,11 @@ impl Entry {
 
     /// The place of a row.
     pub(super) fn row(&self, row: usize) -> Place {
-        Place::at(&self.path, self.slice.as_ref().map_or(row + 2, |slice| slice.line(row)), 1)
+        Place::at(
+            &self.path,
+            self.slice.as_ref().map_or(row + 2, |slice| slice.line(row)),
+            1,
+        )
     }
 }
 
@@ -49,7 +53,11 @@ impl<'a> RunFile<'a> {
 
     pub(super) fn fields(&self) -> Vec<Field> {
         match self {
-            Self::Own(table) => table.header.iter().map(|&column| Field::own(column)).collect(),
+            Self::Own(table) => table
+                .header
+                .iter()
+                .map(|&column| Field::own(column))
+                .collect(),
             Self::Foreign(_, slice) => slice.quantities().into_iter().map(Field::foreign).collect(),
         }
     }
@@ -86,7 +94,11 @@ impl Field {
             Column::Radius => (Quantity::Radius, MM),
             Column::Position(axis) => (Quantity::Position(axis), MM),
         };
-        Self { quantity, factor, name: column.name() }
+        Self {
+            quantity,
+            factor,
+            name: column.name(),
+        }
     }
 
     fn foreign(quantity: Quantity) -> Self {
@@ -97,6 +109,10 @@ impl Field {
             Quantity::Radius => "radius_mm",
             Quantity::Position(_) | Quantity::Target(_) => "a position",
         };
-        Self { quantity, factor: 1.0, name }
+        Self {
+            quantity,
+            factor: 1.0,
+            name,
+        }
     }
 }

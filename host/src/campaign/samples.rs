@@ -82,19 +82,27 @@ struct Part {
 impl Rows {
     fn take(&mut self, part: Part, keep_time: bool) {
         let mut time = part.time;
-        time.chunks_mut(STAMPS).for_each(|stamps| self.stamps.take(stamps));
+        time.chunks_mut(STAMPS)
+            .for_each(|stamps| self.stamps.take(stamps));
         if keep_time {
             append(&mut self.time, time);
         }
         append(&mut self.first, part.first);
         append(&mut self.second, part.second);
-        self.heights = [self.heights[0].min(part.heights[0]), self.heights[1].max(part.heights[1])];
+        self.heights = [
+            self.heights[0].min(part.heights[0]),
+            self.heights[1].max(part.heights[1]),
+        ];
     }
 }
 
 /// Adds numbers behind others; those that come at once are not copied.
 fn append(numbers: &mut Vec<f64>, more: Vec<f64>) {
-    if numbers.capacity() > 0 { numbers.extend_from_slice(&more) } else { *numbers = more }
+    if numbers.capacity() > 0 {
+        numbers.extend_from_slice(&more)
+    } else {
+        *numbers = more
+    }
 }
 
 /// Reads and checks one run. Of its rows the angle and the deviation (or x and y) are kept, and the time only if it is wanted
@@ -109,7 +117,12 @@ pub(super) fn load(entry: &Entry, keep_time: bool) -> Result<Loaded, CampaignErr
     let position = [0, 1, 2].map(|axis| index(&|q| q == Quantity::Position(axis)));
     let xy = position[0].zip(position[1]);
     let no_circle = |e: CircleError, field: usize| {
-        CampaignError::new(entry.place(0, field), Problem::NoCircle { reason: e.to_string() })
+        CampaignError::new(
+            entry.place(0, field),
+            Problem::NoCircle {
+                reason: e.to_string(),
+            },
+        )
     };
     let mut plane = None;
     if let ([Some(x), Some(y), Some(z)], true) = (position, xy.is_some()) {
@@ -117,7 +130,10 @@ pub(super) fn load(entry: &Entry, keep_time: bool) -> Result<Loaded, CampaignErr
         if scatter.count < FEWEST {
             return Err(too_few(entry, scatter.count));
         }
-        plane = Some((PlaneView::through(&scatter).map_err(|e| no_circle(e, x))?, z));
+        plane = Some((
+            PlaneView::through(&scatter).map_err(|e| no_circle(e, x))?,
+            z,
+        ));
     }
     // Without angles the time becomes the angle.
     let polar_by_time = xy.is_none() && angle_field.is_none();
@@ -128,9 +144,14 @@ pub(super) fn load(entry: &Entry, keep_time: bool) -> Result<Loaded, CampaignErr
     };
     let mut rows = Rows::default();
     let expected = file.rows().unwrap_or(0);
-    rows.first.reserve_exact(if polar_by_time { 0 } else { expected });
+    rows.first
+        .reserve_exact(if polar_by_time { 0 } else { expected });
     rows.second.reserve_exact(expected);
-    rows.time.reserve_exact(if keep && time_field.is_some() { expected } else { 0 });
+    rows.time.reserve_exact(if keep && time_field.is_some() {
+        expected
+    } else {
+        0
+    });
     let prepare = |batch: Batch| {
         let mut columns = batch.columns;
         let mut column =
@@ -156,7 +177,12 @@ pub(super) fn load(entry: &Entry, keep_time: bool) -> Result<Loaded, CampaignErr
                 (column(angle_field), deviation)
             }
         };
-        Part { time, first, second, heights }
+        Part {
+            time,
+            first,
+            second,
+            heights,
+        }
     };
     file.walk(prepare, |part| {
         rows.take(part, keep);
@@ -194,7 +220,12 @@ pub(super) fn load(entry: &Entry, keep_time: bool) -> Result<Loaded, CampaignErr
     let noise_m = if let Some((x, _)) = xy {
         let plane = plane.map(|(view, _)| view.with_heights(rows.heights));
         frame = Some(polar(entry, x, &mut run.samples, plane, &no_circle)?);
-        check::deviation(entry, &run.samples.deviation_m, x, "the distance from the circle")?
+        check::deviation(
+            entry,
+            &run.samples.deviation_m,
+            x,
+            "the distance from the circle",
+        )?
     } else if let Some(field) = radial_field {
         if let (Some((clock, ..)), true) = (&clock, polar_by_time) {
             check::slowness(entry, clock.turn_s)?; // a wrong radius explains more than a wrong deviation
@@ -217,7 +248,9 @@ pub(super) fn load(entry: &Entry, keep_time: bool) -> Result<Loaded, CampaignErr
             run.samples.angle_rad = time.iter().enumerate().map(|(k, t)| angle(k, *t)).collect();
             kept = Some(time);
         } else {
-            time.iter_mut().enumerate().for_each(|(k, t)| *t = angle(k, *t));
+            time.iter_mut()
+                .enumerate()
+                .for_each(|(k, t)| *t = angle(k, *t));
             run.samples.angle_rad = time;
         }
         run.samples.angle_inferred = true;
@@ -228,7 +261,13 @@ pub(super) fn load(entry: &Entry, keep_time: bool) -> Result<Loaded, CampaignErr
     if !unwrapped(&run.samples.angle_rad) {
         unwrap(&mut run.samples.angle_rad);
     }
-    check::angles(entry, &run.samples.angle_rad, field, &mut covered, &mut notes)?;
+    check::angles(
+        entry,
+        &run.samples.angle_rad,
+        field,
+        &mut covered,
+        &mut notes,
+    )?;
     run.start_angle_rad = run.samples.angle_rad[0];
     let mut turn_s = None;
     if let Some((clock, time, _)) = clock {
@@ -241,8 +280,18 @@ pub(super) fn load(entry: &Entry, keep_time: bool) -> Result<Loaded, CampaignErr
 }
 
 fn too_few(entry: &Entry, found: usize) -> CampaignError {
-    let at = if found == 0 { Place::at(&entry.path, 1, 1) } else { entry.row(found - 1) };
-    CampaignError::new(at, Problem::TooFew { found, expected: FEWEST })
+    let at = if found == 0 {
+        Place::at(&entry.path, 1, 1)
+    } else {
+        entry.row(found - 1)
+    };
+    CampaignError::new(
+        at,
+        Problem::TooFew {
+            found,
+            expected: FEWEST,
+        },
+    )
 }
 
 /// Moments of the points of a run in space: a walk over the file of its own, unless an import has taken them already.
@@ -274,15 +323,33 @@ fn finish(
     let fingerprint = check::fingerprint(&run.samples.deviation_m, noise_m);
     run.samples.time_s = time;
     let rows = run.samples.deviation_m.len();
-    Loaded { rows, clocked: turn_s.is_some(), run, frame, turn_s, notes, laps, fingerprint }
+    Loaded {
+        rows,
+        clocked: turn_s.is_some(),
+        run,
+        frame,
+        turn_s,
+        notes,
+        laps,
+        fingerprint,
+    }
 }
 
 /// The angle of sample `k` at time `t`: one turn of evenly spaced samples, whatever the rounding of the stamps; by the
 /// stamps themselves where samples were lost.
 fn inferred_angle(entry: &Entry, clock: &Clock, rows: usize) -> impl Fn(usize, f64) -> f64 {
-    let (start, d) = (entry.start_angle_rad.unwrap_or(0.0), f64::from(entry.direction.sign()));
+    let (start, d) = (
+        entry.start_angle_rad.unwrap_or(0.0),
+        f64::from(entry.direction.sign()),
+    );
     let (n, rate, whole) = (rows as f64, d * TAU / clock.turn_s, clock.gap.is_none());
-    move |k, t| if whole { start + d * TAU * k as f64 / n } else { start + rate * t }
+    move |k, t| {
+        if whole {
+            start + d * TAU * k as f64 / n
+        } else {
+            start + rate * t
+        }
+    }
 }
 
 /// Points (x as angle, y as deviation) into polar samples about their least-squares circle, in place.
@@ -305,16 +372,24 @@ fn polar(
         };
         return Err(CampaignError::new(entry.place(0, field), problem));
     }
-    x.par_chunks_mut(1 << 16).zip(y.par_chunks_mut(1 << 16)).for_each(|(x, y)| {
-        for (x, y) in x.iter_mut().zip(y) {
-            let (dx, dy) = (*x - centre[0], *y - centre[1]);
-            *x = dy.atan2(dx);
-            *y = dx.hypot(dy) - entry.radius_m;
-        }
-    });
+    x.par_chunks_mut(1 << 16)
+        .zip(y.par_chunks_mut(1 << 16))
+        .for_each(|(x, y)| {
+            for (x, y) in x.iter_mut().zip(y) {
+                let (dx, dy) = (*x - centre[0], *y - centre[1]);
+                *x = dy.atan2(dx);
+                *y = dx.hypot(dy) - entry.radius_m;
+            }
+        });
     Ok(match plane {
-        None => Frame { origin_m: [centre[0], centre[1], 0.0], plane: None },
-        Some(view) => Frame { origin_m: view.lift(centre), plane: Some(view.tilt()) },
+        None => Frame {
+            origin_m: [centre[0], centre[1], 0.0],
+            plane: None,
+        },
+        Some(view) => Frame {
+            origin_m: view.lift(centre),
+            plane: Some(view.tilt()),
+        },
     })
 }
 
@@ -328,9 +403,15 @@ struct PlaneView {
 impl PlaneView {
     fn through(scatter: &Scatter) -> Result<Self, CircleError> {
         let plane = Plane::through(scatter)?;
-        let largest =
-            plane.normal.iter().copied().fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
-        Ok(Self { plane, flip: largest.signum() })
+        let largest = plane
+            .normal
+            .iter()
+            .copied()
+            .fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
+        Ok(Self {
+            plane,
+            flip: largest.signum(),
+        })
     }
 
     fn with_heights(mut self, [lowest, highest]: [f64; 2]) -> Self {
@@ -351,7 +432,11 @@ impl PlaneView {
         let normal = self.plane.normal.map(|c| c * self.flip);
         let axis = normal.iter().copied().fold(0.0, f64::max);
         let across = normal.iter().map(|c| c * c).sum::<f64>() - axis * axis;
-        Tilt { normal, tilt_rad: across.max(0.0).sqrt().atan2(axis), flatness_m: self.plane.flatness }
+        Tilt {
+            normal,
+            tilt_rad: across.max(0.0).sqrt().atan2(axis),
+            flatness_m: self.plane.flatness,
+        }
     }
 }
 

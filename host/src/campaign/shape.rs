@@ -4,7 +4,17 @@
 const EACH: u64 = 0x0101_0101_0101_0101;
 const ALL: u128 = u128::MAX / 0xFF;
 /// 10⁰ … 10⁸, exact.
-const TENS: [u32; 9] = [1, 10, 100, 1000, 10_000, 100_000, 1_000_000, 10_000_000, 100_000_000];
+const TENS: [u32; 9] = [
+    1,
+    10,
+    100,
+    1000,
+    10_000,
+    100_000,
+    1_000_000,
+    10_000_000,
+    100_000_000,
+];
 
 /// Where sign, digits, point and end of a field stand.
 #[derive(Clone, Copy, Debug)]
@@ -37,7 +47,12 @@ impl Shape {
     pub(super) fn of(field: &[u8]) -> Option<Self> {
         let mut window = [0; 16];
         window.get_mut(..field.len())?.copy_from_slice(field);
-        let digits = |from: usize| window[from..].iter().take_while(|b| b.is_ascii_digit()).count();
+        let digits = |from: usize| {
+            window[from..]
+                .iter()
+                .take_while(|b| b.is_ascii_digit())
+                .count()
+        };
         let sign = usize::from(window[0] == b'-');
         let whole = digits(sign);
         let point = sign + whole;
@@ -45,7 +60,9 @@ impl Shape {
             return None;
         }
         let decimals = digits(point + 1);
-        if !(1..=8).contains(&decimals) || !matches!(&field[point + 1 + decimals..], b"," | b"\n" | b"\r\n") {
+        if !(1..=8).contains(&decimals)
+            || !matches!(&field[point + 1 + decimals..], b"," | b"\n" | b"\r\n")
+        {
             return None;
         }
         let range = |from: usize, n: usize| ((1_u128 << (8 * n)) - 1) << (8 * from);
@@ -54,14 +71,25 @@ impl Shape {
         Some(Self {
             text: words(u128::from_le_bytes(window) & !of_digits | (0x30 * ALL) & of_digits),
             limit: words((0x7F * ALL) & !of_digits | (0x76 * ALL) & of_digits),
-            bytes: words((0x80 * ALL) & if field.len() < 16 { range(0, field.len()) } else { u128::MAX }),
+            bytes: words(
+                (0x80 * ALL)
+                    & if field.len() < 16 {
+                        range(0, field.len())
+                    } else {
+                        u128::MAX
+                    },
+            ),
             sign: (sign as u64) << 63,
             before: 8 * sign as u32,
             spare: 64 - 8 * whole as u32,
             decimals_at: point + 1,
             decimals: 8 * decimals as u32,
             tens: f64::from(TENS[decimals]),
-            carry: if whole + decimals <= 8 { 0 } else { u64::from(TENS[decimals]) },
+            carry: if whole + decimals <= 8 {
+                0
+            } else {
+                u64::from(TENS[decimals])
+            },
             length: field.len(),
         })
     }
@@ -72,7 +100,8 @@ impl Shape {
         let window: &[u8; 24] = text.get(at..)?.first_chunk()?;
         let word = |k: usize| u64::from_le_bytes(std::array::from_fn(|byte| window[k + byte]));
         let difference = [word(0) ^ self.text[0], word(8) ^ self.text[1]];
-        let misfit = |k: usize| (difference[k].wrapping_add(self.limit[k]) | difference[k]) & self.bytes[k];
+        let misfit =
+            |k: usize| (difference[k].wrapping_add(self.limit[k]) | difference[k]) & self.bytes[k];
         if misfit(0) | misfit(1) != 0 {
             return None;
         }
@@ -86,7 +115,10 @@ impl Shape {
         };
         // No more than fifteen digits: exact, as the power of ten is; one rounding, by the division.
         let value = digits as i64 as f64 / self.tens;
-        Some((f64::from_bits(value.to_bits() | self.sign), at + self.length))
+        Some((
+            f64::from_bits(value.to_bits() | self.sign),
+            at + self.length,
+        ))
     }
 }
 

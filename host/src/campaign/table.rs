@@ -85,19 +85,37 @@ impl Table {
         if path.is_dir() {
             return Err(CampaignError::new(
                 Place::file(path),
-                Problem::IsDirectory { expected: EXPECTED_RUN },
+                Problem::IsDirectory {
+                    expected: EXPECTED_RUN,
+                },
             ));
         }
         let mut text = Text::open(std::fs::File::open(path).map_err(io)?).map_err(io)?;
         let head = text.head();
         if head.is_empty() {
-            return Err(CampaignError::new(Place::file(path), Problem::Empty { expected: EXPECTED_RUN }));
+            return Err(CampaignError::new(
+                Place::file(path),
+                Problem::Empty {
+                    expected: EXPECTED_RUN,
+                },
+            ));
         }
-        let start = if head.starts_with(b"\xEF\xBB\xBF") { 3 } else { 0 };
-        let end = head[start..].iter().position(|&b| b == b'\n').map_or(head.len(), |p| start + p);
+        let start = if head.starts_with(b"\xEF\xBB\xBF") {
+            3
+        } else {
+            0
+        };
+        let end = head[start..]
+            .iter()
+            .position(|&b| b == b'\n')
+            .map_or(head.len(), |p| start + p);
         let header = parse_header(path, &head[start..end])?;
         text.skip(end + 1);
-        Ok(Self { path: path.to_path_buf(), header, text })
+        Ok(Self {
+            path: path.to_path_buf(),
+            header,
+            text,
+        })
     }
 
     /// Rows to expect, unless they come at once.
@@ -119,7 +137,12 @@ impl Table {
             let parsed = parse_block(block, factors).map_err(|line| at + line as u64)?;
             let blank = parsed.blank_at.map(|blank| at + blank as u64);
             let rows = parsed.rows;
-            let prepared = (rows > 0).then(|| prepare(Batch { columns: parsed.columns, rows }));
+            let prepared = (rows > 0).then(|| {
+                prepare(Batch {
+                    columns: parsed.columns,
+                    rows,
+                })
+            });
             Ok((blank, prepared))
         };
         let walked = self.text.walk(parse, |result: Result<_, u64>| {
@@ -162,35 +185,71 @@ fn parse_header(path: &Path, line: &[u8]) -> Result<Vec<Column>, CampaignError> 
     let Ok(line) = std::str::from_utf8(line) else {
         let at = std::str::from_utf8(line).map_or_else(|e| e.valid_up_to(), |_| 0);
         let column = String::from_utf8_lossy(&line[..at]).chars().count() + 1;
-        return err(column, Problem::NotUtf8 { expected: EXPECTED_RUN });
+        return err(
+            column,
+            Problem::NotUtf8 {
+                expected: EXPECTED_RUN,
+            },
+        );
     };
     let line = line.trim_end_matches('\r');
     if line.trim().is_empty() {
-        return err(1, Problem::Header { found: String::new() });
+        return err(
+            1,
+            Problem::Header {
+                found: String::new(),
+            },
+        );
     }
     let mut header = Vec::new();
     let mut column = 1;
     for name in line.split(',') {
         match Column::parse(name.trim()) {
             Some(c) if header.contains(&c) => {
-                return err(column, Problem::DuplicateColumn { name: name.trim().to_owned() });
+                return err(
+                    column,
+                    Problem::DuplicateColumn {
+                        name: name.trim().to_owned(),
+                    },
+                );
             }
             Some(c) => header.push(c),
-            None if line.contains(';') => return err(line.find(';').unwrap_or(0) + 1, Problem::Semicolons),
+            None if line.contains(';') => {
+                return err(line.find(';').unwrap_or(0) + 1, Problem::Semicolons);
+            }
             None if line.split(',').all(|f| f.trim().parse::<f64>().is_ok()) => {
                 return err(1, Problem::NoHeader);
             }
-            None => return err(column, Problem::Header { found: shorten(line) }),
+            None => {
+                return err(
+                    column,
+                    Problem::Header {
+                        found: shorten(line),
+                    },
+                );
+            }
         }
         column += name.chars().count() + 1;
     }
     let has = |c: Column| header.contains(&c);
-    let radial = header.iter().filter(|c| matches!(c, Column::Deviation(_) | Column::Radius)).count();
-    let positions = header.iter().filter(|c| matches!(c, Column::Position(_))).count();
+    let radial = header
+        .iter()
+        .filter(|c| matches!(c, Column::Deviation(_) | Column::Radius))
+        .count();
+    let positions = header
+        .iter()
+        .filter(|c| matches!(c, Column::Position(_)))
+        .count();
     let polar = radial == 1 && positions == 0 && (has(Column::Time) || has(Column::Angle));
-    let planar = radial == 0 && !has(Column::Angle) && has(Column::Position(0)) && has(Column::Position(1));
+    let planar =
+        radial == 0 && !has(Column::Angle) && has(Column::Position(0)) && has(Column::Position(1));
     if !(polar || planar) {
-        return err(1, Problem::Header { found: shorten(line) });
+        return err(
+            1,
+            Problem::Header {
+                found: shorten(line),
+            },
+        );
     }
     Ok(header)
 }
@@ -228,13 +287,20 @@ fn parse_block(bytes: &[u8], factors: &[f64]) -> Result<Parsed, usize> {
     let width = factors.len();
     // The last line may have no end.
     let lines = memchr::memchr_iter(b'\n', bytes).count() + 1;
-    let new = |&factor: &f64| Growing { values: Vec::with_capacity(lines), shape: None, factor };
+    let new = |&factor: &f64| Growing {
+        values: Vec::with_capacity(lines),
+        shape: None,
+        factor,
+    };
     let mut columns: Vec<Growing> = factors.iter().map(new).collect();
     let (mut at, mut rows, mut blank_at) = (0, 0, None);
     'rows: while at < bytes.len() {
         let line = at;
         for (field, column) in columns.iter_mut().enumerate() {
-            let like_above = column.shape.as_ref().and_then(|shape| shape.read(bytes, at));
+            let like_above = column
+                .shape
+                .as_ref()
+                .and_then(|shape| shape.read(bytes, at));
             if let Some((value, next)) = like_above {
                 column.values.push(value * column.factor);
                 at = next;
@@ -252,7 +318,11 @@ fn parse_block(bytes: &[u8], factors: &[f64]) -> Result<Parsed, usize> {
         }
         rows += 1;
     }
-    Ok(Parsed { columns: columns.into_iter().map(|column| column.values).collect(), rows, blank_at })
+    Ok(Parsed {
+        columns: columns.into_iter().map(|column| column.values).collect(),
+        rows,
+        blank_at,
+    })
 }
 
 /// A field of any shape into its column; the byte behind its end.
@@ -267,18 +337,24 @@ fn parse_unlike(column: &mut Growing, bytes: &[u8], at: usize, last: bool) -> Op
 /// Whether the line at `at` is empty.
 fn is_blank(bytes: &[u8], at: usize) -> bool {
     matches!(bytes[at], b'\n' | b'\r' | b' ' | b'\t')
-        && bytes[at..].iter().take_while(|b| **b != b'\n').all(u8::is_ascii_whitespace)
+        && bytes[at..]
+            .iter()
+            .take_while(|b| **b != b'\n')
+            .all(u8::is_ascii_whitespace)
 }
 
 /// A finite number with blanks around it, and the byte behind the end of its field.
 fn parse_field(bytes: &[u8], at: usize, last: bool) -> Option<(f64, usize)> {
     let at = skip_blanks(bytes, at);
-    let (value, used) = decimal::parse(&bytes[at..], b'.').filter(|(value, _)| value.is_finite())?;
+    let (value, used) =
+        decimal::parse(&bytes[at..], b'.').filter(|(value, _)| value.is_finite())?;
     let end = skip_blanks(bytes, at + used);
     let next = match bytes.get(end) {
         Some(b',') if !last => end + 1,
         Some(b'\n') if last => end + 1,
-        Some(b'\r') if last && bytes.get(end + 1).is_none_or(|&b| b == b'\n') => bytes.len().min(end + 2),
+        Some(b'\r') if last && bytes.get(end + 1).is_none_or(|&b| b == b'\n') => {
+            bytes.len().min(end + 2)
+        }
         None if last => end,
         _ => return None,
     };
@@ -328,8 +404,16 @@ fn explain_line(header: &[Column], line: &[u8]) -> (usize, Problem) {
     let line = match std::str::from_utf8(line) {
         Ok(text) => text.trim_end_matches(['\n', '\r']),
         Err(e) => {
-            let column = String::from_utf8_lossy(&line[..e.valid_up_to()]).chars().count() + 1;
-            return (column, Problem::NotUtf8 { expected: "numbers" });
+            let column = String::from_utf8_lossy(&line[..e.valid_up_to()])
+                .chars()
+                .count()
+                + 1;
+            return (
+                column,
+                Problem::NotUtf8 {
+                    expected: "numbers",
+                },
+            );
         }
     };
     if line.trim().is_empty() {
@@ -344,8 +428,12 @@ fn explain_line(header: &[Column], line: &[u8]) -> (usize, Problem) {
         let here = column + text.chars().take_while(|c| c.is_whitespace()).count();
         if field >= expected {
             // `0,00125,-179,7`: every field an integer part or digits of a fraction.
-            let digits =
-                |f: &&str| f.trim().trim_start_matches(['-', '+']).bytes().all(|b| b.is_ascii_digit());
+            let digits = |f: &&str| {
+                f.trim()
+                    .trim_start_matches(['-', '+'])
+                    .bytes()
+                    .all(|b| b.is_ascii_digit())
+            };
             let comma = found == 2 * expected && fields.iter().all(digits);
             let problem = if comma {
                 Problem::DecimalComma {
@@ -360,14 +448,33 @@ fn explain_line(header: &[Column], line: &[u8]) -> (usize, Problem) {
         }
         match fast_float2::parse::<f64, _>(value) {
             Ok(v) if v.is_finite() => {}
-            Ok(_) => return (here, Problem::NotFinite { text: value.to_owned(), column: name }),
+            Ok(_) => {
+                return (
+                    here,
+                    Problem::NotFinite {
+                        text: value.to_owned(),
+                        column: name,
+                    },
+                );
+            }
             Err(_) if value.is_empty() && found == expected => {
                 return (here, Problem::EmptyField { column: name });
             }
             Err(_) if value.contains(';') => return (column, Problem::Semicolons),
-            Err(_) => return (here, Problem::NotANumber { text: shorten(value), column: name }),
+            Err(_) => {
+                return (
+                    here,
+                    Problem::NotANumber {
+                        text: shorten(value),
+                        column: name,
+                    },
+                );
+            }
         }
         column += text.chars().count() + 1;
     }
-    (column.saturating_sub(1), Problem::Ragged { found, expected })
+    (
+        column.saturating_sub(1),
+        Problem::Ragged { found, expected },
+    )
 }

@@ -57,17 +57,27 @@ fn what_is_written_is_read_back() {
     write(&campaign, dir.path()).unwrap();
     let (read, notes) = read_with_notes(dir.path()).unwrap();
     assert!(notes.is_empty(), "{notes:?}");
-    assert_eq!((&read.name, &read.machine), (&campaign.name, &campaign.machine));
+    assert_eq!(
+        (&read.name, &read.machine),
+        (&campaign.name, &campaign.machine)
+    );
     for (a, b) in campaign.runs.iter().zip(&read.runs) {
         close(&a.samples.deviation_m, &b.samples.deviation_m, 1e-13);
         close(&a.samples.angle_rad, &b.samples.angle_rad, 1e-12);
-        close(a.samples.time_s.as_ref().unwrap(), b.samples.time_s.as_ref().unwrap(), 1e-9);
+        close(
+            a.samples.time_s.as_ref().unwrap(),
+            b.samples.time_s.as_ref().unwrap(),
+            1e-9,
+        );
         assert!(b.samples.angle_inferred);
         assert_eq!(
             (&a.file, a.radius_m, a.feed_m_s, a.direction),
             (&b.file, b.radius_m, b.feed_m_s, b.direction)
         );
-        assert_eq!((a.started_s, a.temperature_c, a.centre_m), (b.started_s, b.temperature_c, b.centre_m));
+        assert_eq!(
+            (a.started_s, a.temperature_c, a.centre_m),
+            (b.started_s, b.temperature_c, b.centre_m)
+        );
         assert!((b.turn_s().unwrap() / turn - 1.0).abs() < 1e-9);
     }
 }
@@ -81,8 +91,17 @@ fn measured_angles_and_points_survive_a_round_trip() {
     polar.samples.time_s = None;
     points.file = "points.csv".into();
     // Points are taken about their own centre: leave the set-up offset out.
-    points.samples.deviation_m = points.samples.angle_rad.iter().map(|a| 1e-5 * (2.0 * a).cos()).collect();
-    let campaign = Campaign { name: "c".into(), machine: "m".into(), runs: vec![polar, points] };
+    points.samples.deviation_m = points
+        .samples
+        .angle_rad
+        .iter()
+        .map(|a| 1e-5 * (2.0 * a).cos())
+        .collect();
+    let campaign = Campaign {
+        name: "c".into(),
+        machine: "m".into(),
+        runs: vec![polar, points],
+    };
     write(&campaign, dir.path()).unwrap();
     let read = read(dir.path()).unwrap();
     for (a, b) in campaign.runs.iter().zip(&read.runs) {
@@ -103,9 +122,17 @@ fn angles_come_from_the_order_of_samples_and_not_from_rounded_stamps() {
     let mut csv = String::from("time_s,deviation_um\r\n");
     for k in 0..n {
         let t = (turn * k as f64 / n as f64 / tick).round() * tick;
-        csv += &format!("{:.5},{:.1}\r\n", 7.0 + t, 40.0 * (TAU * k as f64 / n as f64).cos());
+        csv += &format!(
+            "{:.5},{:.1}\r\n",
+            7.0 + t,
+            40.0 * (TAU * k as f64 / n as f64).cos()
+        );
     }
-    write_raw(dir.path(), &format!("{ONE}start_angle_deg = 90\n"), &[("a.csv", &csv)]);
+    write_raw(
+        dir.path(),
+        &format!("{ONE}start_angle_deg = 90\n"),
+        &[("a.csv", &csv)],
+    );
     let run = &read(dir.path()).unwrap().runs[0];
     for (k, a) in run.samples.angle_rad.iter().enumerate() {
         assert!((a - (PI / 2.0 - TAU * k as f64 / n as f64)).abs() < 1e-12);
@@ -121,7 +148,11 @@ fn lost_samples_are_noted_and_angles_follow_the_stamps() {
     let kept = |k: &usize| !(300..320).contains(k);
     let mut csv = String::from("time_s,deviation_um\n");
     for k in (0..n).filter(kept) {
-        csv += &format!("{:.5},{:.1}\n", PI * k as f64 / n as f64, 40.0 * (TAU * k as f64 / n as f64).cos());
+        csv += &format!(
+            "{:.5},{:.1}\n",
+            PI * k as f64 / n as f64,
+            40.0 * (TAU * k as f64 / n as f64).cos()
+        );
     }
     write_raw(dir.path(), ONE, &[("a.csv", &csv)]);
     let (campaign, notes) = read_with_notes(dir.path()).unwrap();
@@ -163,7 +194,13 @@ fn points_in_space_are_seen_from_the_positive_axis() {
 fn a_long_file_is_read_in_pieces_and_its_faults_found() {
     let dir = tempfile::tempdir().unwrap();
     let n = 300_000; // several blocks
-    let line = |k: usize| format!("{:.6},{:.1}\n", PI * k as f64 / n as f64, (k % 7) as f64 - 30.0);
+    let line = |k: usize| {
+        format!(
+            "{:.6},{:.1}\n",
+            PI * k as f64 / n as f64,
+            (k % 7) as f64 - 30.0
+        )
+    };
     let mut csv = String::from("time_s,deviation_um\n");
     (0..n).for_each(|k| csv += &line(k));
     write_raw(dir.path(), ONE, &[("a.csv", &csv)]);
@@ -177,7 +214,11 @@ fn a_long_file_is_read_in_pieces_and_its_faults_found() {
     csv.replace_range(at..at + 1, "x");
     write_raw(dir.path(), ONE, &[("a.csv", &csv)]);
     let error = read(dir.path()).unwrap_err();
-    assert_eq!((error.at.line, error.at.column), (Some(bad + 2), Some(1)), "{error}");
+    assert_eq!(
+        (error.at.line, error.at.column),
+        (Some(bad + 2), Some(1)),
+        "{error}"
+    );
 }
 
 #[test]
@@ -185,24 +226,41 @@ fn keys_that_look_like_slips_are_refused_and_others_noted() {
     let dir = tempfile::tempdir().unwrap();
     let mut csv = String::from("angle_deg,deviation_mm\n");
     (0..72).for_each(|k| csv += &format!("{},0.01\n", -5 * k));
-    write_raw(dir.path(), &format!("{ONE}operator = \"me\"\n"), &[("a.csv", &csv)]);
+    write_raw(
+        dir.path(),
+        &format!("{ONE}operator = \"me\"\n"),
+        &[("a.csv", &csv)],
+    );
     let (_, notes) = read_with_notes(dir.path()).unwrap();
     assert_eq!(notes.len(), 1);
     assert_eq!((notes[0].at.line, notes[0].at.column), (Some(9), Some(1)));
-    for slip in
-        ["start_angel_deg = 3", "temperature_k = 300", "Radius_mm = 1", "center_mm = [0,0,0]", "started = 1"]
-    {
+    for slip in [
+        "start_angel_deg = 3",
+        "temperature_k = 300",
+        "Radius_mm = 1",
+        "center_mm = [0,0,0]",
+        "started = 1",
+    ] {
         write_raw(dir.path(), &format!("{ONE}{slip}\n"), &[("a.csv", &csv)]);
         let error = read(dir.path()).unwrap_err();
-        assert!(matches!(*error.problem, Problem::UnknownKey { .. }), "{slip}: {error}");
+        assert!(
+            matches!(*error.problem, Problem::UnknownKey { .. }),
+            "{slip}: {error}"
+        );
         assert_eq!(error.at.line, Some(9));
     }
 }
 
 #[test]
 fn open_campaigns_are_read_without_a_note() {
-    let Some(root) = std::env::var_os("GIOTTO_CAMPAIGNS") else { return };
-    for entry in std::fs::read_dir(root).unwrap().flatten().filter(|e| e.path().is_dir()) {
+    let Some(root) = std::env::var_os("GIOTTO_CAMPAIGNS") else {
+        return;
+    };
+    for entry in std::fs::read_dir(root)
+        .unwrap()
+        .flatten()
+        .filter(|e| e.path().is_dir())
+    {
         let (campaign, notes) = read_with_notes(&entry.path()).unwrap();
         assert_eq!(campaign.runs.len(), 78);
         assert!(notes.is_empty(), "{}: {notes:?}", entry.path().display());

@@ -10,7 +10,11 @@ pub(super) struct Thinned<T, const MOST: usize = 65_536> {
 
 impl<T, const MOST: usize> Default for Thinned<T, MOST> {
     fn default() -> Self {
-        Self { values: Vec::new(), stride: 1, pushed: 0 }
+        Self {
+            values: Vec::new(),
+            stride: 1,
+            pushed: 0,
+        }
     }
 }
 
@@ -50,7 +54,10 @@ impl<T: Copy, const MOST: usize> Thinned<T, MOST> {
 
     /// The values kept with their places.
     pub(super) fn iter(&self) -> impl Iterator<Item = (usize, T)> + '_ {
-        self.values.iter().enumerate().map(|(k, v)| (k * self.stride, *v))
+        self.values
+            .iter()
+            .enumerate()
+            .map(|(k, v)| (k * self.stride, *v))
     }
 
     /// The values kept.
@@ -68,13 +75,19 @@ mod tests {
     #[test]
     fn keeps_every_nth_and_knows_which() {
         for n in [1, 5, MOST, MOST + 1, 3 * MOST + 7, 40 * MOST] {
-            let (mut thinned, mut blocks) = (Thinned::<_, MOST>::default(), Thinned::<_, MOST>::default());
+            let (mut thinned, mut blocks) =
+                (Thinned::<_, MOST>::default(), Thinned::<_, MOST>::default());
             (0..n).for_each(|k| thinned.push(k));
-            (0..n).step_by(1000).for_each(|from| blocks.extend(1000.min(n - from), |k| from + k));
+            (0..n)
+                .step_by(1000)
+                .for_each(|from| blocks.extend(1000.min(n - from), |k| from + k));
             assert!(thinned.iter().eq(blocks.iter()));
             assert!(thinned.iter().all(|(place, value)| place == value));
             let kept = thinned.iter().count();
-            assert!(kept <= MOST && (n < MOST || kept > MOST / 2), "{kept} of {n}");
+            assert!(
+                kept <= MOST && (n < MOST || kept > MOST / 2),
+                "{kept} of {n}"
+            );
             let (place, value) = thinned.at(n - 1).unwrap();
             assert!(place == value && value < n && value + 2 * n / MOST + 1 >= n - 1);
         }

@@ -22,11 +22,16 @@ pub fn write(campaign: &Campaign, dir: &Path) -> Result<(), CampaignError> {
         if run.file.is_empty() || !Path::new(&run.file).components().all(plain) {
             return Err(CampaignError::new(
                 Place::file(dir),
-                Problem::OutsideDirectory { file: run.file.clone() },
+                Problem::OutsideDirectory {
+                    file: run.file.clone(),
+                },
             ));
         }
         if !names.insert(run.file.as_str()) {
-            let problem = Problem::DuplicateName { index, file: run.file.clone() };
+            let problem = Problem::DuplicateName {
+                index,
+                file: run.file.clone(),
+            };
             return Err(CampaignError::new(Place::file(dir), problem));
         }
     }
@@ -52,13 +57,17 @@ pub fn write(campaign: &Campaign, dir: &Path) -> Result<(), CampaignError> {
 }
 
 fn make_dir(dir: &Path) -> Result<(), CampaignError> {
-    std::fs::create_dir_all(dir).map_err(|e| CampaignError::io(dir, "made", "a place for a directory", &e))
+    std::fs::create_dir_all(dir)
+        .map_err(|e| CampaignError::io(dir, "made", "a place for a directory", &e))
 }
 
 /// Writes a file whole or not at all.
 pub(crate) fn replace(path: &Path, text: &str) -> Result<(), CampaignError> {
     let io = |e: std::io::Error| CampaignError::io(path, "written", "a place for a file", &e);
-    let dir = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let dir = path
+        .parent()
+        .filter(|p| !p.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
     let mut file = tempfile::NamedTempFile::new_in(dir).map_err(io)?;
     file.write_all(text.as_bytes()).map_err(io)?;
     make_public(file.as_file()).map_err(io)?;
@@ -96,7 +105,12 @@ fn entry(run: &Run) -> Table {
         table["temperature_c"] = value(plain(temperature));
     }
     if let Some(centre) = run.centre_m {
-        table["centre_mm"] = value(centre.map(|c| plain(c * 1e3)).into_iter().collect::<toml_edit::Array>());
+        table["centre_mm"] = value(
+            centre
+                .map(|c| plain(c * 1e3))
+                .into_iter()
+                .collect::<toml_edit::Array>(),
+        );
     }
     if let Some(arc) = run.samples.arc_rad() {
         table["arc_deg"] = value((arc.to_degrees() * 1e3).round() / 1e3);

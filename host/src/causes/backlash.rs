@@ -44,11 +44,22 @@ impl CauseModel for Backlash {
         [0.0, 5e-6, 20e-6, 60e-6].map(|play| vec![play]).to_vec()
     }
 
-    fn signature(&self, axis: Option<Axis>, shape: &[f64], _column: usize, view: &RunView, out: &mut [f64]) {
+    fn signature(
+        &self,
+        axis: Option<Axis>,
+        shape: &[f64],
+        _column: usize,
+        view: &RunView,
+        out: &mut [f64],
+    ) {
         let play_m = shape.first().copied().unwrap_or(0.0);
         for (out, Stroke { facing, .. }) in out.iter_mut().zip(view.strokes_of(axis)) {
             let back_m = view.radius_m * (1.0 - facing);
-            let crossed = if play_m > 0.0 { (back_m / play_m).min(1.0) } else { 1.0 };
+            let crossed = if play_m > 0.0 {
+                (back_m / play_m).min(1.0)
+            } else {
+                1.0
+            };
             *out = 0.5e-3 * facing * (2.0 * crossed - 1.0);
         }
     }
@@ -65,6 +76,9 @@ impl CauseModel for Backlash {
     }
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
-        Some(Term::Backlash { axis: effect.axis?, step_m: effect.value * 1e-3 })
+        Some(Term::Backlash {
+            axis: effect.axis?,
+            step_m: effect.value * 1e-3,
+        })
     }
 }

@@ -38,6 +38,8 @@ impl CauseModel for BandwidthMismatch {
     }
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
-        Some(Term::BandwidthMismatch { delta_kappa2_s2: effect.value })
+        Some(Term::BandwidthMismatch {
+            delta_kappa2_s2: effect.value,
+        })
     }
 }

@@ -66,25 +66,47 @@ impl CauseModel for CyclicError {
         2
     }
 
-    fn signature(&self, axis: Option<Axis>, shape: &[f64], column: usize, view: &RunView, out: &mut [f64]) {
+    fn signature(
+        &self,
+        axis: Option<Axis>,
+        shape: &[f64],
+        column: usize,
+        view: &RunView,
+        out: &mut [f64],
+    ) {
         let Some(pitch_m) = shape.first() else { return };
         let wave = std::f64::consts::TAU * view.radius_m / pitch_m;
         let at = usize::from(axis == Some(Axis::Y));
         for (out, direction) in out.iter_mut().zip(view.direction.iter()) {
             let along = direction[at];
-            *out = 1e-6 * along * if column == 0 { (wave * along).sin() } else { (wave * along).cos() };
+            *out = 1e-6
+                * along
+                * if column == 0 {
+                    (wave * along).sin()
+                } else {
+                    (wave * along).cos()
+                };
         }
     }
 
     /// Sine and cosine together, four samples at a time.
-    fn signatures(&self, axis: Option<Axis>, shape: &[f64], view: &RunView, out: &mut [&mut [f64]]) {
-        let (Some(pitch_m), [sines, cosines]) = (shape.first(), out) else { return };
+    fn signatures(
+        &self,
+        axis: Option<Axis>,
+        shape: &[f64],
+        view: &RunView,
+        out: &mut [&mut [f64]],
+    ) {
+        let (Some(pitch_m), [sines, cosines]) = (shape.first(), out) else {
+            return;
+        };
         let wave = std::f64::consts::TAU * view.radius_m / pitch_m;
         let at = usize::from(axis == Some(Axis::Y));
         let outs = sines.chunks_mut(4).zip(cosines.chunks_mut(4));
         for ((sines, cosines), part) in outs.zip(view.direction.chunks(4)) {
-            let along =
-                f64x4::from(std::array::from_fn(|k| part.get(k).map_or(0.0, |direction| direction[at])));
+            let along = f64x4::from(std::array::from_fn(|k| {
+                part.get(k).map_or(0.0, |direction| direction[at])
+            }));
             let (sin, cos) = (along * wave).sin_cos();
             let scaled = along * 1e-6;
             for (k, (sine, cosine)) in sines.iter_mut().zip(cosines).enumerate() {

@@ -14,7 +14,9 @@ const WORDS: Words = Words {
     adjust: "programme speeds that the controller keeps, or raise its limit if the machine allows it",
     never_told_from: &[],
     next: "the duration of the turn, over speeds around the limit",
-    not_compensable: Some("the controller chooses the speed; a table that knows the clamp is valid below it"),
+    not_compensable: Some(
+        "the controller chooses the speed; a table that knows the clamp is valid below it",
+    ),
 };
 
 impl CauseModel for FeedClamp {

@@ -39,7 +39,12 @@ impl Harmonics {
 
     /// Value at an angle.
     pub fn at(&self, angle_rad: f64) -> f64 {
-        let waves = self.0.iter().enumerate().skip(1).filter(|(_, pair)| **pair != [0.0; 2]);
+        let waves = self
+            .0
+            .iter()
+            .enumerate()
+            .skip(1)
+            .filter(|(_, pair)| **pair != [0.0; 2]);
         waves.fold(self.0[0][0], |sum, (order, [c, s])| {
             let (sin, cos) = (order as f64 * angle_rad).sin_cos();
             sum + c * cos + s * sin
@@ -53,9 +58,12 @@ mod tests {
 
     #[test]
     fn a_pattern_is_the_same_seen_from_another_angle() {
-        let pattern = Harmonics::mean(0.3).with(2, [1.0, -0.4]).with(5, [0.0, 2.0]);
+        let pattern = Harmonics::mean(0.3)
+            .with(2, [1.0, -0.4])
+            .with(5, [0.0, 2.0]);
         for angle in [0.0_f64, 0.7, 3.9, -2.0] {
-            let expected = 0.3 + (2.0 * angle).cos() - 0.4 * (2.0 * angle).sin() + 2.0 * (5.0 * angle).sin();
+            let expected =
+                0.3 + (2.0 * angle).cos() - 0.4 * (2.0 * angle).sin() + 2.0 * (5.0 * angle).sin();
             assert!((pattern.at(angle) - expected).abs() < 1e-14);
             assert!((pattern.seen_from(0.6).at(angle + 0.6) - expected).abs() < 1e-14);
         }

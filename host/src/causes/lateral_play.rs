@@ -34,7 +34,14 @@ impl CauseModel for LateralPlay {
         EACH_AXIS
     }
 
-    fn signature(&self, axis: Option<Axis>, _shape: &[f64], _column: usize, view: &RunView, out: &mut [f64]) {
+    fn signature(
+        &self,
+        axis: Option<Axis>,
+        _shape: &[f64],
+        _column: usize,
+        view: &RunView,
+        out: &mut [f64],
+    ) {
         let side = usize::from(axis != Some(Axis::Y));
         for (out, direction) in out.iter_mut().zip(view.direction.iter()) {
             *out = -0.5e-3 * view.sign * direction[side].abs();
@@ -48,6 +55,9 @@ impl CauseModel for LateralPlay {
     }
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
-        Some(Term::LateralPlay { axis: effect.axis?, shift_m: effect.value * 1e-3 })
+        Some(Term::LateralPlay {
+            axis: effect.axis?,
+            shift_m: effect.value * 1e-3,
+        })
     }
 }

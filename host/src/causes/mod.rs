@@ -98,7 +98,9 @@ impl Cause {
 
     /// The cause of this name in files and JSON.
     pub fn from_id(id: &str) -> Option<Self> {
-        ALL.iter().find(|model| model.words().id == id).map(|model| model.cause())
+        ALL.iter()
+            .find(|model| model.words().id == id)
+            .map(|model| model.cause())
     }
 }
 
@@ -200,7 +202,14 @@ pub trait CauseModel: Sync {
     }
 
     /// Radial deviation in m per unit of the contract's value, at each sample of the run.
-    fn signature(&self, axis: Option<Axis>, shape: &[f64], _column: usize, view: &RunView, out: &mut [f64]) {
+    fn signature(
+        &self,
+        axis: Option<Axis>,
+        shape: &[f64],
+        _column: usize,
+        view: &RunView,
+        out: &mut [f64],
+    ) {
         let waves = self.harmonics(axis, shape, view).unwrap_or_default();
         for (out, psi) in out.iter_mut().zip(view.psi_rad.iter()) {
             *out = waves.at(*psi);
@@ -208,7 +217,13 @@ pub trait CauseModel: Sync {
     }
 
     /// All its columns in one go.
-    fn signatures(&self, axis: Option<Axis>, shape: &[f64], view: &RunView, out: &mut [&mut [f64]]) {
+    fn signatures(
+        &self,
+        axis: Option<Axis>,
+        shape: &[f64],
+        view: &RunView,
+        out: &mut [&mut [f64]],
+    ) {
         for (column, out) in out.iter_mut().enumerate() {
             self.signature(axis, shape, column, view, out);
         }

@@ -37,6 +37,8 @@ impl CauseModel for RadiusOffset {
     }
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
-        Some(Term::RadiusOffset { offset_m: effect.value * 1e-3 })
+        Some(Term::RadiusOffset {
+            offset_m: effect.value * 1e-3,
+        })
     }
 }

@@ -62,8 +62,17 @@ impl CauseModel for ReversalSpike {
         shape.iter_mut().for_each(|value| *value = value.abs());
     }
 
-    fn signature(&self, axis: Option<Axis>, shape: &[f64], _column: usize, view: &RunView, out: &mut [f64]) {
-        let &[decay_s, rise_s, presliding_m] = shape else { return };
+    fn signature(
+        &self,
+        axis: Option<Axis>,
+        shape: &[f64],
+        _column: usize,
+        view: &RunView,
+        out: &mut [f64],
+    ) {
+        let &[decay_s, rise_s, presliding_m] = shape else {
+            return;
+        };
         let pulse = Pulse::new(decay_s, rise_s, presliding_m, view);
         let steps_a_half_turn = view.half_turn_s() / pulse.step_s;
         for (out, stroke) in out.iter_mut().zip(view.strokes_of(axis)) {
@@ -128,7 +137,10 @@ impl Pulse {
         let (turn_sin, turn_cos) = (view.omega_rad_s * step_s).sin_cos();
         let (mut sin, mut cos) = (0.0, 1.0);
         for slot in &mut friction_steps {
-            (cos, sin) = (cos * turn_cos - sin * turn_sin, sin * turn_cos + cos * turn_sin);
+            (cos, sin) = (
+                cos * turn_cos - sin * turn_sin,
+                sin * turn_cos + cos * turn_sin,
+            );
             let travel = view.radius_m * (1.0 - cos);
             if travel > SLID * presliding_m {
                 *slot = 1.0 - before;

@@ -38,6 +38,8 @@ impl CauseModel for ScaleError {
     }
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
-        Some(Term::ScaleError { relative: effect.value * 1e-6 })
+        Some(Term::ScaleError {
+            relative: effect.value * 1e-6,
+        })
     }
 }

@@ -38,6 +38,8 @@ impl CauseModel for ScaleMismatch {
     }
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
-        Some(Term::ScaleMismatch { relative: effect.value * 1e-6 })
+        Some(Term::ScaleMismatch {
+            relative: effect.value * 1e-6,
+        })
     }
 }

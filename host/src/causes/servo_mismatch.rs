@@ -61,6 +61,8 @@ impl CauseModel for ServoMismatch {
     }
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
-        Some(Term::ServoMismatch { delta_tau_s: effect.value })
+        Some(Term::ServoMismatch {
+            delta_tau_s: effect.value,
+        })
     }
 }

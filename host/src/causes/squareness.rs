@@ -37,6 +37,8 @@ impl CauseModel for Squareness {
     }
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
-        Some(Term::Squareness { shear_rad: effect.value * 1e-6 })
+        Some(Term::Squareness {
+            shear_rad: effect.value * 1e-6,
+        })
     }
 }

@@ -50,7 +50,10 @@ impl CauseModel for Straightness {
     }
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
-        Some(Term::Straightness { axis: effect.axis?, curvature_per_m: curvature_per_m(effect) })
+        Some(Term::Straightness {
+            axis: effect.axis?,
+            curvature_per_m: curvature_per_m(effect),
+        })
     }
 }
 

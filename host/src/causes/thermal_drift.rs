@@ -34,8 +34,14 @@ impl CauseModel for ThermalDrift {
 
     fn shapes(&self, views: &[RunView]) -> Vec<Vec<f64>> {
         // All runs at one time: nothing can drift.
-        let spread = views.iter().any(|view| (view.elapsed - views[0].elapsed).abs() > 1e-9);
-        if spread { [0.0, 2.0, 5.0].map(|curvature| vec![curvature]).to_vec() } else { Vec::new() }
+        let spread = views
+            .iter()
+            .any(|view| (view.elapsed - views[0].elapsed).abs() > 1e-9);
+        if spread {
+            [0.0, 2.0, 5.0].map(|curvature| vec![curvature]).to_vec()
+        } else {
+            Vec::new()
+        }
     }
 
     fn bend(&self, _which: usize, _value: f64, _travel_m: f64) -> Bend {
@@ -43,7 +49,9 @@ impl CauseModel for ThermalDrift {
     }
 
     fn tidy(&self, shape: &mut [f64]) {
-        shape.iter_mut().for_each(|value| *value = value.clamp(0.0, SETTLED));
+        shape
+            .iter_mut()
+            .for_each(|value| *value = value.clamp(0.0, SETTLED));
     }
 
     fn harmonics(&self, _axis: Option<Axis>, shape: &[f64], view: &RunView) -> Option<Harmonics> {
@@ -55,7 +63,11 @@ impl CauseModel for ThermalDrift {
         let campaign_s = effect.param("campaign_s", 3600.0);
         let settling = effect.param("settling", 0.0);
         // Slope at the start of what reaches `value` at the end of the campaign.
-        let steeper = if settling > 0.0 { 1.0 / (settling * (1.0 - (-1.0 / settling).exp())) } else { 1.0 };
+        let steeper = if settling > 0.0 {
+            1.0 / (settling * (1.0 - (-1.0 / settling).exp()))
+        } else {
+            1.0
+        };
         machine.thermal_per_s = effect.value * 1e-6 * steeper / campaign_s;
         machine.thermal_settling_s = settling * campaign_s;
     }
@@ -66,5 +78,9 @@ const SETTLED: f64 = 5.0;
 
 /// Growth after a share of the campaign, 0 at the start and 1 at its end; what would grow ever faster is taken as linear.
 fn growth(curvature: f64, elapsed: f64) -> f64 {
-    if curvature > 1e-3 { (-curvature * elapsed).exp_m1() / (-curvature).exp_m1() } else { elapsed }
+    if curvature > 1e-3 {
+        (-curvature * elapsed).exp_m1() / (-curvature).exp_m1()
+    } else {
+        elapsed
+    }
 }

@@ -55,7 +55,9 @@ impl RunView {
             .collect();
         self.strokes = [(0, 0.0), (1, std::f64::consts::FRAC_PI_2)].map(|(axis, first_rad)| {
             let strokes = psi_rad.iter().zip(self.direction.iter());
-            strokes.map(|(psi, direction)| self.stroke(psi - first_rad, direction[axis])).collect()
+            strokes
+                .map(|(psi, direction)| self.stroke(psi - first_rad, direction[axis]))
+                .collect()
         });
         self.psi_rad = psi_rad;
     }
@@ -67,7 +69,10 @@ impl RunView {
         let cut = halves as i64;
         let whole = cut - i64::from((cut as f64) > halves);
         let side = if whole % 2 == 0 { 1.0 } else { -1.0 };
-        Stroke { share: halves - whole as f64, facing: side * direction }
+        Stroke {
+            share: halves - whole as f64,
+            facing: side * direction,
+        }
     }
 
     /// Where each sample stands between the reversals of an axis; of X where none is named.
@@ -83,5 +88,7 @@ impl RunView {
 
 /// The axes an effect sits on: the named one, or both.
 pub(super) fn axes_of(effect: &Effect) -> impl Iterator<Item = Axis> {
-    [Axis::X, Axis::Y].into_iter().filter(move |axis| effect.axis.is_none_or(|named| named == *axis))
+    [Axis::X, Axis::Y]
+        .into_iter()
+        .filter(move |axis| effect.axis.is_none_or(|named| named == *axis))
 }

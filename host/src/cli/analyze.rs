@@ -49,9 +49,15 @@ impl From<CampaignError> for Failure {
 
 fn table(header: &[&str]) -> Table {
     let mut table = Table::new();
-    table.load_style(presets::NOTHING).set_header(header.iter().copied());
+    table
+        .load_style(presets::NOTHING)
+        .set_header(header.iter().copied());
     for (k, column) in table.column_iter_mut().enumerate() {
-        column.set_cell_alignment(if k == 0 { CellAlignment::Left } else { CellAlignment::Right });
+        column.set_cell_alignment(if k == 0 {
+            CellAlignment::Left
+        } else {
+            CellAlignment::Right
+        });
     }
     table
 }
@@ -61,7 +67,9 @@ fn um(si: f64) -> String {
 }
 
 fn show(report: &Report, out: Output) {
-    let title = [&report.name, &report.machine].map(String::as_str).join(" — ");
+    let title = [&report.name, &report.machine]
+        .map(String::as_str)
+        .join(" — ");
     out.say(format_args!("{title}: {} runs", report.runs.len()));
     out.say("");
     let mut runs = table(&[
@@ -84,13 +92,21 @@ fn show(report: &Report, out: Output) {
             let found = run.harmonics.iter().find(|h| h.order == order);
             found.map_or_else(|| "–".to_owned(), |h: &Harmonic| um(h.cos_m.hypot(h.sin_m)))
         };
-        let arc = run.arc_rad.map_or_else(String::new, |a| format!(" ({:.0}°)", a.to_degrees()));
+        let arc = run
+            .arc_rad
+            .map_or_else(String::new, |a| format!(" ({:.0}°)", a.to_degrees()));
         runs.add_row([
             format!("{}{arc}", run.file),
             format!("{}", (run.radius_m * 1e6).round() / 1e3),
             format!("{}", (run.feed_m_s * 1e6).round() / 1e3),
-            if run.direction == Direction::Ccw { "ccw" } else { "cw" }.to_owned(),
-            run.measured_feed_m_s.map_or_else(|| "–".to_owned(), |f| format!("{:.1}", f * 1e3)),
+            if run.direction == Direction::Ccw {
+                "ccw"
+            } else {
+                "cw"
+            }
+            .to_owned(),
+            run.measured_feed_m_s
+                .map_or_else(|| "–".to_owned(), |f| format!("{:.1}", f * 1e3)),
             um(run.radius_error_m),
             format!("{:.2}", 1.96 * run.radius_error_se_m * 1e6),
             um(run.out_of_roundness_m),
@@ -105,12 +121,24 @@ fn show(report: &Report, out: Output) {
     for (run, frame) in report.runs.iter().zip(&report.frames) {
         if let Some(plane) = frame.and_then(|f| f.plane) {
             let (tilt, flat) = (plane.tilt_rad.to_degrees(), plane.flatness_m * 1e6);
-            out.say(format_args!("{}: plane tilted by {tilt:.3}°, flat within {flat:.1} µm", run.file));
+            out.say(format_args!(
+                "{}: plane tilted by {tilt:.3}°, flat within {flat:.1} µm",
+                run.file
+            ));
         }
     }
     out.say("");
     out.say("ISO 230-4, µm (G about the least-squares circle, F from the nominal circle as centred, D of both directions)");
-    let mut iso = table(&["R mm", "feed mm/s", "G cw", "G ccw", "G(b)", "F max", "F min", "D"]);
+    let mut iso = table(&[
+        "R mm",
+        "feed mm/s",
+        "G cw",
+        "G ccw",
+        "G(b)",
+        "F max",
+        "F min",
+        "D",
+    ]);
     let maybe = |v: Option<f64>| v.map_or_else(|| "–".to_owned(), um);
     for row in &report.iso230_4 {
         iso.add_row([
@@ -131,22 +159,37 @@ fn show(report: &Report, out: Output) {
 fn beside(report: &Report, ballbar: &Ballbar20, out: Output) {
     let of = |v: &Option<String>| v.clone().unwrap_or_else(|| "?".to_owned());
     out.say("");
-    let (machine, plane, date) = (of(&ballbar.machine), of(&ballbar.plane), of(&ballbar.started));
+    let (machine, plane, date) = (
+        of(&ballbar.machine),
+        of(&ballbar.plane),
+        of(&ballbar.started),
+    );
     out.say(format_args!(
         "Ballbar 20: {machine}, plane {plane}, {date} (its results; its samples are not read)"
     ));
     let pairs = analysis::counterparts(report);
-    let mut header = vec!["result".to_owned(), "unit".to_owned(), "Ballbar 20".to_owned()];
-    header.extend(
-        pairs
-            .iter()
-            .map(|p| format!("R{} f{}", (p.radius_m * 1e6).round() / 1e3, (p.feed_m_s * 1e6).round() / 1e3)),
-    );
+    let mut header = vec![
+        "result".to_owned(),
+        "unit".to_owned(),
+        "Ballbar 20".to_owned(),
+    ];
+    header.extend(pairs.iter().map(|p| {
+        format!(
+            "R{} f{}",
+            (p.radius_m * 1e6).round() / 1e3,
+            (p.feed_m_s * 1e6).round() / 1e3
+        )
+    }));
     let mut rows = table(&header.iter().map(String::as_str).collect::<Vec<_>>());
     for feature in &ballbar.features {
-        let mut row = vec![feature.name.clone(), feature.unit.clone(), format!("{}", feature.value)];
+        let mut row = vec![
+            feature.name.clone(),
+            feature.unit.clone(),
+            format!("{}", feature.value),
+        ];
         row.extend(pairs.iter().map(|p| {
-            p.get(&feature.name, &feature.unit).map_or_else(|| "–".to_owned(), |v| format!("{v:.3}"))
+            p.get(&feature.name, &feature.unit)
+                .map_or_else(|| "–".to_owned(), |v| format!("{v:.3}"))
         }));
         rows.add_row(row);
     }

@@ -27,6 +27,10 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     if out.json {
         return out.document(&json!({ "port": controller.port(), "bypass": on }));
     }
-    out.say(format_args!("{}: correction {}", controller.port(), if on { "off" } else { "on" }));
+    out.say(format_args!(
+        "{}: correction {}",
+        controller.port(),
+        if on { "off" } else { "on" }
+    ));
     Ok(())
 }

@@ -69,9 +69,14 @@ struct Arc {
 
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
-    for (name, value) in [("--acceleration", args.acceleration), ("--max-offset", args.max_offset)] {
+    for (name, value) in [
+        ("--acceleration", args.acceleration),
+        ("--max-offset", args.max_offset),
+    ] {
         if value.is_nan() || value <= 0.0 || value.is_infinite() {
-            return Err(Failure::usage(format_args!("{name} {value}: expected a positive number")));
+            return Err(Failure::usage(format_args!(
+                "{name} {value}: expected a positive number"
+            )));
         }
     }
     let program = read(&args.program, Kind::Any)?;
@@ -85,13 +90,20 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         max_offset_mm: args.max_offset,
         all_planes: args.all_planes,
     };
-    let compensate =
-        if gcode::rapid::is_rapid(&program) { gcode::rapid::compensate } else { gcode::compensate };
+    let compensate = if gcode::rapid::is_rapid(&program) {
+        gcode::rapid::compensate
+    } else {
+        gcode::compensate
+    };
     let result = compensate(&program, &model, &options);
     std::fs::write(&args.output, &result.program)
         .map_err(|e| super::failure::cannot_write(&args.output, &e))?;
     let document = document(&result, &model);
-    if out.json { out.document(&document) } else { say(&args, &result, &document, out) }
+    if out.json {
+        out.document(&document)
+    } else {
+        say(&args, &result, &document, out)
+    }
 }
 
 /// What a program may be written in.
@@ -103,16 +115,24 @@ pub(super) enum Kind {
 
 /// The bytes of a program.
 pub(super) fn read(path: &Path, kind: Kind) -> Result<Vec<u8>, Failure> {
-    let fail =
-        |what: &str| Failure::input(format_args!("{}: {what}; expected an NC program", path.display()));
+    let fail = |what: &str| {
+        Failure::input(format_args!(
+            "{}: {what}; expected an NC program",
+            path.display()
+        ))
+    };
     match std::fs::read(path) {
         Ok(bytes) if bytes.is_empty() => Err(fail("is empty").help("check which file this is")),
-        Ok(bytes) if bytes.contains(&0) => Err(fail("holds zero bytes").help("check which file this is")),
+        Ok(bytes) if bytes.contains(&0) => {
+            Err(fail("holds zero bytes").help("check which file this is"))
+        }
         Ok(bytes) if kind == Kind::GCode && gcode::rapid::is_rapid(&bytes) => {
-            Err(fail("is RAPID, which only a robot's own controller runs").help("write it as G-code"))
+            Err(fail("is RAPID, which only a robot's own controller runs")
+                .help("write it as G-code"))
         }
         Ok(bytes) if !gcode::rapid::is_rapid(&bytes) && !gcode::is_program(&bytes) => {
-            Err(fail("no line of it is a block").help("check which file this is; RAPID begins with MODULE"))
+            Err(fail("no line of it is a block")
+                .help("check which file this is; RAPID begins with MODULE"))
         }
         Ok(bytes) => Ok(bytes),
         Err(_) if path.is_dir() => Err(fail("is a directory").help("check the path")),
@@ -138,8 +158,17 @@ fn document(result: &Compensated, model: &ModelFile) -> Document {
                 left: None,
             };
             match report.fate {
-                Fate::Left(left) => Arc { left: Some(left.to_string()), ..none },
-                Fate::Corrected { radius_mm, feed_mm_s, delta_mm, blocks, joint_share } => Arc {
+                Fate::Left(left) => Arc {
+                    left: Some(left.to_string()),
+                    ..none
+                },
+                Fate::Corrected {
+                    radius_mm,
+                    feed_mm_s,
+                    delta_mm,
+                    blocks,
+                    joint_share,
+                } => Arc {
                     radius_mm: Some(radius_mm),
                     feed_mm_s: Some(feed_mm_s),
                     change_um: Some(delta_mm * 1e3),
@@ -153,8 +182,15 @@ fn document(result: &Compensated, model: &ModelFile) -> Document {
     Document {
         corrected: arcs.iter().filter(|a| a.left.is_none()).count(),
         left: arcs.iter().filter(|a| a.left.is_some()).count(),
-        largest_change_um: arcs.iter().filter_map(|a| a.change_um).fold(0.0, |m, c| f64::max(m, c.abs())),
-        not_applied: model.effects.iter().map(|e| e.cause.id().to_owned()).collect(),
+        largest_change_um: arcs
+            .iter()
+            .filter_map(|a| a.change_um)
+            .fold(0.0, |m, c| f64::max(m, c.abs())),
+        not_applied: model
+            .effects
+            .iter()
+            .map(|e| e.cause.id().to_owned())
+            .collect(),
         arcs,
     }
 }
@@ -174,7 +210,13 @@ fn say(args: &Args, result: &Compensated, document: &Document, out: Output) -> R
         match report.fate {
             Fate::Left(Left::Negligible) => negligible += 1,
             Fate::Left(left) => _ = reasons.insert(report.line, left),
-            Fate::Corrected { radius_mm, feed_mm_s, delta_mm, blocks, joint_share } => {
+            Fate::Corrected {
+                radius_mm,
+                feed_mm_s,
+                delta_mm,
+                blocks,
+                joint_share,
+            } => {
                 let joints = if joint_share > JOINT_BAR {
                     let left_um = joint_share * delta_mm.abs() * 1e3;
                     format!(
@@ -197,7 +239,9 @@ fn say(args: &Args, result: &Compensated, document: &Document, out: Output) -> R
         out.say(format_args!("  {name}:{line}: left as it was: {left}"));
     }
     if negligible > 0 {
-        out.say(format_args!("  {negligible} arcs need less than 0.5 µm and were left as they were"));
+        out.say(format_args!(
+            "  {negligible} arcs need less than 0.5 µm and were left as they were"
+        ));
     }
     if !document.not_applied.is_empty() {
         out.say(format_args!(

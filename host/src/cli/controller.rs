@@ -36,7 +36,10 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
             let mut note = |text: &str| out.note(text);
             let mut emulator = Emulator::start(args.image.as_deref(), Pace::Clock, &mut note)?;
             announce(emulator.pty());
-            out.note(format_args!("set-points: {}", emulator.stream_path().display()));
+            out.note(format_args!(
+                "set-points: {}",
+                emulator.stream_path().display()
+            ));
             emulator.wait();
             Err(Failure::controller("the emulator has ended"))
         }

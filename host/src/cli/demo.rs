@@ -48,7 +48,14 @@ impl Kind {
             Self::Sim => Port::Sim,
             Self::Qemu => Port::Qemu,
         };
-        Ok(open(&port, &OpenOptions { image, ..OpenOptions::default() }, &mut |note| out.note(note))?)
+        Ok(open(
+            &port,
+            &OpenOptions {
+                image,
+                ..OpenOptions::default()
+            },
+            &mut |note| out.note(note),
+        )?)
     }
 }
 
@@ -79,11 +86,19 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let mut controller = args.controller.open(args.image, out)?;
     let learned = learn(&plan, args.seed)?;
     show_learned(&learned, out);
-    let bar = if out.draws() { ProgressBar::new_spinner() } else { ProgressBar::hidden() };
+    let bar = if out.draws() {
+        ProgressBar::new_spinner()
+    } else {
+        ProgressBar::hidden()
+    };
     bar.enable_steady_tick(Duration::from_millis(100));
-    let proof = prove(&mut controller, &plan, &learned.table.table, args.seed, &mut |step| {
-        bar.set_message(step.to_owned())
-    });
+    let proof = prove(
+        &mut controller,
+        &plan,
+        &learned.table.table,
+        args.seed,
+        &mut |step| bar.set_message(step.to_owned()),
+    );
     bar.finish_and_clear();
     let proof = proof?;
     if let Some(path) = &args.svg {
@@ -91,7 +106,12 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         out.note(format_args!("picture written to {}", path.display()));
     }
     if out.json {
-        out.document(&document(args.controller, &plan.machine_name, args.seed, &proof))?;
+        out.document(&document(
+            args.controller,
+            &plan.machine_name,
+            args.seed,
+            &proof,
+        ))?;
     } else {
         show_proof(&proof, out);
         out.say(format_args!("{:.1} s", started.elapsed().as_secs_f64()));
@@ -150,9 +170,15 @@ fn document(kind: Kind, machine: &str, seed: u64, proof: &Proof) -> Value {
 
 fn table(header: &[&str], left: usize) -> Table {
     let mut table = Table::new();
-    table.load_style(presets::NOTHING).set_header(header.iter().copied());
+    table
+        .load_style(presets::NOTHING)
+        .set_header(header.iter().copied());
     for (k, column) in table.column_iter_mut().enumerate() {
-        column.set_cell_alignment(if k < left { CellAlignment::Left } else { CellAlignment::Right });
+        column.set_cell_alignment(if k < left {
+            CellAlignment::Left
+        } else {
+            CellAlignment::Right
+        });
     }
     table
 }
@@ -164,7 +190,10 @@ fn show_learned(learned: &Learned, out: Output) {
     };
     let range = |of: fn(&crate::analysis::RunAnalysis) -> f64| {
         let values = runs.iter().map(|r| of(r) * 1e3);
-        (values.clone().fold(f64::INFINITY, f64::min), values.fold(0.0, f64::max))
+        (
+            values.clone().fold(f64::INFINITY, f64::min),
+            values.fold(0.0, f64::max),
+        )
     };
     let ((r0, r1), (f0, f1)) = (range(|r| r.radius_m), range(|r| r.feed_m_s));
     out.say(format_args!(
@@ -190,8 +219,23 @@ fn show_learned(learned: &Learned, out: Output) {
         ));
     }
     let diagnosis = &learned.diagnosis;
-    out.say(format_args!("3 diagnose  against {}:", diagnosis.baseline.name));
-    let mut found = table(&["cause", "axis", "size", "95 % from", "to", "unit", "share %", "correctable"], 2);
+    out.say(format_args!(
+        "3 diagnose  against {}:",
+        diagnosis.baseline.name
+    ));
+    let mut found = table(
+        &[
+            "cause",
+            "axis",
+            "size",
+            "95 % from",
+            "to",
+            "unit",
+            "share %",
+            "correctable",
+        ],
+        2,
+    );
     for f in &diagnosis.findings {
         let axis = match f.axis {
             Some(giotto_shared::Axis::X) => "x",
@@ -211,7 +255,10 @@ fn show_learned(learned: &Learned, out: Output) {
     }
     out.say(indented(&found));
     if diagnosis.unexplained.present {
-        out.say(format_args!("            unexplained: {:.2} µm rms", diagnosis.unexplained.rms_um));
+        out.say(format_args!(
+            "            unexplained: {:.2} µm rms",
+            diagnosis.unexplained.rms_um
+        ));
     }
     out.say(format_args!(
         "4 extend    on runs left out the simulation is off by {:.2} µm rms, before {:.2} (gain {:.1} %)",
@@ -235,8 +282,18 @@ fn show_proof(proof: &Proof, out: Output) {
         flashed.bytes, flashed.slot, flashed.generation
     ));
     out.say("6 run       circles whose radii and speeds are not in the campaign, last of the steady turns measured:");
-    let mut circles =
-        table(&["R mm", "mm/s", "", "ΔR before", "ΔR after", "roundness before", "after (µm)"], 0);
+    let mut circles = table(
+        &[
+            "R mm",
+            "mm/s",
+            "",
+            "ΔR before",
+            "ΔR after",
+            "roundness before",
+            "after (µm)",
+        ],
+        0,
+    );
     for pair in &proof.circles {
         let (before, after) = (&pair.before.analysis, &pair.after.analysis);
         circles.add_row([
@@ -252,7 +309,10 @@ fn show_proof(proof: &Proof, out: Output) {
     out.say(indented(&circles));
     let (before, after) = (proof.before(), proof.after());
     if proof.clamped > 0 {
-        out.say(format_args!("            {} set-points were clamped", proof.clamped));
+        out.say(format_args!(
+            "            {} set-points were clamped",
+            proof.clamped
+        ));
     }
     out.say(format_args!(
         "7 measure   radius size error {:.2} → {:.2} µm rms ({:.2} % less); out-of-roundness {:.1} → {:.1} µm, noise included",
@@ -265,10 +325,18 @@ fn show_proof(proof: &Proof, out: Output) {
 }
 
 fn indented(table: &Table) -> String {
-    table.lines().map(|line| format!("            {line}")).collect::<Vec<_>>().join("\n")
+    table
+        .lines()
+        .map(|line| format!("            {line}"))
+        .collect::<Vec<_>>()
+        .join("\n")
 }
 
 /// Four digits, in the form that is short.
 fn number(value: f64) -> String {
-    if value != 0.0 && value.abs() < 1e-2 { format!("{value:.3e}") } else { format!("{value:.4}") }
+    if value != 0.0 && value.abs() < 1e-2 {
+        format!("{value:.3e}")
+    } else {
+        format!("{value:.4}")
+    }
 }

@@ -31,7 +31,13 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let campaign = args.source.read(out)?;
     let model = args.model.as_deref().map(ModelFile::load).transpose()?;
     let bar = out.spinner("diagnosing");
-    let diagnosis = diagnose(&campaign, &Options { model, seed: args.seed });
+    let diagnosis = diagnose(
+        &campaign,
+        &Options {
+            model,
+            seed: args.seed,
+        },
+    );
     bar.finish_and_clear();
     let diagnosis = diagnosis.map_err(|e| args.source.refused(&e))?;
     if let Some(path) = &args.output {
@@ -59,7 +65,9 @@ fn show(name: &str, d: &Diagnosis, extended: Option<&Path>, out: &Output) {
     out.say(format_args!("Simulation: {}", d.baseline.name));
     let m = &d.misfit;
     let mut table = Table::new();
-    table.load_style(presets::NOTHING).set_header(["misfit of the simulation", "µm rms"]);
+    table
+        .load_style(presets::NOTHING)
+        .set_header(["misfit of the simulation", "µm rms"]);
     for (kind, value) in [
         ("size of the circles", m.size_um),
         ("  of which follows campaign time", m.drift_um),
@@ -141,12 +149,21 @@ fn show(name: &str, d: &Diagnosis, extended: Option<&Path>, out: &Output) {
 
 /// Numbers to the right: every column from `first` on.
 fn right(table: &mut Table, first: usize) {
-    table.column_iter_mut().skip(first).for_each(|column| column.set_cell_alignment(CellAlignment::Right));
+    table
+        .column_iter_mut()
+        .skip(first)
+        .for_each(|column| column.set_cell_alignment(CellAlignment::Right));
 }
 
 fn row(f: &Finding) -> [String; 7] {
     let e = &f.estimate;
-    let axis = f.axis.map_or("", |axis| if axis == giotto_shared::Axis::X { "x" } else { "y" });
+    let axis = f.axis.map_or("", |axis| {
+        if axis == giotto_shared::Axis::X {
+            "x"
+        } else {
+            "y"
+        }
+    });
     [
         f.cause.model().words().name.to_string(),
         axis.to_string(),
@@ -163,7 +180,11 @@ fn number(value: f64) -> String {
     if value != 0.0 && (value.abs() < 1e-3 || value.abs() >= 1e5) {
         return format!("{value:.3e}");
     }
-    let before_point = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
+    let before_point = if value == 0.0 {
+        0
+    } else {
+        value.abs().log10().floor() as i32
+    };
     format!("{value:.*}", (3 - before_point).clamp(0, 6) as usize)
 }
 
@@ -203,6 +224,14 @@ fn recommendation(d: &Diagnosis, extended: Option<&Path>) -> String {
 /// what the extended model does not predict and what it predicts but no controller corrects.
 fn expected_um(d: &Diagnosis) -> Option<[f64; 2]> {
     let gain = d.gain.as_ref()?;
-    let stays: f64 = d.findings.iter().filter(|f| !f.compensable).map(|f| f.rms_um.powi(2)).sum();
-    Some([gain.no_model_rms_um, (gain.extended_rms_um.powi(2) + stays).sqrt()])
+    let stays: f64 = d
+        .findings
+        .iter()
+        .filter(|f| !f.compensable)
+        .map(|f| f.rms_um.powi(2))
+        .sum();
+    Some([
+        gain.no_model_rms_um,
+        (gain.extended_rms_um.powi(2) + stays).sqrt(),
+    ])
 }

@@ -45,7 +45,11 @@ impl Failure {
     }
 
     fn new(kind: Kind, message: impl Display) -> Self {
-        Self { kind, message: message.to_string(), help: None }
+        Self {
+            kind,
+            message: message.to_string(),
+            help: None,
+        }
     }
 
     /// Adds what to do next.

@@ -3,7 +3,9 @@ use super::failure::cannot_write;
 use super::source::Source;
 use super::{Failure, Output};
 use crate::analysis;
-use crate::fit::{self, Action, FitError, Observation, Offset, Options, PartialF, RadiusFit, Step, TERMS};
+use crate::fit::{
+    self, Action, FitError, Observation, Offset, Options, PartialF, RadiusFit, Step, TERMS,
+};
 use crate::model_file::{FORMAT, ModelFile, Servo, Valid};
 use clap::ValueEnum;
 use comfy_table::{CellAlignment, Table, presets};
@@ -65,7 +67,9 @@ impl From<FitError> for Failure {
             FitError::NoSuchRadius { .. } => failure.help("give one of them to --train-radius"),
             FitError::TooFew { .. } => failure.help("measure more feeds, each in both directions"),
             FitError::Collinear { .. } => failure.help("measure at three or more different feeds"),
-            FitError::Quantile { .. } => failure.help("--alpha lies between 0 and 1; 0.05 is usual"),
+            FitError::Quantile { .. } => {
+                failure.help("--alpha lies between 0 and 1; 0.05 is usual")
+            }
             _ => failure,
         }
     }
@@ -84,7 +88,9 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let report = report?;
     report.notes.iter().for_each(|note| out.note(note));
     for run in &report.runs {
-        if let Some(feed) = run.measured_feed_m_s.filter(|f| (f / run.feed_m_s - 1.0).abs() > FEED_DEPARTURE)
+        if let Some(feed) = run
+            .measured_feed_m_s
+            .filter(|f| (f / run.feed_m_s - 1.0).abs() > FEED_DEPARTURE)
         {
             out.note(format_args!(
                 "note: {}: the turn ran at {:.1} mm/s where {:.1} were programmed; the fit takes the programmed feed",
@@ -120,7 +126,9 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     if let Some(path) = &args.output {
         model_file(&fit, &observations, &report.name, &report.machine)
             .save(path)
-            .map_err(|e| Failure::input(e).help("choose another path with -o, or make room there"))?;
+            .map_err(|e| {
+                Failure::input(e).help("choose another path with -o, or make room there")
+            })?;
     }
     if let Some(directory) = &args.figures {
         draw(&fit, &observations, directory)?;
@@ -133,7 +141,10 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         out.say(format_args!("\nmodel written to {}", path.display()));
     }
     if let Some(directory) = &args.figures {
-        out.say(format_args!("figures 8 to 11 written to {}", directory.display()));
+        out.say(format_args!(
+            "figures 8 to 11 written to {}",
+            directory.display()
+        ));
     }
     Ok(())
 }
@@ -151,7 +162,10 @@ fn model_file(fit: &RadiusFit, runs: &[Observation], campaign: &str, machine: &s
     let range = |of: fn(&Observation) -> f64| {
         let values = runs.iter().map(|run| of(run) * 1e3);
         let rounded = |v: f64| (v * 1e6).round() / 1e6;
-        [rounded(values.clone().fold(f64::INFINITY, f64::min)), rounded(values.fold(0.0, f64::max))]
+        [
+            rounded(values.clone().fold(f64::INFINITY, f64::min)),
+            rounded(values.fold(0.0, f64::max)),
+        ]
     };
     ModelFile {
         format: FORMAT,
@@ -162,7 +176,10 @@ fn model_file(fit: &RadiusFit, runs: &[Observation], campaign: &str, machine: &s
             beta2_s4: fit.model.beta2_s4,
             half_width95: fit.ci95.map(|[low, high]| 0.5 * (high - low)),
         },
-        valid: Valid { radius_mm: range(|o| o.radius_m), feed_mm_s: range(|o| o.feed_m_s) },
+        valid: Valid {
+            radius_mm: range(|o| o.radius_m),
+            feed_mm_s: range(|o| o.feed_m_s),
+        },
         effects: Vec::new(),
     }
 }
@@ -190,11 +207,18 @@ fn document(fit: &RadiusFit) -> Value {
         json!({ word: TERMS[s.column], "partial_f": s.partial_f, "critical_f": s.critical_f, "dof": [s.dof.0, s.dof.1] })
     };
     let steps = |rejected: bool| -> Vec<Value> {
-        fit.steps.iter().filter(|s| (s.action == Action::Reject) == rejected).map(step).collect()
+        fit.steps
+            .iter()
+            .filter(|s| (s.action == Action::Reject) == rejected)
+            .map(step)
+            .collect()
     };
     let heldout = fit.heldout.as_ref();
-    let offsets: Map<String, Value> =
-        fit.offsets_m.iter().map(|(radius, offset)| (mm(*radius), json!(offset * 1e6))).collect();
+    let offsets: Map<String, Value> = fit
+        .offsets_m
+        .iter()
+        .map(|(radius, offset)| (mm(*radius), json!(offset * 1e6)))
+        .collect();
     let cumulants = fit.cumulants();
     json!({
         "model": { "beta1_s2": fit.model.beta1_s2, "beta2_s4": fit.model.beta2_s4 },
@@ -222,9 +246,15 @@ fn document(fit: &RadiusFit) -> Value {
 
 fn table(header: &[&str]) -> Table {
     let mut table = Table::new();
-    table.load_style(presets::NOTHING).set_header(header.iter().copied());
+    table
+        .load_style(presets::NOTHING)
+        .set_header(header.iter().copied());
     for (k, column) in table.column_iter_mut().enumerate() {
-        column.set_cell_alignment(if k == 0 { CellAlignment::Left } else { CellAlignment::Right });
+        column.set_cell_alignment(if k == 0 {
+            CellAlignment::Left
+        } else {
+            CellAlignment::Right
+        });
     }
     table
 }
@@ -253,7 +283,11 @@ fn show(fit: &RadiusFit, runs: &[Observation], campaign: &str, out: Output) {
         ("β2", "1e-6 s⁴", fit.model.beta2_s4, fit.ci95[1], 1),
     ] {
         let micro = |v: f64| format!("{:.4}", v * 1e6);
-        let remark = if fit.entered(term) { "" } else { "  not in the model; interval with both terms in" };
+        let remark = if fit.entered(term) {
+            ""
+        } else {
+            "  not in the model; interval with both terms in"
+        };
         coefficients.add_row([
             name.to_owned(),
             micro(value),
@@ -264,11 +298,23 @@ fn show(fit: &RadiusFit, runs: &[Observation], campaign: &str, out: Output) {
     }
     out.say(coefficients);
     out.say("");
-    let mut radii = table(&["R mm", "part", "β0 µm", "runs", "rms µm", "largest µm", "explained %"]);
+    let mut radii = table(&[
+        "R mm",
+        "part",
+        "β0 µm",
+        "runs",
+        "rms µm",
+        "largest µm",
+        "explained %",
+    ]);
     for (radius, offset) in &fit.offsets_m {
         let of_radius = |r: &f64| (r - radius).abs() < 1e-9;
         let trained = fit.options.train_radius_m.is_none_or(|r| of_radius(&r));
-        let part = if trained && fit.options.train_radius_m.is_some() { "fitted" } else { "predicted" };
+        let part = if trained && fit.options.train_radius_m.is_some() {
+            "fitted"
+        } else {
+            "predicted"
+        };
         let mut row = vec![mm(*radius), part.to_owned(), format!("{:.2}", offset * 1e6)];
         match fit.heldout_by_radius.iter().find(|(r, _)| of_radius(r)) {
             Some((_, h)) => row.extend([
@@ -278,7 +324,10 @@ fn show(fit: &RadiusFit, runs: &[Observation], campaign: &str, out: Output) {
                 format!("{:.3}", h.explained_percent),
             ]),
             None => row.extend([
-                runs.iter().filter(|run| of_radius(&run.radius_m)).count().to_string(),
+                runs.iter()
+                    .filter(|run| of_radius(&run.radius_m))
+                    .count()
+                    .to_string(),
                 "–".to_owned(),
                 "–".to_owned(),
                 "–".to_owned(),
@@ -289,7 +338,10 @@ fn show(fit: &RadiusFit, runs: &[Observation], campaign: &str, out: Output) {
     out.say(radii);
     out.say("");
     let (runs, rms) = fit.train;
-    out.say(format_args!("fitted: {runs} runs, residuals {:.2} µm rms", rms * 1e6));
+    out.say(format_args!(
+        "fitted: {runs} runs, residuals {:.2} µm rms",
+        rms * 1e6
+    ));
     match &fit.heldout {
         Some(h) => out.say(format_args!(
             "predicted ({}): {} runs, residuals {:.2} µm rms, largest {:.2} µm, {:.3} % of the radius error explained",
@@ -334,7 +386,9 @@ fn show_chain(fit: &RadiusFit, out: Output) {
     } else {
         fit.classes.to_string().replace('_', " ")
     };
-    out.say(format_args!("\nκ4/κ2² between {low:.1} and {high:.1} (95 %): the chain may be {classes}"));
+    out.say(format_args!(
+        "\nκ4/κ2² between {low:.1} and {high:.1} (95 %): the chain may be {classes}"
+    ));
     match fit.cumulants().equivalent() {
         Some(Element::SecondOrder { omega_n_rad_s, zeta }) => out.say(format_args!(
             "a second order with the same κ2 and κ4: ωn {omega_n_rad_s:.1} rad/s, ζ {zeta:.3} (an equivalent, not a finding)"

@@ -23,11 +23,15 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let mut file = table_file::read(&args.file, out)?;
     if let Some(key) = &args.key {
         let signed = key::load(key)?.sign(&file.image);
-        file.image =
-            signed.map_err(|error| Failure::input(format_args!("{}: {error}", args.file.display())))?;
+        file.image = signed
+            .map_err(|error| Failure::input(format_args!("{}: {error}", args.file.display())))?;
     }
     let mut controller = args.port.open(out)?;
-    let bar = if out.draws() { ProgressBar::new(file.image.len() as u64) } else { ProgressBar::hidden() };
+    let bar = if out.draws() {
+        ProgressBar::new(file.image.len() as u64)
+    } else {
+        ProgressBar::hidden()
+    };
     if let Ok(style) = ProgressStyle::with_template("{msg:12} {bar:32} {bytes}/{total_bytes}") {
         bar.set_style(style);
     }

@@ -36,8 +36,10 @@ pub struct Args {
 }
 
 fn centre(text: &str) -> Result<[f64; 3], String> {
-    let parts: Option<Vec<f64>> =
-        text.split(',').map(|p| p.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
+    let parts: Option<Vec<f64>> = text
+        .split(',')
+        .map(|p| p.trim().parse().ok().filter(|v: &f64| v.is_finite()))
+        .collect();
     parts
         .and_then(|p| p.try_into().ok())
         .ok_or_else(|| "expected three numbers in mm, as in -290,987,615".to_owned())
@@ -58,12 +60,17 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         ..options
     };
     let bar = Progress::new(out, &args.files);
-    let added = import::add(&args.files, &args.output, &options, &|path, bytes| bar.tell(path, bytes))?;
+    let added = import::add(&args.files, &args.output, &options, &|path, bytes| {
+        bar.tell(path, bytes)
+    })?;
     bar.done();
     added.iter().for_each(|a| tell(a, &options, out));
     if out.json {
         let runs = added.iter().map(|a| Entry::of(a, &options)).collect();
-        return out.document(&Document { campaign: args.output.display().to_string(), runs });
+        return out.document(&Document {
+            campaign: args.output.display().to_string(),
+            runs,
+        });
     }
     let folder = args.output.display();
     for a in &added {

@@ -43,13 +43,20 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         KeyCommand::New { file } => {
             let key = SigningKey::generate();
             key.save(&file).map_err(|error| {
-                Failure::input(format_args!("{}: cannot be written: {error}", file.display()))
-                    .help("a key is never written over another file")
+                Failure::input(format_args!(
+                    "{}: cannot be written: {error}",
+                    file.display()
+                ))
+                .help("a key is never written over another file")
             })?;
             if out.json {
                 return out.document(&json!({ "key": file, "public": key.public_hex() }));
             }
-            out.say(format_args!("{}: secret key; public half {}", file.display(), key.public_hex()));
+            out.say(format_args!(
+                "{}: secret key; public half {}",
+                file.display(),
+                key.public_hex()
+            ));
             Ok(())
         }
         KeyCommand::Provision { file, port } => {
@@ -57,7 +64,8 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
             let mut controller = port.open(out)?;
             controller.command(Command::Provision { key: key.public() })?;
             if out.json {
-                return out.document(&json!({ "port": controller.port(), "public": key.public_hex() }));
+                return out
+                    .document(&json!({ "port": controller.port(), "public": key.public_hex() }));
             }
             out.say(format_args!(
                 "{}: from now on only tables signed with this key, public half {}",

@@ -34,13 +34,25 @@ pub fn run(args: Args, command: Command, out: Output) -> Result<(), Failure> {
     Ok(())
 }
 
-fn write(command: &Command, folder: &std::path::Path, pages: &mut Vec<String>) -> Result<(), Failure> {
-    let name = command.get_display_name().unwrap_or_else(|| command.get_name());
+fn write(
+    command: &Command,
+    folder: &std::path::Path,
+    pages: &mut Vec<String>,
+) -> Result<(), Failure> {
+    let name = command
+        .get_display_name()
+        .unwrap_or_else(|| command.get_name());
     let page = format!("{name}.1");
     let path = folder.join(&page);
     let mut text = Vec::new();
-    let rendered = Man::new(command.clone()).title(name.to_uppercase()).render(&mut text);
-    rendered.and_then(|()| std::fs::write(&path, &text)).map_err(|e| cannot_write(&path, &e))?;
+    let rendered = Man::new(command.clone())
+        .title(name.to_uppercase())
+        .render(&mut text);
+    rendered
+        .and_then(|()| std::fs::write(&path, &text))
+        .map_err(|e| cannot_write(&path, &e))?;
     pages.push(page);
-    command.get_subcommands().try_for_each(|sub| write(sub, folder, pages))
+    command
+        .get_subcommands()
+        .try_for_each(|sub| write(sub, folder, pages))
 }

@@ -126,7 +126,11 @@ fn dispatch(command: Command, out: Output) -> Result<(), Failure> {
 /// Runs the command line of this process.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
-    let out = Output { json: cli.json, quiet: cli.quiet, non_interactive: cli.non_interactive };
+    let out = Output {
+        json: cli.json,
+        quiet: cli.quiet,
+        non_interactive: cli.non_interactive,
+    };
     let Some(command) = cli.command else {
         let words = welcome::words(std::path::Path::new("."));
         if out.json {

@@ -49,8 +49,9 @@ impl Output {
 
     /// Prints `value` as the JSON document of this command.
     pub fn document(&self, value: &impl Serialize) -> Result<(), Failure> {
-        let text = serde_json::to_string_pretty(value)
-            .map_err(|e| Failure::input(format_args!("the result cannot be written as JSON: {e}")))?;
+        let text = serde_json::to_string_pretty(value).map_err(|e| {
+            Failure::input(format_args!("the result cannot be written as JSON: {e}"))
+        })?;
         let _ = writeln!(std::io::stdout(), "{text}");
         Ok(())
     }

@@ -48,7 +48,13 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let campaign = args.source.read(out)?;
     let model = args.model.as_deref().map(ModelFile::load).transpose()?;
     let bar = out.spinner("diagnosing");
-    let diagnosis = diagnose(&campaign, &Options { model, seed: args.seed });
+    let diagnosis = diagnose(
+        &campaign,
+        &Options {
+            model,
+            seed: args.seed,
+        },
+    );
     bar.finish_and_clear();
     let diagnosis = diagnosis.map_err(|e| args.source.refused(&e))?;
     let options = planning::Options {
@@ -64,9 +70,8 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let asked = args.output.is_some() || args.gcode.is_some() || args.rapid.is_some();
     if asked && plan.runs.is_empty() {
         let why = "no runs to plan: circles have nothing more to tell apart";
-        return Err(
-            Failure::check(why).help("leave out -o, --gcode and --rapid to see what the campaign tells")
-        );
+        return Err(Failure::check(why)
+            .help("leave out -o, --gcode and --rapid to see what the campaign tells"));
     }
     if let Some(path) = &args.output {
         let text = toml::to_string(&plan.file(&campaign))
@@ -97,13 +102,20 @@ fn write(path: &Path, text: &str, out: Output) -> Result<(), Failure> {
 }
 
 fn name(id: &str) -> String {
-    Cause::from_id(id).map_or_else(|| id.replace('_', " "), |cause| cause.model().words().name.to_string())
+    Cause::from_id(id).map_or_else(
+        || id.replace('_', " "),
+        |cause| cause.model().words().name.to_string(),
+    )
 }
 
 fn show(plan: &Plan, out: Output) {
     for class in &plan.open {
         let members: Vec<String> = class.members.iter().map(|cause| name(cause.id())).collect();
-        out.say(format_args!("Open: any of {}: {}.", members.join(", "), class.why));
+        out.say(format_args!(
+            "Open: any of {}: {}.",
+            members.join(", "),
+            class.why
+        ));
     }
     for line in &plan.line_tests {
         let [a, b] = &line.pair;
@@ -120,7 +132,9 @@ fn show(plan: &Plan, out: Output) {
         return;
     }
     let mut table = Table::new();
-    table.load_style(presets::NOTHING).set_header(["run", "R mm", "f mm/s", "direction", "for"]);
+    table
+        .load_style(presets::NOTHING)
+        .set_header(["run", "R mm", "f mm/s", "direction", "for"]);
     for (i, step) in plan.runs.iter().enumerate() {
         table.add_row([
             (i + 1).to_string(),
@@ -138,7 +152,10 @@ fn show(plan: &Plan, out: Output) {
             .to_string(),
         ]);
     }
-    table.column_iter_mut().take(3).for_each(|column| column.set_cell_alignment(CellAlignment::Right));
+    table
+        .column_iter_mut()
+        .take(3)
+        .for_each(|column| column.set_cell_alignment(CellAlignment::Right));
     out.say(&table);
     for s in &plan.separations {
         let [a, b] = &s.pair;

@@ -30,9 +30,17 @@ impl PortArgs {
     }
 
     /// As [`Self::connect`], with the emulator's time going so fast.
-    pub(super) fn connect_at(&self, pace: Pace, out: Output) -> Result<Controller, ControllerError> {
+    pub(super) fn connect_at(
+        &self,
+        pace: Pace,
+        out: Output,
+    ) -> Result<Controller, ControllerError> {
         let Ok(port) = self.port.parse::<Port>();
-        let options = OpenOptions { image: self.image.clone(), baud: self.baud, pace };
+        let options = OpenOptions {
+            image: self.image.clone(),
+            baud: self.baud,
+            pace,
+        };
         open(&port, &options, &mut |note| out.note(note))
     }
 }

@@ -36,7 +36,13 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let campaign = args.source.read(out)?;
     let model = args.model.as_deref().map(ModelFile::load).transpose()?;
     let bar = out.spinner("diagnosing");
-    let diagnosis = diagnose(&campaign, &Options { model, seed: args.seed });
+    let diagnosis = diagnose(
+        &campaign,
+        &Options {
+            model,
+            seed: args.seed,
+        },
+    );
     bar.finish_and_clear();
     let diagnosis = diagnosis.map_err(|e| args.source.refused(&e))?;
     let html = crate::report::html(&campaign, &diagnosis).map_err(Failure::input)?;

@@ -17,9 +17,14 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let mut controller = args.port.open(out)?;
     controller.command(Command::Rollback)?;
     let active = active_table(&controller.status()?);
-    let (slot, generation) = (active.map(|(slot, _)| slot), active.and_then(|(_, info)| info.generation));
+    let (slot, generation) = (
+        active.map(|(slot, _)| slot),
+        active.and_then(|(_, info)| info.generation),
+    );
     if out.json {
-        return out.document(&json!({ "port": controller.port(), "slot": slot, "generation": generation }));
+        return out.document(
+            &json!({ "port": controller.port(), "slot": slot, "generation": generation }),
+        );
     }
     match (slot, generation) {
         (Some(slot), Some(generation)) => {
@@ -28,7 +33,10 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
                 controller.port()
             ));
         }
-        _ => out.say(format_args!("{}: no confirmed table, bypass", controller.port())),
+        _ => out.say(format_args!(
+            "{}: no confirmed table, bypass",
+            controller.port()
+        )),
     }
     Ok(())
 }

@@ -33,7 +33,9 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let plan = Plan::load(&args.plan)?;
     if args.output.join("campaign.toml").exists() {
         let message = format!("{}: holds a campaign already", args.output.display());
-        return Err(Failure::input(message).help("choose another directory with -o, or remove this one"));
+        return Err(
+            Failure::input(message).help("choose another directory with -o, or remove this one")
+        );
     }
     let campaign = simulation::campaign(&plan, args.seed);
     crate::campaign::write(&campaign, &args.output)?;

@@ -117,9 +117,15 @@ pub(super) struct Progress(indicatif::ProgressBar);
 
 impl Progress {
     pub(super) fn new(out: Output, files: &[PathBuf]) -> Self {
-        let bytes: u64 = files.iter().filter_map(|f| std::fs::metadata(f).ok()).map(|m| m.len()).sum();
+        let bytes: u64 = files
+            .iter()
+            .filter_map(|f| std::fs::metadata(f).ok())
+            .map(|m| m.len())
+            .sum();
         if out.draws() && bytes > 1 << 24 {
-            let style = indicatif::ProgressStyle::with_template("{msg} {bar:40} {bytes}/{total_bytes} {eta}");
+            let style = indicatif::ProgressStyle::with_template(
+                "{msg} {bar:40} {bytes}/{total_bytes} {eta}",
+            );
             let bar = indicatif::ProgressBar::new(bytes);
             return Self(style.map_or_else(|_| bar.clone(), |s| bar.clone().with_style(s)));
         }
@@ -128,8 +134,10 @@ impl Progress {
 
     pub(super) fn tell(&self, file: &Path, bytes: u64) {
         if self.0.message().is_empty() {
-            self.0
-                .set_message(file.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()));
+            self.0.set_message(
+                file.file_name()
+                    .map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
+            );
         }
         self.0.set_position(bytes);
     }
@@ -141,7 +149,12 @@ impl Progress {
 
 /// Says what was recognised and what was left out.
 pub(super) fn tell(added: &Added, options: &Options, out: Output) {
-    let mut text = format!("{}: {}, {} rows", added.source.display(), added.format, added.rows);
+    let mut text = format!(
+        "{}: {}, {} rows",
+        added.source.display(),
+        added.format,
+        added.rows
+    );
     if added.lap.1 > 1 {
         text += &format!(", lap {} of {}", added.lap.0, added.lap.1);
     }
@@ -152,7 +165,11 @@ pub(super) fn tell(added: &Added, options: &Options, out: Output) {
         }
     }
     if options.direction.is_none() {
-        text += if added.direction == Direction::Ccw { ", counter-clockwise" } else { ", clockwise" };
+        text += if added.direction == Direction::Ccw {
+            ", counter-clockwise"
+        } else {
+            ", clockwise"
+        };
     }
     if let Some(arc) = added.arc_rad {
         text += &format!(", an arc of {:.1}°", arc.to_degrees());

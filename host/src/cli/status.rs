@@ -39,8 +39,16 @@ fn slot_document(state: &SlotState) -> Value {
 }
 
 fn document(controller: &Controller, status: &Status) -> Value {
-    let Identity { board, build, protocol, table_format, schema_hash, max_image_bytes, tick_hz, signed_only } =
-        controller.identity();
+    let Identity {
+        board,
+        build,
+        protocol,
+        table_format,
+        schema_hash,
+        max_image_bytes,
+        tick_hz,
+        signed_only,
+    } = controller.identity();
     let probation = match status.probation {
         Probation::None => "none",
         Probation::Fresh => "fresh",
@@ -102,7 +110,15 @@ pub(super) fn words(controller: &Controller, status: &Status) -> Table {
     let mut row = |name: &str, value: String| {
         table.add_row(vec![name.to_owned(), value]);
     };
-    row("controller", format!("{} {} at {}", identity.board, identity.build, controller.port()));
+    row(
+        "controller",
+        format!(
+            "{} {} at {}",
+            identity.board,
+            identity.build,
+            controller.port()
+        ),
+    );
     row(
         "protocol",
         format!(
@@ -111,12 +127,23 @@ pub(super) fn words(controller: &Controller, status: &Status) -> Table {
             identity.table_format,
             identity.schema_hash,
             identity.tick_hz,
-            if identity.signed_only { ", signed tables only" } else { "" }
+            if identity.signed_only {
+                ", signed tables only"
+            } else {
+                ""
+            }
         ),
     );
     let motion = format!("{:?}", status.motion).to_lowercase();
-    let cause = status.fault.map(|cause| format!(" ({cause:?})").to_lowercase()).unwrap_or_default();
-    let stop = if status.stop_input { ", stop input active" } else { "" };
+    let cause = status
+        .fault
+        .map(|cause| format!(" ({cause:?})").to_lowercase())
+        .unwrap_or_default();
+    let stop = if status.stop_input {
+        ", stop input active"
+    } else {
+        ""
+    };
     row("motion", format!("{motion}{cause}{stop}"));
     let correction = match (status.active, status.bypass) {
         (None, _) => "bypass: no confirmed table".to_owned(),
@@ -127,7 +154,10 @@ pub(super) fn words(controller: &Controller, status: &Status) -> Table {
     match status.probation {
         Probation::None => {}
         Probation::Fresh => row("probation", "table not confirmed, has not run".to_owned()),
-        Probation::FirstRun => row("probation", "table not confirmed, first run begun or done".to_owned()),
+        Probation::FirstRun => row(
+            "probation",
+            "table not confirmed, first run begun or done".to_owned(),
+        ),
     }
     for (number, slot) in status.slots.iter().enumerate() {
         row(&format!("slot {number}"), slot_words(slot));
@@ -139,8 +169,20 @@ pub(super) fn words(controller: &Controller, status: &Status) -> Table {
     row("programmed", place(status.raw_nm));
     row("corrected", place(status.corrected_nm));
     let counts = &status.counters;
-    row("ticks", format!("{} since boot, {} overrun", status.tick, counts.tick_overruns));
-    row("clamps", format!("offset {}, rate {}", counts.offset_clamps, counts.slew_clamps));
+    row(
+        "ticks",
+        format!(
+            "{} since boot, {} overrun",
+            status.tick, counts.tick_overruns
+        ),
+    );
+    row(
+        "clamps",
+        format!(
+            "offset {}, rate {}",
+            counts.offset_clamps, counts.slew_clamps
+        ),
+    );
     row(
         "segments",
         format!(
@@ -173,10 +215,16 @@ pub(super) fn words(controller: &Controller, status: &Status) -> Table {
         ),
     );
     if let Some(permille) = status.idle_permille {
-        row("idle", format!("{:.1} % of the time", f64::from(permille) / 10.0));
+        row(
+            "idle",
+            format!("{:.1} % of the time", f64::from(permille) / 10.0),
+        );
     }
     if status.stack_bytes > 0 {
-        row("stack", format!("{} bytes at the deepest", status.stack_bytes));
+        row(
+            "stack",
+            format!("{} bytes at the deepest", status.stack_bytes),
+        );
     }
     table
 }

@@ -39,10 +39,16 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
             if out.json {
                 return out.document(&json!({ "table": output, "bytes": made.image.len() }));
             }
-            out.say(format_args!("{}: {} bytes", output.display(), made.image.len()));
+            out.say(format_args!(
+                "{}: {} bytes",
+                output.display(),
+                made.image.len()
+            ));
             Ok(())
         }
-        _ => Err(Failure::usage("giotto table needs MODEL.toml and -o TABLE.bin, or `show TABLE.bin`")),
+        _ => Err(Failure::usage(
+            "giotto table needs MODEL.toml and -o TABLE.bin, or `show TABLE.bin`",
+        )),
     }
 }
 

@@ -21,26 +21,37 @@ pub(super) fn read(path: &Path, out: Output) -> Result<TableFile, Failure> {
     let expected = "a table (TABLE.bin) or a model (MODEL.toml)";
     let metadata = std::fs::metadata(path).map_err(|error| match error.kind() {
         ErrorKind::NotFound => {
-            Failure::input(format_args!("{shown}: no such file; expected {expected}")).help("check the path")
+            Failure::input(format_args!("{shown}: no such file; expected {expected}"))
+                .help("check the path")
         }
         _ => Failure::input(format_args!("{shown}: cannot be read: {error}")),
     })?;
     if metadata.is_dir() {
-        return Err(Failure::input(format_args!("{shown}: is a directory; expected {expected}"))
-            .help("check the path"));
+        return Err(
+            Failure::input(format_args!("{shown}: is a directory; expected {expected}"))
+                .help("check the path"),
+        );
     }
     if metadata.len() > MOST {
-        return Err(Failure::input(format_args!("{shown}: {} bytes; expected {expected}", metadata.len())));
+        return Err(Failure::input(format_args!(
+            "{shown}: {} bytes; expected {expected}",
+            metadata.len()
+        )));
     }
     let bytes = std::fs::read(path)
         .map_err(|error| Failure::input(format_args!("{shown}: cannot be read: {error}")))?;
     if bytes.starts_with(&image::MAGIC) {
         let table = table::decode(&bytes).map_err(|error| bad_table(path, &error))?;
-        return Ok(TableFile { table, image: bytes });
+        return Ok(TableFile {
+            table,
+            image: bytes,
+        });
     }
     if path.extension().is_none_or(|extension| extension != "toml") {
-        return Err(Failure::input(format_args!("{shown}: not a giotto table; expected {expected}"))
-            .help("make one with `giotto table MODEL.toml -o TABLE.bin`"));
+        return Err(Failure::input(format_args!(
+            "{shown}: not a giotto table; expected {expected}"
+        ))
+        .help("make one with `giotto table MODEL.toml -o TABLE.bin`"));
     }
     from_model(path, out)
 }
@@ -53,10 +64,15 @@ pub(super) fn from_model(path: &Path, out: Output) -> Result<TableFile, Failure>
             .help("check the model's coefficients and ranges; a controller has bounds of its own")
     })?;
     for cause in &made.left_out {
-        out.note(format_args!("note: {cause:?} cannot be corrected by a controller and is left out"));
+        out.note(format_args!(
+            "note: {cause:?} cannot be corrected by a controller and is left out"
+        ));
     }
     let image = encode(&made.table).map_err(|error| bad_table(path, &error))?;
-    Ok(TableFile { table: made.table, image })
+    Ok(TableFile {
+        table: made.table,
+        image,
+    })
 }
 
 fn encode(table: &Table) -> Result<Vec<u8>, TableError> {
@@ -69,7 +85,9 @@ fn encode(table: &Table) -> Result<Vec<u8>, TableError> {
 fn bad_table(path: &Path, error: &TableError) -> Failure {
     let failure = Failure::input(format_args!("{}: {error}", path.display()));
     match error {
-        TableError::NewerVersion { .. } => failure.help("use the giotto that wrote it, or a newer one"),
+        TableError::NewerVersion { .. } => {
+            failure.help("use the giotto that wrote it, or a newer one")
+        }
         _ => failure.help("make the table anew with `giotto table MODEL.toml -o TABLE.bin`"),
     }
 }

@@ -26,12 +26,15 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         Verdict::None => (false, None, None),
     };
     if out.json {
-        let document = json!({ "port": port, "same": same, "slot": slot, "first_difference": offset });
+        let document =
+            json!({ "port": port, "same": same, "slot": slot, "first_difference": offset });
         out.document(&document)?;
     }
     match verdict {
         Verdict::Same { slot } => {
-            out.say(format_args!("{port}: corrects with this table, in slot {slot}, byte for byte"));
+            out.say(format_args!(
+                "{port}: corrects with this table, in slot {slot}, byte for byte"
+            ));
             Ok(())
         }
         Verdict::Differs { slot, offset } => Err(Failure::check(format_args!(

@@ -1,7 +1,8 @@
 //! What `giotto` alone says: what to do next, from what lies in the directory.
 use std::path::Path;
 
-const COMMANDS: &str = "  giotto demo                      see the whole loop on a simulated machine
+const COMMANDS: &str =
+    "  giotto demo                      see the whole loop on a simulated machine
   giotto import FILE --help        bring your own measurements in
   giotto analyze CAMPAIGN          what was measured: circles, size, roundness
   giotto diagnose CAMPAIGN         what is wrong, why, and what to do
@@ -29,8 +30,14 @@ fn next(folder: &Path) -> String {
         .filter(|name| !name.starts_with('.'))
         .collect();
     names.sort();
-    if let Some(campaign) = names.iter().find(|name| folder.join(name).join("campaign.toml").is_file()) {
-        return format!("{campaign} is a campaign: giotto diagnose {}", quoted(campaign));
+    if let Some(campaign) = names
+        .iter()
+        .find(|name| folder.join(name).join("campaign.toml").is_file())
+    {
+        return format!(
+            "{campaign} is a campaign: giotto diagnose {}",
+            quoted(campaign)
+        );
     }
     let table = |name: &&String| {
         let name = name.to_ascii_lowercase();
@@ -47,7 +54,11 @@ fn next(folder: &Path) -> String {
 
 fn quoted(name: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_.+".contains(c);
-    if name.chars().all(plain) { name.to_owned() } else { format!("'{}'", name.replace('\'', "'\\''")) }
+    if name.chars().all(plain) {
+        name.to_owned()
+    } else {
+        format!("'{}'", name.replace('\'', "'\\''"))
+    }
 }
 
 #[cfg(test)]
@@ -60,11 +71,18 @@ mod tests {
         let path = folder.path();
         assert_eq!(next(path), "giotto demo");
         std::fs::write(path.join("a ball.CSV"), "").unwrap();
-        assert!(next(path).contains("giotto import 'a ball.CSV' --radius MM"), "{}", next(path));
+        assert!(
+            next(path).contains("giotto import 'a ball.CSV' --radius MM"),
+            "{}",
+            next(path)
+        );
         std::fs::create_dir(path.join("mill")).unwrap();
         std::fs::write(path.join("mill/campaign.toml"), "").unwrap();
         assert!(next(path).ends_with("giotto diagnose mill"));
-        assert_eq!(next(&path.join("mill")), "this directory is a campaign: giotto diagnose .");
+        assert_eq!(
+            next(&path.join("mill")),
+            "this directory is a campaign: giotto diagnose ."
+        );
         assert_eq!(next(&path.join("nowhere")), "giotto demo");
     }
 }

@@ -4,8 +4,8 @@ use super::error::ControllerError;
 use super::link::Link;
 use giotto_shared::table::SCHEMA_HASH;
 use giotto_shared::wire::{
-    self, Accumulator, Command, FromController, Identity, MAX_FRAME, PROTOCOL_VERSION, Refusal, Reply,
-    Request, SUPERVISE_MS, SetPoints, Status,
+    self, Accumulator, Command, FromController, Identity, MAX_FRAME, PROTOCOL_VERSION, Refusal,
+    Reply, Request, SUPERVISE_MS, SetPoints, Status,
 };
 use std::time::Duration;
 
@@ -33,7 +33,10 @@ pub struct Controller {
 
 impl std::fmt::Debug for Controller {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Controller").field("port", &self.name).field("identity", &self.identity).finish()
+        f.debug_struct("Controller")
+            .field("port", &self.name)
+            .field("identity", &self.identity)
+            .finish()
     }
 }
 
@@ -82,18 +85,28 @@ impl Controller {
         };
         let (port, theirs) = (self.name.clone(), identity.protocol);
         if theirs != PROTOCOL_VERSION {
-            return Err(ControllerError::OtherProtocol { port, theirs, ours: PROTOCOL_VERSION });
+            return Err(ControllerError::OtherProtocol {
+                port,
+                theirs,
+                ours: PROTOCOL_VERSION,
+            });
         }
         let theirs = identity.schema_hash;
         if theirs != SCHEMA_HASH {
-            return Err(ControllerError::OtherSchema { port, theirs, ours: SCHEMA_HASH });
+            return Err(ControllerError::OtherSchema {
+                port,
+                theirs,
+                ours: SCHEMA_HASH,
+            });
         }
         self.identity = identity;
         // A hello sets it back.
         if self.supervise_ms == SUPERVISE_MS {
             return Ok(());
         }
-        self.command(Command::Supervise { after_ms: self.supervise_ms })
+        self.command(Command::Supervise {
+            after_ms: self.supervise_ms,
+        })
     }
 
     /// Who it is.
@@ -117,8 +130,12 @@ impl Controller {
     /// # Errors
     /// Those of the link.
     pub fn supervise(&mut self, after: Option<Duration>) -> Result<(), ControllerError> {
-        self.supervise_ms = after.map_or(0, |after| u16::try_from(after.as_millis()).unwrap_or(u16::MAX));
-        self.command(Command::Supervise { after_ms: self.supervise_ms })
+        self.supervise_ms = after.map_or(0, |after| {
+            u16::try_from(after.as_millis()).unwrap_or(u16::MAX)
+        });
+        self.command(Command::Supervise {
+            after_ms: self.supervise_ms,
+        })
     }
 
     /// Lets time pass on the link without a word, as a host that has died.
@@ -173,7 +190,11 @@ impl Controller {
         self.exchange(command, GIVE_UP_AFTER)
     }
 
-    fn exchange(&mut self, command: Command, give_up_after: Duration) -> Result<Reply, ControllerError> {
+    fn exchange(
+        &mut self,
+        command: Command,
+        give_up_after: Duration,
+    ) -> Result<Reply, ControllerError> {
         let (seq, frame) = self.next_frame(command)?;
         let give_up_at = self.link.now() + give_up_after;
         let mut attempts = 0;
@@ -195,7 +216,10 @@ impl Controller {
     }
 
     pub(super) fn no_answer(&self, waited: Duration) -> ControllerError {
-        ControllerError::NoAnswer { port: self.name.clone(), waited }
+        ControllerError::NoAnswer {
+            port: self.name.clone(),
+            waited,
+        }
     }
 
     /// Number of the next request.
@@ -206,14 +230,23 @@ impl Controller {
     /// Number and frame of the next request.
     pub(super) fn next_frame(&self, command: Command) -> Result<(u16, Vec<u8>), ControllerError> {
         let seq = self.next_seq();
-        let request = Request { session: self.session, seq, command };
+        let request = Request {
+            session: self.session,
+            seq,
+            command,
+        };
         let mut buffer = [0; MAX_FRAME];
         let frame = wire::encode(&request, &mut buffer).map_err(|_| ControllerError::WrongReply)?;
         Ok((seq, frame.to_vec()))
     }
 
     /// Sends the frame of request `seq`; `again`: something was not answered.
-    pub(super) fn send_frame(&mut self, seq: u16, frame: &[u8], again: bool) -> Result<(), ControllerError> {
+    pub(super) fn send_frame(
+        &mut self,
+        seq: u16,
+        frame: &[u8],
+        again: bool,
+    ) -> Result<(), ControllerError> {
         self.seq = seq;
         self.repeats += u32::from(again);
         // A zero first: it closes whatever a disturbed line has left open.
@@ -250,16 +283,24 @@ impl Controller {
     }
 
     fn send(&mut self, bytes: &[u8]) -> Result<(), ControllerError> {
-        self.link.send(bytes).map_err(|error| lost(&self.name, &error))
+        self.link
+            .send(bytes)
+            .map_err(|error| lost(&self.name, &error))
     }
 
     /// The next message that is for us.
     pub(super) fn arrival(&mut self, until: Duration) -> Result<Option<Arrival>, ControllerError> {
         loop {
             while let Some(byte) = self.pending.pop_front() {
-                let Some(payload) = self.accumulator.push(byte) else { continue };
+                let Some(payload) = self.accumulator.push(byte) else {
+                    continue;
+                };
                 match postcard::from_bytes(payload) {
-                    Ok(FromController::Reply { session, seq, reply }) if session == self.session => {
+                    Ok(FromController::Reply {
+                        session,
+                        seq,
+                        reply,
+                    }) if session == self.session => {
                         let reply = match reply {
                             Reply::Refused(refusal) => Err(refusal),
                             reply => Ok(reply),
@@ -275,7 +316,10 @@ impl Controller {
                 }
             }
             let mut buffer = [0; 4096];
-            let count = self.link.receive(&mut buffer, until).map_err(|error| lost(&self.name, &error))?;
+            let count = self
+                .link
+                .receive(&mut buffer, until)
+                .map_err(|error| lost(&self.name, &error))?;
             if count == 0 {
                 return Ok(None);
             }
@@ -285,5 +329,8 @@ impl Controller {
 }
 
 fn lost(port: &str, error: &std::io::Error) -> ControllerError {
-    ControllerError::Lost { port: port.to_owned(), reason: error.to_string() }
+    ControllerError::Lost {
+        port: port.to_owned(),
+        reason: error.to_string(),
+    }
 }

@@ -70,8 +70,11 @@ impl Emulator {
         note: &mut dyn FnMut(&str),
     ) -> Result<Self, ControllerError> {
         let program = program();
-        let found =
-            Command::new(&program).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
+        let found = Command::new(&program)
+            .arg("--version")
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .status();
         if found.is_err() {
             return Err(ControllerError::NoEmulator { program });
         }
@@ -79,22 +82,40 @@ impl Emulator {
             Some(path) if path.is_file() => path.to_owned(),
             Some(path) => {
                 let reason = "no such file".to_owned();
-                return Err(ControllerError::NoImage { path: path.to_owned(), reason });
+                return Err(ControllerError::NoImage {
+                    path: path.to_owned(),
+                    reason,
+                });
             }
             None if pace == Pace::Slow => image::ensure_with(board, &["awake"], note)?,
             None => image::ensure(board, note)?,
         };
-        let folder = tempfile::Builder::new().prefix("giotto-qemu-").tempdir().map_err(|e| failed(&e))?;
+        let folder = tempfile::Builder::new()
+            .prefix("giotto-qemu-")
+            .tempdir()
+            .map_err(|e| failed(&e))?;
         let mut command = Command::new("sh");
         command.args(["-c", KEEPER, "sh", &program]);
-        command.args(["-machine", board.machine(), "-nographic", "-monitor", "none", "-kernel"]).arg(&image);
+        command
+            .args([
+                "-machine",
+                board.machine(),
+                "-nographic",
+                "-monitor",
+                "none",
+                "-kernel",
+            ])
+            .arg(&image);
         for port in board.serial_ports() {
             match port {
                 SerialPort::Link => command.args(["-serial", "pty"]),
                 SerialPort::Nowhere => command.args(["-serial", "null"]),
                 SerialPort::Socket(name) => {
                     let path = folder.path().join(name);
-                    let socket = format!("socket,id={name},path={},server=on,wait=off", path.display());
+                    let socket = format!(
+                        "socket,id={name},path={},server=on,wait=off",
+                        path.display()
+                    );
                     command.args(["-chardev", &socket, "-serial", &format!("chardev:{name}")])
                 }
             };
@@ -104,12 +125,26 @@ impl Emulator {
             Pace::Fast | Pace::Slow => "off",
             Pace::Clock => "on",
         };
-        let shift = if pace == Pace::Slow { board.slow_shift() } else { board.instruction_shift() };
-        command.arg("-icount").arg(format!("shift={shift},sleep={sleep},align=off"));
-        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let shift = if pace == Pace::Slow {
+            board.slow_shift()
+        } else {
+            board.instruction_shift()
+        };
+        command
+            .arg("-icount")
+            .arg(format!("shift={shift},sleep={sleep},align=off"));
+        command
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
         let mut process = command.spawn().map_err(|error| failed(&error))?;
         match find_pty(&mut process) {
-            Ok((pty, words)) => Ok(Self { process, words, pty, folder }),
+            Ok((pty, words)) => Ok(Self {
+                process,
+                words,
+                pty,
+                folder,
+            }),
             Err(error) => {
                 end(&mut process);
                 Err(error)
@@ -154,7 +189,10 @@ impl Emulator {
     /// Those of [`SerialLink::open`].
     pub fn into_link(self) -> Result<EmulatorLink, ControllerError> {
         let serial = SerialLink::open(&self.pty, super::port::BAUD)?;
-        Ok(EmulatorLink { serial, _emulator: self })
+        Ok(EmulatorLink {
+            serial,
+            _emulator: self,
+        })
     }
 }
 
@@ -171,7 +209,9 @@ impl Drop for Emulator {
 }
 
 fn failed(error: &io::Error) -> ControllerError {
-    ControllerError::Emulator { reason: error.to_string() }
+    ControllerError::Emulator {
+        reason: error.to_string(),
+    }
 }
 
 /// Reads "char device redirected to PATH (label serial0)".
@@ -193,14 +233,20 @@ fn find_pty(process: &mut Child) -> Result<(String, mpsc::Receiver<String>), Con
     drop(sender);
     let mut words = Vec::new();
     while let Ok(line) = lines.recv_timeout(START_TIME) {
-        let path = line.strip_prefix("char device redirected to ").and_then(|rest| rest.split(' ').next());
+        let path = line
+            .strip_prefix("char device redirected to ")
+            .and_then(|rest| rest.split(' ').next());
         if let Some(path) = path {
             let path = path.to_owned();
             return Ok((path, lines));
         }
         words.push(line);
     }
-    let reason = if words.is_empty() { "it says nothing".to_owned() } else { words.join("; ") };
+    let reason = if words.is_empty() {
+        "it says nothing".to_owned()
+    } else {
+        words.join("; ")
+    };
     Err(ControllerError::Emulator { reason })
 }
 

@@ -135,8 +135,12 @@ impl ControllerError {
             }
             Self::Refused(refusal) => return refusal_help(refusal),
             Self::Path(_) => "choose numbers inside what is possible",
-            Self::ReadBack { .. } => "the table in use is untouched; flash again, and replace worn flash",
-            Self::Table(TableError::NewerVersion { .. }) => "use the giotto that wrote it, or a newer one",
+            Self::ReadBack { .. } => {
+                "the table in use is untouched; flash again, and replace worn flash"
+            }
+            Self::Table(TableError::NewerVersion { .. }) => {
+                "use the giotto that wrote it, or a newer one"
+            }
             Self::Table(_) => "make the table anew with `giotto table MODEL.toml -o TABLE.bin`",
             Self::Starved { .. } => {
                 "reset it (`giotto status` shows the fault) and stream over a faster port, from a less busy computer"
@@ -161,7 +165,9 @@ fn refusal_help(refusal: &Refusal) -> Option<&'static str> {
         Refusal::ProbationOver => "flash the table again (which confirms it), or `giotto rollback`",
         Refusal::NothingToRollBack => "`giotto bypass on` switches the correction off",
         Refusal::NoTable => "flash a table first",
-        Refusal::Motion(MotionRefusal::OutOfBounds { .. }) => "choose a radius and feed inside the bounds",
+        Refusal::Motion(MotionRefusal::OutOfBounds { .. }) => {
+            "choose a radius and feed inside the bounds"
+        }
         Refusal::Flash(_) => "the table in use is untouched; flash again, and replace worn flash",
         Refusal::Table(TableError::Unsigned | TableError::BadSignature) => {
             "sign it with the key of this controller: `giotto flash TABLE --key FILE`"
@@ -169,7 +175,9 @@ fn refusal_help(refusal: &Refusal) -> Option<&'static str> {
         Refusal::KeyProvisioned => "a controller keeps its first key; sign with that one",
         Refusal::NoSignatures => "build the firmware with its feature `signed`",
         Refusal::Motion(MotionRefusal::StopInput) => "release the stop input",
-        Refusal::Motion(MotionRefusal::Fault) => "`giotto status` names the fault; reset the controller",
+        Refusal::Motion(MotionRefusal::Fault) => {
+            "`giotto status` names the fault; reset the controller"
+        }
         Refusal::NotUnderstood => "use the giotto and the firmware of the same release",
         _ => return None,
     })

@@ -87,11 +87,19 @@ impl Controller {
         progress(Progress::Confirmed);
         let crc = Header::read(image)?.crc;
         match active_table(&self.status()?) {
-            Some((active, TableInfo { generation: Some(generation), crc: theirs, .. }))
-                if active == slot && theirs == crc =>
-            {
-                Ok(Flashed { slot, generation, crc, bytes: image.len() })
-            }
+            Some((
+                active,
+                TableInfo {
+                    generation: Some(generation),
+                    crc: theirs,
+                    ..
+                },
+            )) if active == slot && theirs == crc => Ok(Flashed {
+                slot,
+                generation,
+                crc,
+                bytes: image.len(),
+            }),
             _ => Err(ControllerError::ReadBack { slot, offset: 0 }),
         }
     }
@@ -100,7 +108,11 @@ impl Controller {
     ///
     /// # Errors
     /// [`ControllerError::Refused`], those of the link.
-    pub fn write(&mut self, image: &[u8], progress: &mut dyn FnMut(Progress)) -> Result<u8, ControllerError> {
+    pub fn write(
+        &mut self,
+        image: &[u8],
+        progress: &mut dyn FnMut(Progress),
+    ) -> Result<u8, ControllerError> {
         let mut attempt = 1;
         loop {
             match self.try_write(image, progress) {
@@ -113,11 +125,20 @@ impl Controller {
         }
     }
 
-    fn try_write(&mut self, image: &[u8], progress: &mut dyn FnMut(Progress)) -> Result<u8, ControllerError> {
+    fn try_write(
+        &mut self,
+        image: &[u8],
+        progress: &mut dyn FnMut(Progress),
+    ) -> Result<u8, ControllerError> {
         let max = self.identity().max_image_bytes;
-        let length = u16::try_from(image.len()).ok().filter(|length| *length <= max);
+        let length = u16::try_from(image.len())
+            .ok()
+            .filter(|length| *length <= max);
         let length = length.ok_or(ControllerError::Refused(Refusal::UploadTooLong { max }))?;
-        self.command(Command::WriteBegin { length, crc: crc32(image) })?;
+        self.command(Command::WriteBegin {
+            length,
+            crc: crc32(image),
+        })?;
         self.send_pieces(image, progress)?;
         progress(Progress::Sent(image.len(), image.len()));
         match self.ask(Command::WriteEnd)? {
@@ -139,7 +160,9 @@ impl Controller {
         progress(Progress::Sent(0, image.len()));
         let pieces: Vec<&[u8]> = image.chunks(CHUNK).collect();
         let request = |index: usize| {
-            let data = pieces.get(index).and_then(|piece| Chunk::from_slice(piece).ok());
+            let data = pieces
+                .get(index)
+                .and_then(|piece| Chunk::from_slice(piece).ok());
             let offset = u16::try_from(index * CHUNK).ok();
             let (offset, data) = offset.zip(data).ok_or(ControllerError::WrongReply)?;
             Ok(Command::WriteChunk { offset, data })
@@ -149,8 +172,10 @@ impl Controller {
             let done = match answer {
                 Ok(Reply::Done) => index + 1,
                 Ok(_) => return Err(ControllerError::WrongReply),
-                Err(Refusal::OutOfOrder { expected }) => whole_pieces(usize::from(expected), image.len())
-                    .ok_or(ControllerError::Refused(Refusal::OutOfOrder { expected }))?,
+                Err(Refusal::OutOfOrder { expected }) => {
+                    whole_pieces(usize::from(expected), image.len())
+                        .ok_or(ControllerError::Refused(Refusal::OutOfOrder { expected }))?
+                }
                 Err(refusal) => return Err(ControllerError::Refused(refusal)),
             };
             if done > most {
@@ -170,7 +195,11 @@ impl Controller {
         let piece = |index: usize| (length - length.min(index * CHUNK)).min(CHUNK);
         let request = |index: usize| {
             let offset = u16::try_from(index * CHUNK).map_err(|_| ControllerError::WrongReply)?;
-            Ok(Command::ReadBack { slot, offset, length: piece(index) as u8 })
+            Ok(Command::ReadBack {
+                slot,
+                offset,
+                length: piece(index) as u8,
+            })
         };
         self.series(length.div_ceil(CHUNK), &request, &mut |index, answer| {
             let Reply::Data { offset, data } = answer.map_err(ControllerError::Refused)? else {
@@ -201,7 +230,9 @@ impl Controller {
     /// # Errors
     /// Those of the link.
     pub fn verify(&mut self, image: &[u8]) -> Result<Verdict, ControllerError> {
-        let Some((slot, info)) = active_table(&self.status()?) else { return Ok(Verdict::None) };
+        let Some((slot, info)) = active_table(&self.status()?) else {
+            return Ok(Verdict::None);
+        };
         let stored = self.read_slot(slot, usize::from(info.length))?;
         Ok(match first_difference(&stored, image) {
             None => Verdict::Same { slot },
@@ -212,7 +243,8 @@ impl Controller {
 
 /// How many pieces of an image end at `offset`; `None` if none does.
 fn whole_pieces(offset: usize, length: usize) -> Option<usize> {
-    (offset == length || offset < length && offset.is_multiple_of(CHUNK)).then(|| offset.div_ceil(CHUNK))
+    (offset == length || offset < length && offset.is_multiple_of(CHUNK))
+        .then(|| offset.div_ceil(CHUNK))
 }
 
 fn first_difference(a: &[u8], b: &[u8]) -> Option<usize> {

@@ -45,7 +45,9 @@ impl Board {
 
     /// The board of this name.
     pub fn named(name: &str) -> Option<Self> {
-        [Self::Mps2An386, Self::Stm32f405].into_iter().find(|board| board.name() == name)
+        [Self::Mps2An386, Self::Stm32f405]
+            .into_iter()
+            .find(|board| board.name() == name)
     }
 
     /// The emulator's serial ports in order: which is the link, and which lead to a socket of this name.
@@ -101,7 +103,10 @@ pub enum Toolchain {
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 
 fn sysroot(rustc: &str) -> Option<PathBuf> {
-    let output = Command::new(rustc).args(["--print", "sysroot"]).output().ok()?;
+    let output = Command::new(rustc)
+        .args(["--print", "sysroot"])
+        .output()
+        .ok()?;
     let path = String::from_utf8(output.stdout).ok()?;
     output.status.success().then(|| PathBuf::from(path.trim()))
 }
@@ -136,18 +141,35 @@ impl Toolchain {
 
     /// The cargo command that builds a board's image with these extra features.
     pub fn cargo(&self, board: Board, features: &[&str]) -> Command {
-        let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| OsString::from("cargo")));
+        let mut cargo =
+            Command::new(std::env::var_os("CARGO").unwrap_or_else(|| OsString::from("cargo")));
         let mut wanted = vec![board.name()];
         wanted.extend(features);
-        cargo.args(["build", "-p", "giotto-firmware", "--bin", board.name(), "--no-default-features"]);
-        cargo.args(["--features", &wanted.join(","), "--target", TARGET, "--profile", PROFILE]);
+        cargo.args([
+            "build",
+            "-p",
+            "giotto-firmware",
+            "--bin",
+            board.name(),
+            "--no-default-features",
+        ]);
+        cargo.args([
+            "--features",
+            &wanted.join(","),
+            "--target",
+            TARGET,
+            "--profile",
+            PROFILE,
+        ]);
         if let Self::Debian { linker } = self {
             cargo.args(["-Z", "build-std=core"]);
             cargo.env("RUSTC", DEBIAN_RUSTC).env("RUSTC_BOOTSTRAP", "1");
             cargo.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", linker);
         }
         // Flags meant for the host's compiler do not fit the controller's.
-        cargo.env_remove("RUSTFLAGS").env_remove("CARGO_ENCODED_RUSTFLAGS");
+        cargo
+            .env_remove("RUSTFLAGS")
+            .env_remove("CARGO_ENCODED_RUSTFLAGS");
         cargo
     }
 }
@@ -199,17 +221,36 @@ pub fn ensure_with(
     if built.is_some() && newest.is_none_or(|newest| built >= Some(newest)) {
         return Ok(path);
     }
-    let what = if built.is_some() { "older than its sources" } else { "missing" };
-    let no_image = |reason: String| ControllerError::NoImage { path: path.clone(), reason };
+    let what = if built.is_some() {
+        "older than its sources"
+    } else {
+        "missing"
+    };
+    let no_image = |reason: String| ControllerError::NoImage {
+        path: path.clone(),
+        reason,
+    };
     let Some(toolchain) = Toolchain::find() else {
         return Err(no_image(format!("no compiler for {TARGET} is installed")));
     };
-    note(&format!("firmware image {} is {what}: building it with {}", board.name(), toolchain.name()));
+    note(&format!(
+        "firmware image {} is {what}: building it with {}",
+        board.name(),
+        toolchain.name()
+    ));
     let mut cargo = toolchain.cargo(board, features);
-    let output = cargo.arg("--target-dir").arg(&target).current_dir(workspace()).output();
+    let output = cargo
+        .arg("--target-dir")
+        .arg(&target)
+        .current_dir(workspace())
+        .output();
     let output = output.map_err(|error| no_image(format!("cargo cannot be run: {error}")))?;
     if !output.status.success() {
-        return Err(no_image(String::from_utf8_lossy(&output.stderr).trim_end().to_owned()));
+        return Err(no_image(
+            String::from_utf8_lossy(&output.stderr)
+                .trim_end()
+                .to_owned(),
+        ));
     }
     Ok(path)
 }
@@ -223,7 +264,11 @@ fn newest_below(folder: &Path) -> Option<SystemTime> {
     let entries = folder.read_dir().ok()?;
     let times = entries.flatten().filter_map(|entry| {
         let path = entry.path();
-        if path.is_dir() { newest_below(&path) } else { modified(&path) }
+        if path.is_dir() {
+            newest_below(&path)
+        } else {
+            modified(&path)
+        }
     });
     times.max()
 }

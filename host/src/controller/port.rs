@@ -53,7 +53,11 @@ pub struct OpenOptions {
 
 impl Default for OpenOptions {
     fn default() -> Self {
-        Self { image: None, baud: BAUD, pace: Pace::Fast }
+        Self {
+            image: None,
+            baud: BAUD,
+            pace: Pace::Fast,
+        }
     }
 }
 
@@ -69,8 +73,13 @@ pub fn open(
     match port {
         Port::Sim => Controller::connect(Box::new(VirtualLink::new()), "sim", 1),
         Port::Qemu | Port::QemuBoard(_) => {
-            let board = if let Port::QemuBoard(board) = port { *board } else { Board::Mps2An386 };
-            let emulator = Emulator::start_board(board, options.image.as_deref(), options.pace, note)?;
+            let board = if let Port::QemuBoard(board) = port {
+                *board
+            } else {
+                Board::Mps2An386
+            };
+            let emulator =
+                Emulator::start_board(board, options.image.as_deref(), options.pace, note)?;
             let mut controller = Controller::connect(Box::new(emulator.into_link()?), "qemu", 1)?;
             // Its time does not wait for ours: a second of silence there may be a moment here.
             controller.supervise(None)?;
@@ -85,6 +94,8 @@ pub fn open(
 
 /// A session number that another client is unlikely to have: no two opened within 65 s of a process id.
 fn session() -> u16 {
-    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let now = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .unwrap_or_default();
     (now.as_millis() as u16) ^ (std::process::id() as u16).rotate_left(8)
 }

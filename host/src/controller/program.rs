@@ -38,10 +38,10 @@ impl From<ControllerError> for ProgramError {
 fn exact(steps: &[Step], from_nm: [i32; 3]) -> Result<Vec<(ExactSegment, u32)>, ProgramError> {
     let mut at = from_nm;
     let one = |(step, wanted): (usize, &Step)| {
-        let segment = wanted
-            .segment
-            .exact(at)
-            .map_err(|error| ProgramError { step: Some(step), error: ControllerError::Path(error) })?;
+        let segment = wanted.segment.exact(at).map_err(|error| ProgramError {
+            step: Some(step),
+            error: ControllerError::Path(error),
+        })?;
         at = segment.end_nm(at);
         Ok((segment, (wanted.tolerance_m.max(0.0) * 1e9) as u32))
     };
@@ -74,7 +74,9 @@ impl Controller {
         let segments = exact(steps, from_nm)?;
         self.command(Command::Begin)?;
         self.append_all(&segments)?;
-        Ok(segments.iter().fold(from_nm, |at, (segment, _)| segment.end_nm(at)))
+        Ok(segments
+            .iter()
+            .fold(from_nm, |at, (segment, _)| segment.end_nm(at)))
     }
 
     /// Moves in a straight line to a place, nm, once what runs has come to its end, and returns when the machine stands there.
@@ -86,7 +88,10 @@ impl Controller {
             return Ok(());
         }
         let to_m = to_nm.map(|nm| f64::from(nm) * 1e-9);
-        let step = Step { segment: Segment::Line { to_m, feed_m_s }, tolerance_m: 0.0 };
+        let step = Step {
+            segment: Segment::Line { to_m, feed_m_s },
+            tolerance_m: 0.0,
+        };
         self.send_program(&[step]).map_err(|error| error.error)?;
         self.at_rest().map(drop)
     }
@@ -104,10 +109,16 @@ impl Controller {
 
     fn append_all(&mut self, segments: &[(ExactSegment, u32)]) -> Result<(), ProgramError> {
         for (step, &(segment, tolerance_nm)) in segments.iter().enumerate() {
-            if let Err(error) = self.append(&Command::Append { segment, tolerance_nm }) {
+            if let Err(error) = self.append(&Command::Append {
+                segment,
+                tolerance_nm,
+            }) {
                 // What was accepted runs to its end.
                 let _ = self.command(Command::End);
-                return Err(ProgramError { step: Some(step), error });
+                return Err(ProgramError {
+                    step: Some(step),
+                    error,
+                });
             }
         }
         Ok(self.command(Command::End)?)

@@ -11,7 +11,14 @@ const KEEP_ALIVE: Duration = Duration::from_millis(SUPERVISE_MS as u64 / 4);
 
 /// `laps` turns about the origin from polar angle 0; SI.
 pub const fn circle(radius_m: f64, feed_m_s: f64, direction: Direction, laps: u32) -> CircleRun {
-    CircleRun { centre_m: [0.0; 3], radius_m, feed_m_s, direction, laps, start_rad: 0.0 }
+    CircleRun {
+        centre_m: [0.0; 3],
+        radius_m,
+        feed_m_s,
+        direction,
+        laps,
+        start_rad: 0.0,
+    }
 }
 
 /// One set-point.
@@ -51,7 +58,11 @@ impl Controller {
     ///
     /// # Errors
     /// [`ControllerError::Refused`]; [`ControllerError::SetPointsLost`] if the record has a gap; those of the link.
-    pub fn run_circle(&mut self, circle: &CircleRun, every: u16) -> Result<Recording, ControllerError> {
+    pub fn run_circle(
+        &mut self,
+        circle: &CircleRun,
+        every: u16,
+    ) -> Result<Recording, ControllerError> {
         self.begin_recording(every)?;
         self.start_circle(circle)?;
         self.end_recording(every)
@@ -60,8 +71,14 @@ impl Controller {
     /// Set-points are put away from now on.
     pub(super) fn begin_recording(&mut self, every: u16) -> Result<(), ControllerError> {
         // What is left of another run comes before the second answer.
-        self.command(Command::Subscribe { every: 0, on_link: true })?;
-        self.command(Command::Subscribe { every: every.max(1), on_link: true })?;
+        self.command(Command::Subscribe {
+            every: 0,
+            on_link: true,
+        })?;
+        self.command(Command::Subscribe {
+            every: every.max(1),
+            on_link: true,
+        })?;
         self.set_points.clear();
         Ok(())
     }
@@ -81,9 +98,15 @@ impl Controller {
                 return Err(ControllerError::SetPointsLost { lost: 1 });
             }
             spoke_at = self.now();
-            at_rest = !matches!(self.status()?.motion, MotionState::Running | MotionState::Stopping);
+            at_rest = !matches!(
+                self.status()?.motion,
+                MotionState::Running | MotionState::Stopping
+            );
         }
-        self.command(Command::Subscribe { every: 0, on_link: true })?;
+        self.command(Command::Subscribe {
+            every: 0,
+            on_link: true,
+        })?;
         self.recording(every)
     }
 
@@ -95,17 +118,27 @@ impl Controller {
         for batch in self.set_points.drain(..) {
             let gap = batch.tick.wrapping_sub(due.unwrap_or(batch.tick));
             lost += (gap / u32::from(every)) as usize;
-            due = Some(batch.tick.wrapping_add(batch.points.len() as u32 * u32::from(every)));
+            due = Some(
+                batch
+                    .tick
+                    .wrapping_add(batch.points.len() as u32 * u32::from(every)),
+            );
             points.extend(batch.points);
         }
         if lost > 0 {
             return Err(ControllerError::SetPointsLost { lost });
         }
-        let timed = points.into_iter().enumerate().map(|(index, point)| SetPointRecord {
-            time_s: index as f64 * dt_s,
-            programmed_m: metres(point.raw_nm),
-            corrected_m: metres(point.corrected_nm),
-        });
-        Ok(Recording { dt_s, points: timed.collect() })
+        let timed = points
+            .into_iter()
+            .enumerate()
+            .map(|(index, point)| SetPointRecord {
+                time_s: index as f64 * dt_s,
+                programmed_m: metres(point.raw_nm),
+                corrected_m: metres(point.corrected_nm),
+            });
+        Ok(Recording {
+            dt_s,
+            points: timed.collect(),
+        })
     }
 }

@@ -18,14 +18,23 @@ impl SerialLink {
     /// [`ControllerError::NoPort`], [`ControllerError::InUse`], [`ControllerError::CannotOpen`].
     pub fn open(path: &str, baud: u32) -> Result<Self, ControllerError> {
         let port = path.to_owned();
-        match serialport::new(path, baud).timeout(Duration::from_millis(100)).open() {
-            Ok(port) => Ok(Self { port, opened: Instant::now() }),
+        match serialport::new(path, baud)
+            .timeout(Duration::from_millis(100))
+            .open()
+        {
+            Ok(port) => Ok(Self {
+                port,
+                opened: Instant::now(),
+            }),
             Err(error) => Err(match error.kind {
                 ErrorKind::Io(io::ErrorKind::NotFound) => ControllerError::NoPort { port },
                 ErrorKind::NoDevice | ErrorKind::Io(io::ErrorKind::WouldBlock) => {
                     ControllerError::InUse { port }
                 }
-                _ => ControllerError::CannotOpen { port, reason: error.description },
+                _ => ControllerError::CannotOpen {
+                    port,
+                    reason: error.description,
+                },
             }),
         }
     }
@@ -37,14 +46,24 @@ impl Link for SerialLink {
     }
 
     fn receive(&mut self, buffer: &mut [u8], until: Duration) -> io::Result<usize> {
-        let left = until.saturating_sub(self.now()).max(Duration::from_millis(1));
+        let left = until
+            .saturating_sub(self.now())
+            .max(Duration::from_millis(1));
         self.port.set_timeout(left).map_err(io::Error::from)?;
         match self.port.read(buffer) {
-            Err(error) if matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::Interrupted) => {
+            Err(error)
+                if matches!(
+                    error.kind(),
+                    io::ErrorKind::TimedOut | io::ErrorKind::Interrupted
+                ) =>
+            {
                 Ok(0)
             }
             // A pty whose other end is gone reads as an empty stream.
-            Ok(0) => Err(io::Error::new(io::ErrorKind::BrokenPipe, "the other end has closed the port")),
+            Ok(0) => Err(io::Error::new(
+                io::ErrorKind::BrokenPipe,
+                "the other end has closed the port",
+            )),
             result => result,
         }
     }

@@ -63,7 +63,11 @@ impl Series {
     }
 
     fn on_the_way(&self) -> usize {
-        self.sent.iter().skip(self.settled).map(|sent| sent.bytes).sum()
+        self.sent
+            .iter()
+            .skip(self.settled)
+            .map(|sent| sent.bytes)
+            .sum()
     }
 
     /// Whether a frame of so many bytes may be sent now.
@@ -102,7 +106,9 @@ impl Controller {
             match self.arrival(until)? {
                 Some(Arrival::Reply(seq, reply)) => {
                     let at = usize::from(seq.wrapping_sub(series.first));
-                    let Some(&Sent { index, when, .. }) = series.sent.get(at) else { continue };
+                    let Some(&Sent { index, when, .. }) = series.sent.get(at) else {
+                        continue;
+                    };
                     series.patience = (2 * (self.now() - when)).clamp(REPEAT_AFTER, MOST_PATIENCE);
                     // Answers come in the order of the requests.
                     series.settled = series.settled.max(at + 1);
@@ -144,7 +150,11 @@ impl Controller {
                 break;
             }
             self.send_frame(seq, &frame, index < series.farthest)?;
-            series.sent.push(Sent { index, bytes: frame.len() + 1, when: self.now() });
+            series.sent.push(Sent {
+                index,
+                bytes: frame.len() + 1,
+                when: self.now(),
+            });
             series.next = index + 1;
             series.farthest = series.farthest.max(series.next);
         }

@@ -33,8 +33,13 @@ impl Controller {
         let before = self.status()?;
         self.begin_recording(every)?;
         // Begins when the queue is full.
-        self.command(Command::BeginStream { feed_m_s: feed_m_s as f32, ahead: u16::MAX })?;
-        let sent = self.send_points(before.raw_nm, places_nm).and_then(|()| self.append(&Command::End));
+        self.command(Command::BeginStream {
+            feed_m_s: feed_m_s as f32,
+            ahead: u16::MAX,
+        })?;
+        let sent = self
+            .send_points(before.raw_nm, places_nm)
+            .and_then(|()| self.append(&Command::End));
         let recording = self.end_recording(every);
         let after = self.status()?;
         let (was, is) = (before.counters, after.counters);
@@ -62,17 +67,27 @@ impl Controller {
         feed_m_s: f64,
     ) -> Result<Status, ControllerError> {
         let before = self.status()?;
-        self.command(Command::BeginStream { feed_m_s: feed_m_s as f32, ahead: u16::MAX })?;
+        self.command(Command::BeginStream {
+            feed_m_s: feed_m_s as f32,
+            ahead: u16::MAX,
+        })?;
         self.send_points(before.raw_nm, places_nm)?;
         self.at_rest()
     }
 
-    fn send_points(&mut self, from_nm: [i32; 3], places_nm: &[[i32; 3]]) -> Result<(), ControllerError> {
+    fn send_points(
+        &mut self,
+        from_nm: [i32; 3],
+        places_nm: &[[i32; 3]],
+    ) -> Result<(), ControllerError> {
         let mut writer = Steps::from(from_nm);
         let mut rest = places_nm;
         while !rest.is_empty() {
             let mut steps = Chunk::new();
-            let fitting = rest.iter().take(POINTS).take_while(|&&place| writer.write(place, &mut steps));
+            let fitting = rest
+                .iter()
+                .take(POINTS)
+                .take_while(|&&place| writer.write(place, &mut steps));
             rest = &rest[fitting.count()..];
             self.append(&Command::Points { steps })?;
         }

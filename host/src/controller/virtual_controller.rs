@@ -20,7 +20,11 @@ pub const TICK_HZ: u32 = 1000;
 const SLOT: usize = 4096;
 /// Two slots and the key, each one erase unit.
 const LAYOUT: Layout = Layout::new([0, SLOT as u32], SLOT as u32).with_key(2 * SLOT as u32);
-const BOARD: Board = Board { name: "virtual", build: env!("CARGO_PKG_VERSION"), tick_hz: TICK_HZ };
+const BOARD: Board = Board {
+    name: "virtual",
+    build: env!("CARGO_PKG_VERSION"),
+    tick_hz: TICK_HZ,
+};
 
 /// Flash of a virtual controller.
 pub type Flash = RamFlash<{ 3 * SLOT }, SLOT>;
@@ -36,7 +40,13 @@ impl<T> Queue<T> {
     /// Both ends.
     fn new(capacity: usize) -> (Self, Self) {
         let things = Arc::new(Mutex::new(VecDeque::with_capacity(capacity)));
-        (Self { things: Arc::clone(&things), capacity }, Self { things, capacity })
+        (
+            Self {
+                things: Arc::clone(&things),
+                capacity,
+            },
+            Self { things, capacity },
+        )
     }
 
     fn with<R>(&self, act: impl FnOnce(&mut VecDeque<T>) -> R) -> R {
@@ -149,7 +159,13 @@ impl VirtualController {
         let desk = Desk::new(planner, Arc::clone(&shared), segments_in, points_out);
         let server = Server::boot(BOARD, flash, LAYOUT, desk, Box::default());
         let tick = Tick::new(executor, Arc::clone(&shared), segments_out, points_in);
-        Self { server, tick, shared, wires: Wires::default(), ticks: 0 }
+        Self {
+            server,
+            tick,
+            shared,
+            wires: Wires::default(),
+            ticks: 0,
+        }
     }
 
     /// Takes bytes from the host.
@@ -186,7 +202,11 @@ impl VirtualController {
         let flash = self.server.store_mut().flash_mut().clone();
         let wires = std::mem::take(&mut self.wires);
         let ticks = self.ticks;
-        *self = Self { wires, ticks, ..Self::boot(flash) };
+        *self = Self {
+            wires,
+            ticks,
+            ..Self::boot(flash)
+        };
     }
 }
 
@@ -231,12 +251,18 @@ impl Link for VirtualLink {
 /// Those of the pty.
 pub fn serve(ready: &mut dyn FnMut(&str)) -> Result<Infallible, ControllerError> {
     use serialport::{SerialPort, TTYPort};
-    let cannot = |reason: String| ControllerError::CannotOpen { port: "pty".to_owned(), reason };
+    let cannot = |reason: String| ControllerError::CannotOpen {
+        port: "pty".to_owned(),
+        reason,
+    };
     let (mut near, far) = TTYPort::pair().map_err(|error| cannot(error.description))?;
-    let path = far.name().ok_or_else(|| cannot("it has no name".to_owned()))?;
+    let path = far
+        .name()
+        .ok_or_else(|| cannot("it has no name".to_owned()))?;
     // Closed, because it is locked: a client could not open it. Until one does, the near end reads as hung up.
     drop(far);
-    near.set_timeout(Duration::from_millis(1)).map_err(|error| cannot(error.description))?;
+    near.set_timeout(Duration::from_millis(1))
+        .map_err(|error| cannot(error.description))?;
     ready(&path);
     let mut controller = VirtualController::default();
     let started = Instant::now();
@@ -244,7 +270,11 @@ pub fn serve(ready: &mut dyn FnMut(&str)) -> Result<Infallible, ControllerError>
     loop {
         match near.read(&mut buffer) {
             Ok(count) => controller.receive(&buffer[..count]),
-            Err(error) if matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::Interrupted) => {}
+            Err(error)
+                if matches!(
+                    error.kind(),
+                    io::ErrorKind::TimedOut | io::ErrorKind::Interrupted
+                ) => {}
             // No client: nothing to do but to let time pass.
             Err(_) => std::thread::sleep(Duration::from_millis(5)),
         }

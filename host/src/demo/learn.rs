@@ -40,7 +40,13 @@ pub fn learn(plan: &Plan, seed: u64) -> Result<Learned, DemoError> {
     let fit = RadiusFit::new(&observations, fit::Options::default())?;
     let diagnosis = diagnose(&campaign, &diagnosis::Options { model: None, seed })?;
     let table = table_from_model(&diagnosis.model)?;
-    Ok(Learned { campaign, report, fit, diagnosis, table })
+    Ok(Learned {
+        campaign,
+        report,
+        fit,
+        diagnosis,
+        table,
+    })
 }
 
 /// The table in the form in which it is flashed.

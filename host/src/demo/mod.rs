@@ -54,7 +54,9 @@ pub enum DemoError {
     #[error(transparent)]
     Table(#[from] TableError),
     /// The set-points of a circle hold no steady turn.
-    #[error("the set-points of R {radius_mm} mm at {feed_mm_s} mm/s hold no whole turn at constant rate")]
+    #[error(
+        "the set-points of R {radius_mm} mm at {feed_mm_s} mm/s hold no whole turn at constant rate"
+    )]
     NoSteadyTurn {
         /// Programmed radius, mm.
         radius_mm: f64,
@@ -71,5 +73,8 @@ pub enum DemoError {
 /// # Errors
 /// None in a build whose tests pass.
 pub fn bundled() -> Result<Plan, DemoError> {
-    Ok(Plan::parse(CAMPAIGN, Path::new("the demo's campaign.toml"))?)
+    Ok(Plan::parse(
+        CAMPAIGN,
+        Path::new("the demo's campaign.toml"),
+    )?)
 }

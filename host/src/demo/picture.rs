@@ -25,12 +25,19 @@ pub fn picture(proof: &Proof) -> String {
         let error = |p: &Pair| p.before.analysis.radius_error_m.abs();
         error(a).total_cmp(&error(b))
     };
-    let Some(worst) = proof.circles.iter().max_by(farthest) else { return String::new() };
-    let (radius_m, feed_m_s) = (worst.before.analysis.radius_m, worst.before.analysis.feed_m_s);
+    let Some(worst) = proof.circles.iter().max_by(farthest) else {
+        return String::new();
+    };
+    let (radius_m, feed_m_s) = (
+        worst.before.analysis.radius_m,
+        worst.before.analysis.feed_m_s,
+    );
     let both: Vec<&Pair> = proof
         .circles
         .iter()
-        .filter(|p| p.before.analysis.radius_m == radius_m && p.before.analysis.feed_m_s == feed_m_s)
+        .filter(|p| {
+            p.before.analysis.radius_m == radius_m && p.before.analysis.feed_m_s == feed_m_s
+        })
         .collect();
     let largest = both
         .iter()
@@ -52,16 +59,23 @@ pub fn picture(proof: &Proof) -> String {
         feed_m_s * 1e3,
     );
     #[allow(clippy::type_complexity, reason = "a table of panels, read once")]
-    let panels: [(&str, f64, fn(&Pair) -> &Measured); 3] =
-        [("before", 1.0, |p| &p.before), ("after", 1.0, |p| &p.after), ("after", CLOSER, |p| &p.after)];
+    let panels: [(&str, f64, fn(&Pair) -> &Measured); 3] = [
+        ("before", 1.0, |p| &p.before),
+        ("after", 1.0, |p| &p.after),
+        ("after", CLOSER, |p| &p.after),
+    ];
     for (index, (title, closer, of)) in panels.into_iter().enumerate() {
         let x = PANEL * (index as f64 + 0.5);
         let magnification = scale * closer * radius_m / NOMINAL;
         let runs: Vec<&Measured> = both.iter().map(|p| of(p)).collect();
         panel(&mut svg, x, title, &runs, scale * closer, magnification);
     }
-    for (row, (direction, words)) in
-        [(Direction::Ccw, "counter-clockwise"), (Direction::Cw, "clockwise")].into_iter().enumerate()
+    for (row, (direction, words)) in [
+        (Direction::Ccw, "counter-clockwise"),
+        (Direction::Cw, "clockwise"),
+    ]
+    .into_iter()
+    .enumerate()
     {
         let x = width / 2.0 - 150.0 + 170.0 * row as f64;
         let _ = writeln!(
@@ -83,7 +97,14 @@ fn colour(direction: Direction) -> &'static str {
 }
 
 /// One panel: `scale` is picture units a metre of deviation.
-fn panel(svg: &mut String, x: f64, title: &str, runs: &[&Measured], scale: f64, magnification: f64) {
+fn panel(
+    svg: &mut String,
+    x: f64,
+    title: &str,
+    runs: &[&Measured],
+    scale: f64,
+    magnification: f64,
+) {
     let ring_m = ring(scale);
     let _ = writeln!(
         svg,
@@ -93,9 +114,11 @@ fn panel(svg: &mut String, x: f64, title: &str, runs: &[&Measured], scale: f64, 
         svg,
         r##"<text y="-142" text-anchor="middle" fill="#666">deviation × {magnification:.0}</text>"##
     );
-    for (radius, dash) in
-        [(NOMINAL, ""), (NOMINAL - ring_m * scale, "3 4"), (NOMINAL + ring_m * scale, "3 4")]
-    {
+    for (radius, dash) in [
+        (NOMINAL, ""),
+        (NOMINAL - ring_m * scale, "3 4"),
+        (NOMINAL + ring_m * scale, "3 4"),
+    ] {
         let _ = writeln!(
             svg,
             r##"<circle r="{radius:.1}" fill="none" stroke="#999" stroke-dasharray="{dash}"/>"##
@@ -109,8 +132,9 @@ fn panel(svg: &mut String, x: f64, title: &str, runs: &[&Measured], scale: f64, 
             colour(run.analysis.direction)
         );
     }
-    let mean =
-        |of: fn(&Measured) -> f64| runs.iter().map(|r| of(r)).sum::<f64>() / runs.len().max(1) as f64 * 1e6;
+    let mean = |of: fn(&Measured) -> f64| {
+        runs.iter().map(|r| of(r)).sum::<f64>() / runs.len().max(1) as f64 * 1e6
+    };
     let _ = writeln!(
         svg,
         r##"<g paint-order="stroke" stroke="#fff" stroke-width="4"><text y="-6" text-anchor="middle">radius {:+.2} µm</text><text y="12" text-anchor="middle">form {:.1} µm</text></g><text y="150" text-anchor="middle" fill="#666">dashed: ±{:.0} µm</text></g>"##,
@@ -124,7 +148,11 @@ fn panel(svg: &mut String, x: f64, title: &str, runs: &[&Measured], scale: f64, 
 fn ring(scale: f64) -> f64 {
     let wanted = 20.0 / scale;
     let decade = 10f64.powf(wanted.log10().floor());
-    [5.0, 2.0, 1.0].into_iter().map(|k| k * decade).find(|v| *v <= wanted).unwrap_or(decade)
+    [5.0, 2.0, 1.0]
+        .into_iter()
+        .map(|k| k * decade)
+        .find(|v| *v <= wanted)
+        .unwrap_or(decade)
 }
 
 /// Closed path of a run, the means of its samples over equal parts of the turn.
@@ -137,10 +165,20 @@ fn outline(run: &Measured, scale: f64) -> String {
         *count += 1.0;
     }
     let mut path = String::new();
-    for (part, (sum, count)) in sums.into_iter().enumerate().filter(|(_, (_, count))| *count > 0.0) {
+    for (part, (sum, count)) in sums
+        .into_iter()
+        .enumerate()
+        .filter(|(_, (_, count))| *count > 0.0)
+    {
         let (sin, cos) = ((part as f64 + 0.5) / POINTS as f64 * TAU).sin_cos();
         let r = NOMINAL + scale * sum / count;
-        let _ = write!(path, "{}{:.1} {:.1}", if path.is_empty() { 'M' } else { 'L' }, r * cos, -r * sin);
+        let _ = write!(
+            path,
+            "{}{:.1} {:.1}",
+            if path.is_empty() { 'M' } else { 'L' },
+            r * cos,
+            -r * sin
+        );
     }
     path.push('Z');
     path

@@ -14,7 +14,12 @@ use std::f64::consts::TAU;
 
 /// Radius, mm, and feed, mm/s, of the circles that prove the correction; each is run both ways. None of these
 /// radii and none of these feeds is in the campaign; all lie within its ranges, where the table is valid.
-pub const CIRCLES: [(f64, f64); 4] = [(110.0, 680.0), (130.0, 550.0), (190.0, 650.0), (250.0, 630.0)];
+pub const CIRCLES: [(f64, f64); 4] = [
+    (110.0, 680.0),
+    (130.0, 550.0),
+    (190.0, 650.0),
+    (250.0, 630.0),
+];
 
 /// Turns at constant rate: the machine settles in the first, the last is measured.
 const LAPS: u32 = 2;
@@ -70,7 +75,11 @@ impl Proof {
     fn size(&self, of: fn(&Pair) -> &Measured) -> Size {
         let n = self.circles.len().max(1) as f64;
         let rms = |value: fn(&RunAnalysis) -> f64| {
-            let squares: f64 = self.circles.iter().map(|pair| value(&of(pair).analysis).powi(2)).sum();
+            let squares: f64 = self
+                .circles
+                .iter()
+                .map(|pair| value(&of(pair).analysis).powi(2))
+                .sum();
             (squares / n).sqrt()
         };
         Size {
@@ -97,7 +106,8 @@ impl Proof {
     /// Whether the size error fell by [`REDUCTION_PERCENT`] or to [`LEFT_M`], and the out-of-roundness fell.
     pub fn holds(&self) -> bool {
         let (before, after) = (self.before(), self.after());
-        let size = self.reduction_percent() >= REDUCTION_PERCENT || after.radius_error_rms_m <= LEFT_M;
+        let size =
+            self.reduction_percent() >= REDUCTION_PERCENT || after.radius_error_rms_m <= LEFT_M;
         size && after.out_of_roundness_m < before.out_of_roundness_m
     }
 }
@@ -130,7 +140,9 @@ pub fn prove(
         for (radius_mm, feed_mm_s) in CIRCLES {
             for direction in [Direction::Ccw, Direction::Cw] {
                 let state = if bypass { "off" } else { "on" };
-                progress(&format!("R {radius_mm} mm, {feed_mm_s} mm/s, correction {state}"));
+                progress(&format!(
+                    "R {radius_mm} mm, {feed_mm_s} mm/s, correction {state}"
+                ));
                 let test = CircleTest::new(radius_mm * 1e-3, feed_mm_s * 1e-3, direction);
                 let stream = STREAM + 2 * done.len() as u64 + u64::from(bypass);
                 done.push(run(controller, plan, &test, seed, stream)?);
@@ -144,7 +156,11 @@ pub fn prove(
         flashed,
         clamped: since.offset_clamps.wrapping_sub(counters.offset_clamps)
             + since.slew_clamps.wrapping_sub(counters.slew_clamps),
-        circles: before.into_iter().zip(after).map(|(before, after)| Pair { before, after }).collect(),
+        circles: before
+            .into_iter()
+            .zip(after)
+            .map(|(before, after)| Pair { before, after })
+            .collect(),
     })
 }
 
@@ -157,12 +173,19 @@ fn run(
     stream: u64,
 ) -> Result<Measured, DemoError> {
     let every = (controller.identity().tick_hz / RATE_HZ).clamp(1, u32::from(u16::MAX)) as u16;
-    let recording =
-        controller.run_circle(&circle(test.radius_m, test.feed_m_s, test.direction, LAPS), every)?;
-    let turn = last_turn(&recording, test)
-        .ok_or(DemoError::NoSteadyTurn { radius_mm: test.radius_m * 1e3, feed_mm_s: test.feed_m_s * 1e3 })?;
-    let position_m: Vec<[f64; 2]> =
-        recording.points.iter().map(|p| [p.corrected_m[0], p.corrected_m[1]]).collect();
+    let recording = controller.run_circle(
+        &circle(test.radius_m, test.feed_m_s, test.direction, LAPS),
+        every,
+    )?;
+    let turn = last_turn(&recording, test).ok_or(DemoError::NoSteadyTurn {
+        radius_mm: test.radius_m * 1e3,
+        feed_mm_s: test.feed_m_s * 1e3,
+    })?;
+    let position_m: Vec<[f64; 2]> = recording
+        .points
+        .iter()
+        .map(|p| [p.corrected_m[0], p.corrected_m[1]])
+        .collect();
     let path = drive(
         &plan.machine,
         &SetPoints {
@@ -173,7 +196,10 @@ fn run(
             hold: Hold::Cubic,
         },
     );
-    let test = CircleTest { start_angle_rad: turn.angle_rad, ..*test };
+    let test = CircleTest {
+        start_angle_rad: turn.angle_rad,
+        ..*test
+    };
     let trace = path.lap(&test, turn.start_s, turn.turn_s);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(stream);
@@ -189,7 +215,10 @@ fn run(
         samples: plan.instrument.record(&test, &trace, &mut rng),
     };
     let analysis = analysis::of_run(&run, None)?;
-    Ok(Measured { samples: run.samples, analysis })
+    Ok(Measured {
+        samples: run.samples,
+        analysis,
+    })
 }
 
 /// When the programmed point goes round at constant rate for the last time.
@@ -209,7 +238,12 @@ fn last_turn(recording: &Recording, test: &CircleTest) -> Option<Turn> {
     let polar: Vec<[f64; 2]> = recording
         .points
         .iter()
-        .map(|p| [p.programmed_m[0].hypot(p.programmed_m[1]), p.programmed_m[1].atan2(p.programmed_m[0])])
+        .map(|p| {
+            [
+                p.programmed_m[0].hypot(p.programmed_m[1]),
+                p.programmed_m[1].atan2(p.programmed_m[0]),
+            ]
+        })
         .collect();
     let steady = |i: usize| {
         let step = (polar[i][1] - polar[i - 1][1] - due + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0;
@@ -220,11 +254,16 @@ fn last_turn(recording: &Recording, test: &CircleTest) -> Option<Turn> {
     let first = (1..=last).rev().take_while(|i| steady(*i)).last()? - 1;
     // The turns are whole: the rate that was run follows from their number and the time they took.
     let span_s = (last - first) as f64 * recording.dt_s;
-    let covered = (polar[last][1] - polar[first][1] - rate * span_s + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0;
+    let covered =
+        (polar[last][1] - polar[first][1] - rate * span_s + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0;
     let real = rate + covered / span_s;
     let turn_s = TAU / real.abs();
     let start_s = last as f64 * recording.dt_s - turn_s;
-    (span_s > turn_s).then_some(Turn { start_s, turn_s, angle_rad: polar[last][1] })
+    (span_s > turn_s).then_some(Turn {
+        start_s,
+        turn_s,
+        angle_rad: polar[last][1],
+    })
 }
 
 #[cfg(test)]
@@ -246,9 +285,18 @@ mod tests {
         let point = |i: usize| {
             let angle = sign * rate * (travelled(i as f64 * dt_s) - 0.5 * ramp_s);
             let at = [nm(radius_m * angle.cos()), nm(radius_m * angle.sin()), 0.0];
-            SetPointRecord { time_s: i as f64 * dt_s, programmed_m: at, corrected_m: at }
+            SetPointRecord {
+                time_s: i as f64 * dt_s,
+                programmed_m: at,
+                corrected_m: at,
+            }
         };
-        Recording { dt_s, points: (0..((2.0 * ramp_s + cruise_s) / dt_s) as usize).map(point).collect() }
+        Recording {
+            dt_s,
+            points: (0..((2.0 * ramp_s + cruise_s) / dt_s) as usize)
+                .map(point)
+                .collect(),
+        }
     }
 
     #[test]
@@ -270,6 +318,9 @@ mod tests {
     #[test]
     fn a_circle_that_never_runs_at_its_feed_has_no_steady_turn() {
         let slower = recording(0.11, 0.6, 1.0);
-        assert_eq!(last_turn(&slower, &CircleTest::new(0.11, 0.68, Direction::Ccw)), None);
+        assert_eq!(
+            last_turn(&slower, &CircleTest::new(0.11, 0.68, Direction::Ccw)),
+            None
+        );
     }
 }

@@ -29,7 +29,10 @@ impl Size {
 pub fn fit_lag(sizes: &[Size]) -> Response {
     let cost = |a_s2: f64| -> f64 {
         let response = Response { a_s2, b_s4: 0.0 };
-        sizes.iter().map(|s| (s.error_m - s.radius_m * (response.gain(s.omega_rad_s) - 1.0)).powi(2)).sum()
+        sizes
+            .iter()
+            .map(|s| (s.error_m - s.radius_m * (response.gain(s.omega_rad_s) - 1.0)).powi(2))
+            .sum()
     };
     // Start: least squares of ΔR = −½a·ω²R.
     let (mut up, mut down) = (0.0, 0.0);
@@ -43,7 +46,11 @@ pub fn fit_lag(sizes: &[Size]) -> Response {
     for _ in 0..60 {
         let (low, mid, high) = (cost(a - step), cost(a), cost(a + step));
         let bend = low - 2.0 * mid + high;
-        let delta = if bend > 0.0 { (0.5 * step * (low - high) / bend).clamp(-step, step) } else { 0.0 };
+        let delta = if bend > 0.0 {
+            (0.5 * step * (low - high) / bend).clamp(-step, step)
+        } else {
+            0.0
+        };
         if cost(a + delta) <= mid {
             a += delta;
         }
@@ -58,7 +65,10 @@ mod tests {
 
     #[test]
     fn a_lag_is_found_again() {
-        let truth = Response { a_s2: 1.2e-4, b_s4: 0.0 };
+        let truth = Response {
+            a_s2: 1.2e-4,
+            b_s4: 0.0,
+        };
         let sizes: Vec<Size> = [0.1, 0.15, 0.3]
             .into_iter()
             .flat_map(|radius_m| (1..8).map(move |i| (radius_m, 0.1 * f64::from(i) / radius_m)))

@@ -68,7 +68,11 @@ impl Basis {
                 column.fill(0.0);
             }
         }
-        Self { columns, samples, triangle }
+        Self {
+            columns,
+            samples,
+            triangle,
+        }
     }
 
     /// Coordinates of a vector of samples in the basis.
@@ -107,7 +111,11 @@ impl Basis {
         let mut x = *coordinates;
         for k in (0..COLUMNS).rev() {
             let above: f64 = (k + 1..COLUMNS).map(|j| self.triangle[k][j] * x[j]).sum();
-            x[k] = if self.triangle[k][k] > 0.0 { (x[k] - above) / self.triangle[k][k] } else { 0.0 };
+            x[k] = if self.triangle[k][k] > 0.0 {
+                (x[k] - above) / self.triangle[k][k]
+            } else {
+                0.0
+            };
         }
         let mut out = Harmonics::default();
         out.0[0][0] = x[0];
@@ -186,7 +194,10 @@ mod tests {
     fn harmonics_and_coordinates_are_two_ways_to_say_it() {
         let angles = angles();
         let hidden: Vec<bool> = (0..angles.len()).map(|i| i % 50 < 9).collect();
-        let harmonics = Harmonics::mean(0.7).with(1, [0.1, -0.2]).with(3, [0.0, 0.5]).with(8, [0.3, 0.0]);
+        let harmonics = Harmonics::mean(0.7)
+            .with(1, [0.1, -0.2])
+            .with(3, [0.0, 0.5])
+            .with(8, [0.3, 0.0]);
         for hidden in [&[][..], &hidden] {
             let basis = Basis::masked(&angles, hidden);
             let mut samples: Vec<f64> = angles.iter().map(|angle| harmonics.at(*angle)).collect();
@@ -195,9 +206,17 @@ mod tests {
             }
             let low = basis.coordinates(&samples);
             let said = basis.coordinates_of(&harmonics);
-            assert!(low.iter().zip(&said).all(|(a, b)| (a - b).abs() < 1e-12), "{low:?} {said:?}");
+            assert!(
+                low.iter().zip(&said).all(|(a, b)| (a - b).abs() < 1e-12),
+                "{low:?} {said:?}"
+            );
             let back = basis.harmonics_of(&said);
-            assert!(back.0.iter().zip(&harmonics.0).all(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]) < 1e-12));
+            assert!(
+                back.0
+                    .iter()
+                    .zip(&harmonics.0)
+                    .all(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]) < 1e-12)
+            );
             assert_eq!(basis.take_out(&mut samples), low);
             assert!(samples.iter().all(|left| left.abs() < 1e-12));
         }

@@ -26,8 +26,16 @@ impl Column {
 
     /// Within the low orders.
     pub fn within(low: Vec<Low>) -> Self {
-        let reach = |low: &Low| low.iter().rposition(|x| *x != 0.0).map_or(0, |last| last + 1);
-        Self { reach: low.iter().map(reach).max().unwrap_or(0), low, outside: Vec::new() }
+        let reach = |low: &Low| {
+            low.iter()
+                .rposition(|x| *x != 0.0)
+                .map_or(0, |last| last + 1)
+        };
+        Self {
+            reach: low.iter().map(reach).max().unwrap_or(0),
+            low,
+            outside: Vec::new(),
+        }
     }
 
     /// So many columns from the samples of each run, which `fill` writes; what a run hides does not count.
@@ -52,8 +60,16 @@ impl Column {
             .collect();
         let column = |(at, outside): (usize, Vec<f64>)| {
             let energy = |which: usize| parts.iter().map(|parts| parts[at].1[which]).sum::<f64>();
-            let outside = if energy(0) > WITHIN * energy(1) { outside } else { Vec::new() };
-            Self { low: parts.iter().map(|parts| parts[at].0).collect(), reach: COLUMNS, outside }
+            let outside = if energy(0) > WITHIN * energy(1) {
+                outside
+            } else {
+                Vec::new()
+            };
+            Self {
+                low: parts.iter().map(|parts| parts[at].0).collect(),
+                reach: COLUMNS,
+                outside,
+            }
         };
         outsides.into_iter().enumerate().map(column).collect()
     }
@@ -104,12 +120,18 @@ impl Column {
 
     /// Its samples in every run.
     pub fn all_samples(&self, runs: &[Prepared]) -> Vec<Vec<f64>> {
-        runs.par_iter().enumerate().map(|(index, run)| self.samples(run, index)).collect()
+        runs.par_iter()
+            .enumerate()
+            .map(|(index, run)| self.samples(run, index))
+            .collect()
     }
 
     /// Product of what two columns have outside the low orders of one run.
     pub fn product_outside(&self, other: &Self, place: &std::ops::Range<usize>) -> f64 {
-        match (self.outside.get(place.clone()), other.outside.get(place.clone())) {
+        match (
+            self.outside.get(place.clone()),
+            other.outside.get(place.clone()),
+        ) {
             (Some(a), Some(b)) => dot(a, b),
             _ => 0.0,
         }
@@ -117,7 +139,10 @@ impl Column {
 }
 
 /// Each run with its own part of vectors over all samples.
-fn each<'a>(runs: &'a [Prepared], vectors: &'a mut [Vec<f64>]) -> Vec<(&'a Prepared, Vec<&'a mut [f64]>)> {
+fn each<'a>(
+    runs: &'a [Prepared],
+    vectors: &'a mut [Vec<f64>],
+) -> Vec<(&'a Prepared, Vec<&'a mut [f64]>)> {
     let mut left: Vec<&mut [f64]> = vectors.iter_mut().map(Vec::as_mut_slice).collect();
     let mut take = |length: usize| -> Vec<&'a mut [f64]> {
         left.iter_mut()
@@ -128,5 +153,7 @@ fn each<'a>(runs: &'a [Prepared], vectors: &'a mut [Vec<f64>]) -> Vec<(&'a Prepa
             })
             .collect()
     };
-    runs.iter().map(|run| (run, take(run.place.len()))).collect()
+    runs.iter()
+        .map(|run| (run, take(run.place.len())))
+        .collect()
 }

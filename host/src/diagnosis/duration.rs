@@ -36,10 +36,18 @@ pub fn read(campaign: &Campaign) -> Durations {
         .iter()
         .map(|run| {
             let feed = believed_feed_m_s(run);
-            (feed / run.feed_m_s, feed * feed / run.radius_m, run.feed_m_s.powi(2) / run.radius_m)
+            (
+                feed / run.feed_m_s,
+                feed * feed / run.radius_m,
+                run.feed_m_s.powi(2) / run.radius_m,
+            )
         })
         .collect();
-    let slowed: Vec<f64> = runs.iter().filter(|run| run.0 < 1.0).map(|run| run.1).collect();
+    let slowed: Vec<f64> = runs
+        .iter()
+        .filter(|run| run.0 < 1.0)
+        .map(|run| run.1)
+        .collect();
     let smallest = runs.iter().map(|run| run.0).fold(f64::INFINITY, f64::min);
     let odd = runs.iter().filter(|run| run.0 != 1.0).count();
     if odd == 0 {
@@ -50,13 +58,21 @@ pub fn read(campaign: &Campaign) -> Durations {
     let scatter = (slowed.iter().map(|a| (a - limit).powi(2)).sum::<f64>() / n.max(1.0)).sqrt();
     // All at one acceleration, none below it, and nothing above it left at full speed.
     let one_limit = slowed.len() >= 2 && slowed.len() == odd && scatter < 0.02 * limit;
-    let no_other =
-        runs.iter().all(|run| (run.0 < 1.0) == (run.2 > 1.01 * limit) || (run.2 / limit - 1.0).abs() < 0.03);
+    let no_other = runs
+        .iter()
+        .all(|run| (run.0 < 1.0) == (run.2 > 1.01 * limit) || (run.2 / limit - 1.0).abs() < 0.03);
     if one_limit && no_other {
         // A turn is timed to about a sample in a thousand.
         let se = (scatter / n.sqrt()).max(2e-4 * limit);
-        Durations::Clamped(Clamp { limit_m_s2: limit, se_m_s2: se, runs: slowed.len() })
+        Durations::Clamped(Clamp {
+            limit_m_s2: limit,
+            se_m_s2: se,
+            runs: slowed.len(),
+        })
     } else {
-        Durations::Unexplained { runs: odd, smallest }
+        Durations::Unexplained {
+            runs: odd,
+            smallest,
+        }
     }
 }

@@ -54,7 +54,8 @@ pub fn explain(campaign: &Campaign, start: &Start) -> Explained {
     let survey = Survey::new(campaign);
     let (mut response, mut more_lag_s) = (start.response, 0.0);
     let mut seen = Seen::default();
-    let (mut found, mut longer_s) = pass(&survey, start, (response, more_lag_s), &mut seen, &[], None);
+    let (mut found, mut longer_s) =
+        pass(&survey, start, (response, more_lag_s), &mut seen, &[], None);
     // Scatter is measured well only beside a model, so there are two passes at least.
     let mut known = None;
     for _ in 1..PASSES {
@@ -62,7 +63,8 @@ pub fn explain(campaign: &Campaign, start: &Start) -> Explained {
         let left = residual(&found);
         if tones < TONES {
             let tone = tone::find(&found.runs, &left, &found.spread);
-            seen.tones.extend(tone.filter(|tone| is_material(&found, tone) && tone.is_new(&seen.tones)));
+            seen.tones
+                .extend(tone.filter(|tone| is_material(&found, tone) && tone.is_new(&seen.tones)));
         }
         let refined = refined_response(&found, response);
         let settled = (refined.a_s2 - response.a_s2).abs() <= SETTLED[0] * response.a_s2.abs()
@@ -78,7 +80,14 @@ pub fn explain(campaign: &Campaign, start: &Start) -> Explained {
         more_lag_s = if other { 0.0 } else { more_lag_s + longer_s };
         response = refined;
         let left = left.all_samples(&found.runs);
-        (found, longer_s) = pass(&survey, start, (response, more_lag_s), &mut seen, &kinds, Some(&left));
+        (found, longer_s) = pass(
+            &survey,
+            start,
+            (response, more_lag_s),
+            &mut seen,
+            &kinds,
+            Some(&left),
+        );
     }
     found.tones = seen.tones;
     found
@@ -96,15 +105,32 @@ fn refined_response(found: &Explained, response: Response) -> Response {
         }
     }
     for &item in &found.chosen {
-        let Kind::Cause { cause: Cause::HigherOrderDynamics, .. } = found.items[item].kind else { continue };
-        if let Some(at) = columns.iter().position(|&c| c == found.items[item].columns[0]) {
+        let Kind::Cause {
+            cause: Cause::HigherOrderDynamics,
+            ..
+        } = found.items[item].kind
+        else {
+            continue;
+        };
+        if let Some(at) = columns
+            .iter()
+            .position(|&c| c == found.items[item].columns[0])
+        {
             refined.b_s4 = -2.0 * found.solution.coefficients[at];
         }
     }
-    let fastest = found.runs.iter().map(|run| run.view.omega_rad_s).fold(0.0, f64::max);
+    let fastest = found
+        .runs
+        .iter()
+        .map(|run| run.view.omega_rad_s)
+        .fold(0.0, f64::max);
     let w2 = fastest * fastest;
     // A response that would blow up within the measured range is no response.
-    if 1.0 + refined.a_s2 * w2 + refined.b_s4 * w2 * w2 > 0.1 { refined } else { response }
+    if 1.0 + refined.a_s2 * w2 + refined.b_s4 * w2 * w2 > 0.1 {
+        refined
+    } else {
+        response
+    }
 }
 
 /// What the runs leave of the baseline, and what is seen of it.
@@ -115,7 +141,11 @@ struct Prepare {
 }
 
 /// Makes the runs ready: tones taken out, teeth hidden. `true`: what was found before is not to be trusted.
-fn prepare(survey: &Survey, (response, more_lag_s): (Response, f64), seen: &mut Seen) -> (Prepare, bool) {
+fn prepare(
+    survey: &Survey,
+    (response, more_lag_s): (Response, f64),
+    seen: &mut Seen,
+) -> (Prepare, bool) {
     let (mut runs, lag) = survey.prepare(&response, more_lag_s);
     for tone in &seen.tones {
         tone.remove(&mut runs);
@@ -150,15 +180,27 @@ fn pass(
     left: Option<&[Vec<f64>]>,
 ) -> (Explained, f64) {
     let (Prepare { runs, lag, data }, afresh) = prepare(survey, (response, more_lag_s), seen);
-    let (kinds, left) = if afresh { (&[][..], None) } else { (kinds, left) };
+    let (kinds, left) = if afresh {
+        (&[][..], None)
+    } else {
+        (kinds, left)
+    };
     // Once there is a model, what it leaves shows the scatter better than the data do.
     let spread = match left {
         Some(left) => spread::measure(&runs, left),
         None => spread::measure(&runs, &data.all_samples(&runs)),
     };
     let mut found = Explained {
-        apart_m2: seen.tones.iter().flat_map(|tone| &tone.energy_m2).sum::<f64>()
-            + seen.teeth.iter().map(|teeth| roughness::energy_m2(teeth, &runs)).sum::<f64>(),
+        apart_m2: seen
+            .tones
+            .iter()
+            .flat_map(|tone| &tone.energy_m2)
+            .sum::<f64>()
+            + seen
+                .teeth
+                .iter()
+                .map(|teeth| roughness::energy_m2(teeth, &runs))
+                .sum::<f64>(),
         solution: Solution::default(),
         ledger: Ledger::open(&runs, &spread, data),
         runs: runs.into(),
@@ -189,7 +231,13 @@ fn pass(
         }
         propose_patterns(&mut found);
         let products = found.ledger.white(&all);
-        found.chosen = select(&products, &found.nuisance, &found.items, &found.chosen, &barred);
+        found.chosen = select(
+            &products,
+            &found.nuisance,
+            &found.items,
+            &found.chosen,
+            &barred,
+        );
         found.chosen = prune(&found, &all, found.chosen.clone(), &mut barred);
         if chosen_kinds(&found) == before {
             break;
@@ -210,14 +258,27 @@ fn enter(found: &mut Explained, start: &Start, kinds: &[Kind]) {
     // ∂ΔR/∂a about the response.
     let own = |run: &Prepared| {
         let (w, g) = (run.view.omega_rad_s, run.view.gain);
-        run.low_of(&Harmonics::mean(-0.5 * run.view.radius_m * w * w * g.powi(3)))
+        run.low_of(&Harmonics::mean(
+            -0.5 * run.view.radius_m * w * w * g.powi(3),
+        ))
     };
-    found.nuisance.push(found.ledger.push(Column::within(runs.iter().map(own).collect())));
-    let before = kinds.iter().map(|kind| (kind.clone(), shape::count(kind, &views))).collect();
+    found.nuisance.push(
+        found
+            .ledger
+            .push(Column::within(runs.iter().map(own).collect())),
+    );
+    let before = kinds
+        .iter()
+        .map(|kind| (kind.clone(), shape::count(kind, &views)))
+        .collect();
     found.chosen = found.enter(before).collect();
     // The data no longer hold what the response has taken in; its column still does.
     if start.own_fourth_order {
-        let fourth = Kind::Cause { cause: Cause::HigherOrderDynamics, axis: None, shape: Vec::new() };
+        let fourth = Kind::Cause {
+            cause: Cause::HigherOrderDynamics,
+            axis: None,
+            shape: Vec::new(),
+        };
         let columns = fourth.columns_over(&runs);
         found.nuisance.extend(found.ledger.push_all(columns));
     } else if found.response.b_s4 != 0.0 {
@@ -236,7 +297,11 @@ fn enter(found: &mut Explained, start: &Start, kinds: &[Kind]) {
                 |kind| matches!(kind, Kind::Cause { cause, axis: at, .. } if *cause == model.cause() && *at == axis),
             );
             if let (false, Some(first)) = (known, shapes.first()) {
-                let kind = Kind::Cause { cause: model.cause(), axis, shape: first.clone() };
+                let kind = Kind::Cause {
+                    cause: model.cause(),
+                    axis,
+                    shape: first.clone(),
+                };
                 further.push((kind, shapes.len()));
             }
         }
@@ -255,7 +320,9 @@ fn enter(found: &mut Explained, start: &Start, kinds: &[Kind]) {
 fn restore_fourth_order(found: &mut Explained) {
     let shift = |run: &Prepared| {
         let (w, g) = (run.view.omega_rad_s, run.view.gain);
-        run.low_of(&Harmonics::mean(-0.5 * found.response.b_s4 * run.view.radius_m * w.powi(4) * g.powi(3)))
+        run.low_of(&Harmonics::mean(
+            -0.5 * found.response.b_s4 * run.view.radius_m * w.powi(4) * g.powi(3),
+        ))
     };
     let mut data = found.ledger.column(0).clone();
     data.add(1.0, &Column::within(found.runs.iter().map(shift).collect()));

@@ -58,13 +58,20 @@ impl Explained {
     /// Enters explanations, each chosen from so many starting shapes; gives their numbers.
     pub fn enter(&mut self, kinds: Vec<(Kind, usize)>) -> Range<usize> {
         let first = self.items.len();
-        let columns: Vec<Vec<Column>> =
-            kinds.par_iter().map(|(kind, _)| kind.columns_over(&self.runs)).collect();
+        let columns: Vec<Vec<Column>> = kinds
+            .par_iter()
+            .map(|(kind, _)| kind.columns_over(&self.runs))
+            .collect();
         let mut next = self.ledger.size();
         for ((kind, shapes), columns) in kinds.into_iter().zip(&columns) {
             let own = (next..next + columns.len()).collect();
             next += columns.len();
-            self.items.push(Item { price: kind.price(shapes), columns: own, kind, fitted_beside: None });
+            self.items.push(Item {
+                price: kind.price(shapes),
+                columns: own,
+                kind,
+                fitted_beside: None,
+            });
         }
         self.ledger.push_all(columns.into_iter().flatten());
         first..self.items.len()
@@ -72,10 +79,15 @@ impl Explained {
 
     /// Brings the columns of items up to date with their kinds.
     pub fn relay(&mut self, items: &[usize]) {
-        let columns: Vec<Vec<Column>> =
-            items.par_iter().map(|&item| self.items[item].kind.columns_over(&self.runs)).collect();
-        let at = items.iter().flat_map(|&item| self.items[item].columns.iter().copied());
-        self.ledger.replace_all(at.zip(columns.into_iter().flatten()));
+        let columns: Vec<Vec<Column>> = items
+            .par_iter()
+            .map(|&item| self.items[item].kind.columns_over(&self.runs))
+            .collect();
+        let at = items
+            .iter()
+            .flat_map(|&item| self.items[item].columns.iter().copied());
+        self.ledger
+            .replace_all(at.zip(columns.into_iter().flatten()));
     }
 }
 
@@ -91,7 +103,11 @@ pub fn residual(found: &Explained) -> Column {
 
 /// The chosen explanations, free of the ledger they were found in.
 pub fn chosen_kinds(found: &Explained) -> Vec<Kind> {
-    found.chosen.iter().map(|&i| found.items[i].kind.clone()).collect()
+    found
+        .chosen
+        .iter()
+        .map(|&i| found.items[i].kind.clone())
+        .collect()
 }
 
 /// Energy (sum of squares, m²) that each chosen explanation alone accounts for, and all of them.
@@ -109,8 +125,12 @@ pub fn energies_of(found: &Explained, weights: &[f64], set: &[usize]) -> (Vec<f6
     let whole = gain(set);
     let each = (0..set.len())
         .map(|at| {
-            let rest: Vec<usize> =
-                set.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, c)| *c).collect();
+            let rest: Vec<usize> = set
+                .iter()
+                .enumerate()
+                .filter(|(i, _)| *i != at)
+                .map(|(_, c)| *c)
+                .collect();
             (whole - gain(&rest)).max(0.0)
         })
         .collect();

@@ -51,7 +51,10 @@ const RESAMPLES: usize = 1000;
 pub fn machine(response: &Response, effects: &[Effect], lag_s: Option<f64>) -> Machine {
     let mut machine = Machine::default();
     if response.a_s2 > 0.0 {
-        let servo = PositionLoop { kv_per_s: response.a_s2.powf(-0.5), feed_forward: 0.0 };
+        let servo = PositionLoop {
+            kv_per_s: response.a_s2.powf(-0.5),
+            feed_forward: 0.0,
+        };
         machine.servo = [servo; 2];
         if response.b_s4 != 0.0 {
             machine.add_beta2(-0.5 * response.b_s4);
@@ -79,15 +82,23 @@ pub fn machine(response: &Response, effects: &[Effect], lag_s: Option<f64>) -> M
 /// Eq. 15 with the same κ2 and κ4.
 pub fn beta(response: &Response) -> Servo {
     let (a, b) = (response.a_s2, response.b_s4);
-    Servo::Beta { beta1_s2: -0.5 * a, beta2_s4: 0.375 * a * a - 0.5 * b, half_width95: [0.0; 2] }
+    Servo::Beta {
+        beta1_s2: -0.5 * a,
+        beta2_s4: 0.375 * a * a - 0.5 * b,
+        half_width95: [0.0; 2],
+    }
 }
 
 /// Response and effects that a set gives when it is fitted on some runs only.
 fn fitted(found: &Explained, weights: &[f64], set: &[usize]) -> Option<(Response, Vec<Effect>)> {
     let columns = columns_of(&found.nuisance, &found.items, set);
     let solution = solve(&found.ledger.white(weights), &columns)?;
-    let value =
-        |column: usize| columns.iter().position(|&c| c == column).map_or(0.0, |at| solution.coefficients[at]);
+    let value = |column: usize| {
+        columns
+            .iter()
+            .position(|&c| c == column)
+            .map_or(0.0, |at| solution.coefficients[at])
+    };
     let mut response = found.response;
     response.a_s2 += value(found.nuisance[0]);
     if let Some(&fourth) = found.nuisance.get(1) {
@@ -97,17 +108,33 @@ fn fitted(found: &Explained, weights: &[f64], set: &[usize]) -> Option<(Response
     }
     let mut effects = Vec::new();
     for &item in set {
-        let Kind::Cause { cause, axis, .. } = &found.items[item].kind else { continue };
-        let values: Vec<f64> = found.items[item].columns.iter().map(|&c| value(c)).collect();
+        let Kind::Cause { cause, axis, .. } = &found.items[item].kind else {
+            continue;
+        };
+        let values: Vec<f64> = found.items[item]
+            .columns
+            .iter()
+            .map(|&c| value(c))
+            .collect();
         if *cause == Cause::HigherOrderDynamics {
             response.b_s4 = -2.0 * values[0];
         }
-        let size = if values.len() == 2 { values[0].hypot(values[1]) } else { values[0] };
+        let size = if values.len() == 2 {
+            values[0].hypot(values[1])
+        } else {
+            values[0]
+        };
         let mut params = super::verdict::parameters(found, item);
         if values.len() == 2 {
             params.insert("phase_rad".into(), values[1].atan2(values[0]));
         }
-        effects.push(Effect { cause: *cause, axis: *axis, value: size, ci95: [size; 2], params });
+        effects.push(Effect {
+            cause: *cause,
+            axis: *axis,
+            value: size,
+            ci95: [size; 2],
+            params,
+        });
     }
     effects.extend(found.teeth.iter().map(super::verdict::teeth_effect));
     Some((response, effects))
@@ -127,27 +154,38 @@ pub fn measure(
         values.sort_by(f64::total_cmp);
         values.dedup_by(|a, b| (*a - *b).abs() < 1e-9 * b.abs());
         let same = |i: usize, value: f64| (key(i) - value).abs() < 1e-9 * value.abs();
-        values.iter().map(|&v| (0..campaign.runs.len()).filter(|&i| same(i, v)).collect()).collect()
+        values
+            .iter()
+            .map(|&v| (0..campaign.runs.len()).filter(|&i| same(i, v)).collect())
+            .collect()
     };
     let radii = by(&|i| campaign.runs[i].radius_m);
     let feeds = by(&|i| campaign.runs[i].feed_m_s);
-    let count =
-        [if radii.len() > 1 { radii.len() } else { 0 }, if feeds.len() > 1 { feeds.len() } else { 0 }];
+    let count = [
+        if radii.len() > 1 { radii.len() } else { 0 },
+        if feeds.len() > 1 { feeds.len() } else { 0 },
+    ];
     if count[0] > 0 {
         folds.extend(radii);
     }
     if count[1] > 0 {
         folds.extend(feeds);
     }
-    let errors: Vec<Errors> =
-        folds.par_iter().flat_map(|out| fold(campaign, found, given, clamp, out)).collect();
+    let errors: Vec<Errors> = folds
+        .par_iter()
+        .flat_map(|out| fold(campaign, found, given, clamp, out))
+        .collect();
     let mean = |pick: &dyn Fn(&Errors) -> f64| -> f64 {
         errors.iter().map(pick).sum::<f64>() / errors.len().max(1) as f64
     };
     let (extended, baseline) = (mean(&|e| e.extended), mean(&|e| e.baseline));
     let floor = mean(&|e| e.floor);
     let percent = |extended: f64, baseline: f64| {
-        if baseline > 0.0 { 100.0 * (1.0 - (extended / baseline).sqrt()) } else { 0.0 }
+        if baseline > 0.0 {
+            100.0 * (1.0 - (extended / baseline).sqrt())
+        } else {
+            0.0
+        }
     };
     // Runs, not samples, are drawn again: both folds of a run go together.
     let runs = campaign.runs.len();
@@ -206,29 +244,48 @@ fn fold(
     out: &[usize],
 ) -> Vec<Errors> {
     let runs = &campaign.runs;
-    let weights: Vec<f64> = (0..runs.len()).map(|i| if out.contains(&i) { 0.0 } else { 1.0 }).collect();
+    let weights: Vec<f64> = (0..runs.len())
+        .map(|i| if out.contains(&i) { 0.0 } else { 1.0 })
+        .collect();
     let products = found.ledger.white(&weights);
     let mut barred = Vec::new();
-    let set = select(&products, &found.nuisance, &found.items, &found.chosen, &barred);
+    let set = select(
+        &products,
+        &found.nuisance,
+        &found.items,
+        &found.chosen,
+        &barred,
+    );
     let mut set = prune(found, &weights, set, &mut barred);
     // A pattern without a name has no place in the simulation, but it must not bend the causes.
     let training: Vec<usize> = (0..runs.len()).filter(|&i| weights[i] > 0.0).collect();
-    let programmed: Vec<Size> = training.iter().map(|&i| Size::of(&runs[i], runs[i].feed_m_s)).collect();
+    let programmed: Vec<Size> = training
+        .iter()
+        .map(|&i| Size::of(&runs[i], runs[i].feed_m_s))
+        .collect();
     let lag_only = fit_lag(&programmed);
-    let baseline = given.cloned().unwrap_or_else(|| machine(&lag_only, &[], None));
+    let baseline = given
+        .cloned()
+        .unwrap_or_else(|| machine(&lag_only, &[], None));
     set.sort_unstable();
     let nothing_new =
         clamp.is_none() && found.teeth.is_empty() && !set.iter().any(|&i| found.items[i].listed());
-    let extended = fitted(found, &weights, &set).filter(|_| !nothing_new).map(|(response, effects)| {
-        let lag = found.lag.measured.then_some(found.lag.tau_s);
-        let mut machine = machine(&response, &effects, lag);
-        if let Some(clamp) = clamp {
-            machine.centripetal_limit_m_s2 = Some(clamp.limit_m_s2);
-        }
-        machine
-    });
+    let extended =
+        fitted(found, &weights, &set)
+            .filter(|_| !nothing_new)
+            .map(|(response, effects)| {
+                let lag = found.lag.measured.then_some(found.lag.tau_s);
+                let mut machine = machine(&response, &effects, lag);
+                if let Some(clamp) = clamp {
+                    machine.centripetal_limit_m_s2 = Some(clamp.limit_m_s2);
+                }
+                machine
+            });
     let beta = beta_of(&programmed);
-    let started = runs.iter().filter_map(|run| run.started_s).fold(f64::INFINITY, f64::min);
+    let started = runs
+        .iter()
+        .filter_map(|run| run.started_s)
+        .fold(f64::INFINITY, f64::min);
     out.par_iter()
         .map(|&i| {
             let run = &runs[i];
@@ -241,8 +298,13 @@ fn fold(
             let basis = &found.bases[i];
             let samples = run.samples.deviation_m.len() as f64;
             let left = |prediction: &[f64]| -> f64 {
-                let rest: Vec<f64> =
-                    run.samples.deviation_m.iter().zip(prediction).map(|(y, p)| y - p).collect();
+                let rest: Vec<f64> = run
+                    .samples
+                    .deviation_m
+                    .iter()
+                    .zip(prediction)
+                    .map(|(y, p)| y - p)
+                    .collect();
                 // The centre is the operator's.
                 let [cos, sin] = basis.centre(&rest);
                 (dot(&rest, &rest) - cos * cos - sin * sin).max(0.0) / samples
@@ -253,8 +315,14 @@ fn fold(
             let size = beta[0] * x + beta[1] * x * x / run.radius_m;
             let flat = |value: f64| left(&vec![value; run.samples.deviation_m.len()]);
             // The phase of a tone is new in each run: no model could foretell it.
-            let tone = found.tones.iter().map(|tone| tone.energy_m2[i].max(0.0)).sum::<f64>() / samples;
-            let scatter = tone + found.spread.order_m2[0] + found.spread.order_m2[2..].iter().sum::<f64>();
+            let tone = found
+                .tones
+                .iter()
+                .map(|tone| tone.energy_m2[i].max(0.0))
+                .sum::<f64>()
+                / samples;
+            let scatter =
+                tone + found.spread.order_m2[0] + found.spread.order_m2[2..].iter().sum::<f64>();
             Errors {
                 run: i,
                 extended: extended.as_ref().map_or(base, &simulated),
@@ -281,7 +349,10 @@ fn beta_of(sizes: &[Size]) -> [f64; 2] {
     }
     let determinant = xx * yy - xy * xy;
     if determinant.abs() > 1e-12 * xx * yy {
-        [(xe * yy - ye * xy) / determinant, (ye * xx - xe * xy) / determinant]
+        [
+            (xe * yy - ye * xy) / determinant,
+            (ye * xx - xe * xy) / determinant,
+        ]
     } else {
         [if xx > 0.0 { xe / xx } else { 0.0 }, 0.0]
     }
@@ -290,13 +361,19 @@ fn beta_of(sizes: &[Size]) -> [f64; 2] {
 /// The model file of what was found on all runs.
 pub fn extended_model(campaign: &Campaign, found: &Explained, effects: Vec<Effect>) -> ModelFile {
     let weights = found.all();
-    let response = fitted(found, &weights, &found.chosen).map_or(found.response, |(response, _)| response);
+    let response =
+        fitted(found, &weights, &found.chosen).map_or(found.response, |(response, _)| response);
     let servo = if response.b_s4 > 0.0 {
         let omega_n2 = response.b_s4.powf(-0.5);
         let zeta = (0.5 + 0.25 * response.a_s2 * omega_n2).max(1e-4).sqrt();
-        Servo::SecondOrder { omega_n_rad_s: omega_n2.sqrt(), zeta }
+        Servo::SecondOrder {
+            omega_n_rad_s: omega_n2.sqrt(),
+            zeta,
+        }
     } else if response.b_s4 == 0.0 && response.a_s2 > 0.0 {
-        Servo::Lag { kv_per_s: response.a_s2.powf(-0.5) }
+        Servo::Lag {
+            kv_per_s: response.a_s2.powf(-0.5),
+        }
     } else {
         beta(&response)
     };
@@ -305,7 +382,9 @@ pub fn extended_model(campaign: &Campaign, found: &Explained, effects: Vec<Effec
             .runs
             .iter()
             .map(value)
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], v| [lo.min(v * 1e3), hi.max(v * 1e3)])
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], v| {
+                [lo.min(v * 1e3), hi.max(v * 1e3)]
+            })
     };
     ModelFile {
         format: crate::model_file::FORMAT,
@@ -316,6 +395,9 @@ pub fn extended_model(campaign: &Campaign, found: &Explained, effects: Vec<Effec
             radius_mm: range(&|r| r.radius_m),
             feed_mm_s: range(&|r| r.feed_m_s),
         },
-        effects: effects.into_iter().filter(|e| e.cause != Cause::HigherOrderDynamics).collect(),
+        effects: effects
+            .into_iter()
+            .filter(|e| e.cause != Cause::HigherOrderDynamics)
+            .collect(),
     }
 }

@@ -60,7 +60,11 @@ impl Kind {
 
     /// Its columns over all runs, m per unit; 0 where a run hides its samples.
     pub fn columns_over(&self, runs: &[Prepared]) -> Vec<Column> {
-        let low = |index: usize| runs.iter().map(|run| self.low(index, run)).collect::<Option<Vec<Low>>>();
+        let low = |index: usize| {
+            runs.iter()
+                .map(|run| self.low(index, run))
+                .collect::<Option<Vec<Low>>>()
+        };
         match (0..self.columns()).map(low).collect::<Option<Vec<_>>>() {
             Some(low) => low.into_iter().map(Column::within).collect(),
             None => Column::split(runs, self.columns(), |run, out| self.samples(run, out)),
@@ -82,7 +86,9 @@ impl Kind {
     /// All columns at each sample of one run.
     pub fn samples(&self, run: &Prepared, out: &mut [&mut [f64]]) {
         match self {
-            Self::Cause { cause, axis, shape } => cause.model().signatures(*axis, shape, &run.view, out),
+            Self::Cause { cause, axis, shape } => {
+                cause.model().signatures(*axis, shape, &run.view, out)
+            }
             Self::Pattern(pattern) => out.iter_mut().for_each(|out| pattern.samples(run, out)),
         }
     }

@@ -29,7 +29,10 @@ impl Ledger {
         let mut ledger = Self {
             columns: Vec::new(),
             places: runs.iter().map(|run| run.place.clone()).collect(),
-            discounts: runs.iter().map(|run| spread.discounts(run.visible())).collect(),
+            discounts: runs
+                .iter()
+                .map(|run| spread.discounts(run.visible()))
+                .collect(),
             noise_m2: spread.noise_m2,
             white: vec![Products::default(); runs.len()],
             plain: vec![Products::default(); runs.len()],
@@ -82,22 +85,40 @@ impl Ledger {
 
     /// Number of samples of all runs, each so many times.
     pub fn samples(&self, weights: &[f64]) -> f64 {
-        self.places.iter().zip(weights).map(|(place, weight)| weight * place.len() as f64).sum()
+        self.places
+            .iter()
+            .zip(weights)
+            .map(|(place, weight)| weight * place.len() as f64)
+            .sum()
     }
 
     /// Brings the products of some columns with all up to date: a run at a time, whose samples in all columns stay in the
     /// cache meanwhile.
     fn multiply(&mut self, changed: &[usize]) {
-        let Self { columns, places, discounts, noise_m2, white, plain } = self;
+        let Self {
+            columns,
+            places,
+            discounts,
+            noise_m2,
+            white,
+            plain,
+        } = self;
         let mut has_changed = vec![false; columns.len()];
         changed.iter().for_each(|&at| has_changed[at] = true);
-        places.par_iter().zip(&*discounts).zip(white).zip(plain).enumerate().for_each(
-            |(run, (((place, discount), white), plain))| {
+        places
+            .par_iter()
+            .zip(&*discounts)
+            .zip(white)
+            .zip(plain)
+            .enumerate()
+            .for_each(|(run, (((place, discount), white), plain))| {
                 white.grow(columns.len());
                 plain.grow(columns.len());
                 for &at in changed {
                     // Two that have changed meet once.
-                    for other in (0..columns.len()).filter(|&other| other <= at || !has_changed[other]) {
+                    for other in
+                        (0..columns.len()).filter(|&other| other <= at || !has_changed[other])
+                    {
                         let [one, two] = [&columns[at], &columns[other]];
                         let outside = one.product_outside(two, place);
                         let [kept, whole] = products_within(one, two, run, discount);
@@ -105,8 +126,7 @@ impl Ledger {
                         *plain.at_mut(at, other) = whole + outside;
                     }
                 }
-            },
-        );
+            });
     }
 
     /// Evidence products summed over runs with the given weights (1 keep, 0 leave out, bootstrap counts).
@@ -139,7 +159,12 @@ impl Ledger {
 fn products_within(one: &Column, other: &Column, run: usize, discount: &Low) -> [f64; 2] {
     let (a, b) = (&one.low()[run], &other.low()[run]);
     let [mut white, mut whole] = [0.0; 2];
-    for ((a, b), discount) in a.iter().zip(b).zip(discount).take(one.reach().min(other.reach())) {
+    for ((a, b), discount) in a
+        .iter()
+        .zip(b)
+        .zip(discount)
+        .take(one.reach().min(other.reach()))
+    {
         let product = a * b;
         white += (1.0 - discount) * product;
         whole += product;
@@ -150,7 +175,9 @@ fn products_within(one: &Column, other: &Column, run: usize, discount: &Low) -> 
 
 /// Product of what scatter between runs leaves of the low orders.
 pub fn kept(a: &Low, b: &Low, discount: &Low) -> f64 {
-    (0..COLUMNS).map(|k| (1.0 - discount[k]) * (a[k] * b[k])).sum()
+    (0..COLUMNS)
+        .map(|k| (1.0 - discount[k]) * (a[k] * b[k]))
+        .sum()
 }
 
 fn total(products: &[Products], weights: &[f64]) -> Products {
@@ -192,7 +219,11 @@ directions = ["ccw", "cw"]
 
     /// Columns of both sorts: low orders only, and with samples of their own.
     fn kinds() -> Vec<Kind> {
-        let cause = |cause, axis, shape: &[f64]| Kind::Cause { cause, axis, shape: shape.to_vec() };
+        let cause = |cause, axis, shape: &[f64]| Kind::Cause {
+            cause,
+            axis,
+            shape: shape.to_vec(),
+        };
         let mut kinds = vec![
             cause(Cause::Squareness, None, &[]),
             cause(Cause::Backlash, Some(Axis::X), &[0.0, 0.0]),
@@ -204,13 +235,26 @@ directions = ["ccw", "cw"]
 
     #[test]
     fn columns_that_come_or_change_together_are_those_that_did_so_one_by_one() {
-        let campaign = simulation::campaign(&Plan::parse(PLAN, Path::new("ledger.toml")).unwrap(), 1);
-        let (runs, _) = Survey::new(&campaign).prepare(&Response::of(&Servo::Lag { kv_per_s: 90.0 }), 0.0);
+        let campaign =
+            simulation::campaign(&Plan::parse(PLAN, Path::new("ledger.toml")).unwrap(), 1);
+        let (runs, _) =
+            Survey::new(&campaign).prepare(&Response::of(&Servo::Lag { kv_per_s: 90.0 }), 0.0);
         let data = misfit(&runs);
         let spread = spread::measure(&runs, &data.all_samples(&runs));
-        let columns: Vec<Column> = kinds().iter().flat_map(|kind| kind.columns_over(&runs)).collect();
-        assert!(columns.iter().any(|column| column.outside(&runs[0]).is_empty()));
-        assert!(columns.iter().any(|column| !column.outside(&runs[0]).is_empty()));
+        let columns: Vec<Column> = kinds()
+            .iter()
+            .flat_map(|kind| kind.columns_over(&runs))
+            .collect();
+        assert!(
+            columns
+                .iter()
+                .any(|column| column.outside(&runs[0]).is_empty())
+        );
+        assert!(
+            columns
+                .iter()
+                .any(|column| !column.outside(&runs[0]).is_empty())
+        );
         let mut one_by_one = Ledger::open(&runs, &spread, data.clone());
         for column in &columns {
             one_by_one.push(column.clone());
@@ -222,8 +266,14 @@ directions = ["ccw", "cw"]
         let mut all = [vec![data], columns].concat();
         is_by_definition(&together, &all, &runs);
         // Others in their places, the last first.
-        let changed = [(4, all[1].clone()), (1, all[2].clone()), (3, all[5].clone())];
-        changed.iter().for_each(|(at, column)| all[*at] = column.clone());
+        let changed = [
+            (4, all[1].clone()),
+            (1, all[2].clone()),
+            (3, all[5].clone()),
+        ];
+        changed
+            .iter()
+            .for_each(|(at, column)| all[*at] = column.clone());
         together.replace_all(changed);
         is_by_definition(&together, &all, &runs);
     }
@@ -235,16 +285,25 @@ directions = ["ccw", "cw"]
             for (i, j) in (0..all.len()).flat_map(|i| (0..all.len()).map(move |j| (i, j))) {
                 let (a, b) = (&all[i].low()[run], &all[j].low()[run]);
                 let outside = all[i].product_outside(&all[j], &prepared.place);
-                let low: f64 = (0..COLUMNS).filter(|k| ![1, 2].contains(k)).map(|k| a[k] * b[k]).sum();
+                let low: f64 = (0..COLUMNS)
+                    .filter(|k| ![1, 2].contains(k))
+                    .map(|k| a[k] * b[k])
+                    .sum();
                 let close = |products: &Products, value: f64| {
                     let size = (products.at(i, i) * products.at(j, j)).sqrt();
                     (products.at(i, j) - value).abs() <= 1e-9 * size
                 };
                 assert!(close(plain, low + outside), "run {run}: {i}, {j}");
                 let weighed = kept(a, b, ledger.discounts(run)) + outside;
-                assert!(close(white, weighed / ledger.noise_m2), "run {run}: {i}, {j}");
+                assert!(
+                    close(white, weighed / ledger.noise_m2),
+                    "run {run}: {i}, {j}"
+                );
             }
-            assert!((0..all.len()).all(|i| white.at(i, i) > 0.0 && plain.at(i, i) > 0.0), "run {run}");
+            assert!(
+                (0..all.len()).all(|i| white.at(i, i) > 0.0 && plain.at(i, i) > 0.0),
+                "run {run}"
+            );
         }
     }
 }

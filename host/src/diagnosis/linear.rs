@@ -18,16 +18,27 @@ pub struct Solution {
 pub fn solve(products: &Products, set: &[usize]) -> Option<Solution> {
     let n = set.len();
     if n == 0 {
-        return Some(Solution { coefficients: Vec::new(), covariance: DMatrix::zeros(0, 0), gain: 0.0 });
+        return Some(Solution {
+            coefficients: Vec::new(),
+            covariance: DMatrix::zeros(0, 0),
+            gain: 0.0,
+        });
     }
     let scale: Vec<f64> = set.iter().map(|&i| products.at(i, i).sqrt()).collect();
     if scale.iter().any(|s| !s.is_finite() || *s <= 0.0) {
         return None;
     }
-    let matrix = DMatrix::from_fn(n, n, |i, j| products.at(set[i], set[j]) / (scale[i] * scale[j]));
+    let matrix = DMatrix::from_fn(n, n, |i, j| {
+        products.at(set[i], set[j]) / (scale[i] * scale[j])
+    });
     let right = DVector::from_fn(n, |i, _| products.at(set[i], 0) / scale[i]);
     let factor = matrix.cholesky()?;
-    if factor.l_dirty().diagonal().iter().any(|pivot| pivot * pivot < 1e-9) {
+    if factor
+        .l_dirty()
+        .diagonal()
+        .iter()
+        .any(|pivot| pivot * pivot < 1e-9)
+    {
         return None;
     }
     let solution = factor.solve(&right);
@@ -61,8 +72,16 @@ struct Member {
 impl<'a> Factor<'a> {
     /// The columns `set` of the summed products (column 0 is the data). `None`: they are not independent.
     pub fn new(products: &'a Products, set: &[usize]) -> Option<Self> {
-        let mut factor = Self { products, set: Vec::new(), rows: Vec::new(), members: Vec::new(), gain: 0.0 };
-        set.iter().all(|&column| factor.push(column)).then_some(factor)
+        let mut factor = Self {
+            products,
+            set: Vec::new(),
+            rows: Vec::new(),
+            members: Vec::new(),
+            gain: 0.0,
+        };
+        set.iter()
+            .all(|&column| factor.push(column))
+            .then_some(factor)
     }
 
     /// What the set takes off the sum of squares.
@@ -78,7 +97,10 @@ impl<'a> Factor<'a> {
     /// What is said about the set with further columns, which then leave it. `None`: they are not independent of the set.
     pub fn with<T>(&mut self, further: &[usize], say: impl FnOnce(&mut Self) -> T) -> Option<T> {
         let (size, gain) = (self.set.len(), self.gain);
-        let said = further.iter().all(|&column| self.push(column)).then(|| say(self));
+        let said = further
+            .iter()
+            .all(|&column| self.push(column))
+            .then(|| say(self));
         self.set.truncate(size);
         self.members.truncate(size);
         self.rows.truncate(size * (size + 1) / 2);
@@ -97,7 +119,11 @@ impl<'a> Factor<'a> {
         let (mut square, mut forward) = (0.0, p.at(column, 0) * per_length);
         for (i, (&other, member)) in self.set.iter().zip(&self.members).enumerate() {
             let (earlier, row) = self.rows.split_at(begin);
-            let along: f64 = row.iter().zip(&earlier[i * (i + 1) / 2..]).map(|(a, b)| a * b).sum();
+            let along: f64 = row
+                .iter()
+                .zip(&earlier[i * (i + 1) / 2..])
+                .map(|(a, b)| a * b)
+                .sum();
             let scaled = p.at(column, other) * (per_length * member.per_length);
             let entry = (scaled - along) * member.per_pivot;
             self.rows.push(entry);
@@ -115,7 +141,11 @@ impl<'a> Factor<'a> {
         self.rows.push(pivot.sqrt());
         self.gain += forward * forward;
         self.set.push(column);
-        self.members.push(Member { per_length, per_pivot, forward });
+        self.members.push(Member {
+            per_length,
+            per_pivot,
+            forward,
+        });
         true
     }
 }
@@ -145,7 +175,11 @@ pub fn residual_variance(columns: &[Vec<f64>], values: &[f64]) -> f64 {
     }
     project(&mut left, &basis);
     let degrees = values.len().saturating_sub(basis.len());
-    if degrees == 0 { 0.0 } else { dot(&left, &left) / degrees as f64 }
+    if degrees == 0 {
+        0.0
+    } else {
+        dot(&left, &left) / degrees as f64
+    }
 }
 
 #[cfg(test)]
@@ -174,7 +208,9 @@ mod tests {
     #[test]
     fn a_factor_that_grows_gains_what_a_solution_gains() {
         let columns: [Vec<f64>; 5] = std::array::from_fn(|k| {
-            (0..40).map(|i| f64::from((i * (3 + 2 * k as i32) + i * i) % 17) - 6.0).collect()
+            (0..40)
+                .map(|i| f64::from((i * (3 + 2 * k as i32) + i * i) % 17) - 6.0)
+                .collect()
         });
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let products = Products::from_fn(5, |i, j| dot(&columns[i], &columns[j]));
@@ -183,10 +219,16 @@ mod tests {
         assert!((factor.gain() / direct(&[1, 3]) - 1.0).abs() < 1e-12);
         for further in [vec![2], vec![4], vec![4, 2]] {
             let set: Vec<usize> = [3, 1].into_iter().chain(further.iter().copied()).collect();
-            assert!((factor.gain_with(&further).unwrap() / direct(&set) - 1.0).abs() < 1e-12, "{further:?}");
+            assert!(
+                (factor.gain_with(&further).unwrap() / direct(&set) - 1.0).abs() < 1e-12,
+                "{further:?}"
+            );
         }
         assert_eq!(factor.gain_with(&[3]), None, "a column twice");
-        assert!((factor.gain() / direct(&[1, 3]) - 1.0).abs() < 1e-12, "as it was");
+        assert!(
+            (factor.gain() / direct(&[1, 3]) - 1.0).abs() < 1e-12,
+            "as it was"
+        );
     }
 
     #[test]

@@ -24,19 +24,26 @@ pub fn is_material(found: &Explained, tone: &Tone) -> bool {
 }
 
 /// Drops from a set what is real perhaps but of no interest, the smallest first, and bars it from coming back.
-pub fn prune(found: &Explained, weights: &[f64], mut set: Vec<usize>, barred: &mut Vec<usize>) -> Vec<usize> {
+pub fn prune(
+    found: &Explained,
+    weights: &[f64],
+    mut set: Vec<usize>,
+    barred: &mut Vec<usize>,
+) -> Vec<usize> {
     let count = found.ledger.samples(weights);
     loop {
         let (each, whole) = energies_of(found, weights, &set);
         // Beside what was taken out before, too, the search's own may be the error of another's form.
-        let whole = whole + found.apart_m2 * weights.iter().sum::<f64>() / weights.len().max(1) as f64;
+        let whole =
+            whole + found.apart_m2 * weights.iter().sum::<f64>() / weights.len().max(1) as f64;
         let smallest = each
             .iter()
             .enumerate()
             .filter(|(at, energy)| {
                 let share = SMALLEST_OF_EXPLAINED[usize::from(!found.items[set[*at]].listed())];
                 let rms = (*energy / count).sqrt();
-                rms < SMALLEST_OF_NOISE * found.spread.noise_m() || rms < share * (whole / count).sqrt()
+                rms < SMALLEST_OF_NOISE * found.spread.noise_m()
+                    || rms < share * (whole / count).sqrt()
             })
             .min_by(|a, b| a.1.total_cmp(b.1));
         let Some((at, _)) = smallest else { return set };

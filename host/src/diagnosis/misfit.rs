@@ -36,7 +36,10 @@ pub struct Misfit {
 pub fn rms_um(found: &Explained) -> f64 {
     let left = residual(found);
     let sum: f64 = energies_m2(found, &left).iter().sum();
-    (sum / found.ledger.samples(&found.all()).max(1.0)).max(0.0).sqrt() * 1e6
+    (sum / found.ledger.samples(&found.all()).max(1.0))
+        .max(0.0)
+        .sqrt()
+        * 1e6
 }
 
 /// Sum of squares of a column in each run, the centre free, m².
@@ -51,7 +54,10 @@ fn energies_m2(found: &Explained, column: &Column) -> Vec<f64> {
 
 /// The baseline's misfit with its own coefficient fitted, by least squares of the samples; and the coefficient.
 pub fn of_baseline(found: &Explained) -> (Column, f64) {
-    let (data, own) = (found.ledger.column(0), found.ledger.column(found.nuisance[0]));
+    let (data, own) = (
+        found.ledger.column(0),
+        found.ledger.column(found.nuisance[0]),
+    );
     let (mut up, mut down) = (0.0, 0.0);
     for (index, run) in found.runs.iter().enumerate() {
         let (y, x) = (&data.low()[index], &own.low()[index]);
@@ -74,7 +80,13 @@ pub fn split(found: &Explained) -> Misfit {
         .runs
         .iter()
         .zip(left.low())
-        .map(|(run, low)| if seen(run) { run.basis.harmonics_of(low) } else { Harmonics::default() })
+        .map(|(run, low)| {
+            if seen(run) {
+                run.basis.harmonics_of(low)
+            } else {
+                Harmonics::default()
+            }
+        })
         .collect();
     let whole: f64 = energies_m2(found, &left).iter().sum();
     let size: f64 = found
@@ -86,7 +98,11 @@ pub fn split(found: &Explained) -> Misfit {
     let [even, odd] = parity(found, &harmonics);
     let places = localised(&place_means(&found.runs, &left), count);
     let tone: f64 = found.tones.iter().map(Tone::whole_energy_m2).sum();
-    let teeth: f64 = found.teeth.iter().map(|teeth| roughness::energy_m2(teeth, &found.runs)).sum();
+    let teeth: f64 = found
+        .teeth
+        .iter()
+        .map(|teeth| roughness::energy_m2(teeth, &found.runs))
+        .sum();
     let rms = |energy: f64| (energy / count).max(0.0).sqrt() * 1e6;
     Misfit {
         total_um: rms(whole + tone + teeth),
@@ -168,5 +184,9 @@ fn drift_um(found: &Explained, harmonics: &[Harmonics]) -> f64 {
         ty += t * (h.0[0][0] - mean_y);
         tt += t * t;
     }
-    if tt > 0.0 { (ty * ty / tt / n).sqrt() * 1e6 } else { 0.0 }
+    if tt > 0.0 {
+        (ty * ty / tt / n).sqrt() * 1e6
+    } else {
+        0.0
+    }
 }

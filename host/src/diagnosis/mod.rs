@@ -59,7 +59,10 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { model: None, seed: 1 }
+        Self {
+            model: None,
+            seed: 1,
+        }
     }
 }
 
@@ -136,12 +139,28 @@ pub fn diagnose(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Dia
 }
 
 fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, DiagnosisError> {
-    if !campaign.runs.iter().any(|run| run.samples.deviation_m.len() >= 16) {
+    if !campaign
+        .runs
+        .iter()
+        .any(|run| run.samples.deviation_m.len() >= 16)
+    {
         return Err(DiagnosisError::Empty);
     }
-    let given = options.model.as_ref().map(Machine::from_model).transpose()?;
-    let programmed: Vec<Size> = campaign.runs.iter().map(|run| Size::of(run, run.feed_m_s)).collect();
-    let believed: Vec<Size> = campaign.runs.iter().map(|run| Size::of(run, believed_feed_m_s(run))).collect();
+    let given = options
+        .model
+        .as_ref()
+        .map(Machine::from_model)
+        .transpose()?;
+    let programmed: Vec<Size> = campaign
+        .runs
+        .iter()
+        .map(|run| Size::of(run, run.feed_m_s))
+        .collect();
+    let believed: Vec<Size> = campaign
+        .runs
+        .iter()
+        .map(|run| Size::of(run, believed_feed_m_s(run)))
+        .collect();
     let (start, name) = match &options.model {
         Some(model) => (
             Start {
@@ -157,10 +176,20 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
             } else {
                 "an ideal servo (circles do not shrink with speed)".to_string()
             };
-            (Start { response, own_fourth_order: false }, name)
+            (
+                Start {
+                    response,
+                    own_fourth_order: false,
+                },
+                name,
+            )
         }
     };
-    let known = options.model.as_ref().map(|model| model.effects.clone()).unwrap_or_default();
+    let known = options
+        .model
+        .as_ref()
+        .map(|model| model.effects.clone())
+        .unwrap_or_default();
     let cleaned = without_known(campaign, &start, &known);
     let campaign_seen = cleaned.as_ref().unwrap_or(campaign);
     let durations = duration::read(campaign);
@@ -175,8 +204,8 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
             .iter()
             .zip(programmed.iter().zip(&believed))
             .map(|(run, (p, b))| {
-                let off =
-                    run.radius_m * (found.response.gain(p.omega_rad_s) - found.response.gain(b.omega_rad_s));
+                let off = run.radius_m
+                    * (found.response.gain(p.omega_rad_s) - found.response.gain(b.omega_rad_s));
                 off * off * run.samples.deviation_m.len() as f64
             })
             .sum::<f64>();
@@ -190,22 +219,39 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
     if contradicted {
         cannot_tell.push("the turns did not last as the programmed radius and feed say: check which file belongs to which run".into());
     }
-    let findings = if too_poor { Vec::new() } else { verdict::findings(&found, clamp_energy) };
-    let unexplained =
-        if too_poor { Unexplained::default() } else { unexplained::describe(&found, &durations) };
-    let effects: Vec<Effect> =
-        known.iter().cloned().chain(findings.iter().flat_map(|f| f.effects.clone())).collect();
-    let gain = (!too_poor).then(|| gain::measure(campaign_seen, &found, given.as_ref(), clamp, options.seed));
+    let findings = if too_poor {
+        Vec::new()
+    } else {
+        verdict::findings(&found, clamp_energy)
+    };
+    let unexplained = if too_poor {
+        Unexplained::default()
+    } else {
+        unexplained::describe(&found, &durations)
+    };
+    let effects: Vec<Effect> = known
+        .iter()
+        .cloned()
+        .chain(findings.iter().flat_map(|f| f.effects.clone()))
+        .collect();
+    let gain = (!too_poor)
+        .then(|| gain::measure(campaign_seen, &found, given.as_ref(), clamp, options.seed));
     let gain = gain.filter(|gain| gain.folds != [0, 0]);
     let in_sample = misfit::rms_um(&found);
-    let (heldout_base, heldout_extended) =
-        gain.as_ref().map_or((in_sample, in_sample), |gain| (gain.baseline_rms_um, gain.extended_rms_um));
+    let (heldout_base, heldout_extended) = gain.as_ref().map_or((in_sample, in_sample), |gain| {
+        (gain.baseline_rms_um, gain.extended_rms_um)
+    });
     Ok(Diagnosis {
         noise_um: found.spread.noise_m() * 1e6,
         spread_um: found.spread.order_m2[0].sqrt() * 1e6,
-        baseline: Baseline { name, heldout_rms_um: heldout_base },
+        baseline: Baseline {
+            name,
+            heldout_rms_um: heldout_base,
+        },
         unexplained,
-        extended: Extended { heldout_rms_um: heldout_extended },
+        extended: Extended {
+            heldout_rms_um: heldout_extended,
+        },
         gain_percent: gain.as_ref().map_or(0.0, |gain| gain.percent),
         misfit: misfit::split(&found),
         gain,
@@ -218,7 +264,9 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
 }
 
 fn knows_clamp(known: &[Effect]) -> bool {
-    known.iter().any(|effect| effect.cause == crate::causes::Cause::FeedClamp)
+    known
+        .iter()
+        .any(|effect| effect.cause == crate::causes::Cause::FeedClamp)
 }
 
 /// The campaign with what the given effects do taken out, by the simulation with and without them.
@@ -233,7 +281,12 @@ fn without_known(campaign: &Campaign, start: &Start, known: &[Effect]) -> Option
         let test = crate::simulation::CircleTest::of(run);
         let without = crate::simulation::circle(&plain, &test);
         let with = crate::simulation::circle(&with, &test);
-        for ((y, a), b) in run.samples.deviation_m.iter_mut().zip(&with.deviation_m).zip(&without.deviation_m)
+        for ((y, a), b) in run
+            .samples
+            .deviation_m
+            .iter_mut()
+            .zip(&with.deviation_m)
+            .zip(&without.deviation_m)
         {
             *y -= a - b;
         }

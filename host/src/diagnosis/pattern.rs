@@ -88,7 +88,11 @@ pub enum Pattern {
 impl Pattern {
     /// Number of linear columns.
     pub fn columns(&self) -> usize {
-        if matches!(self, Self::Harmonic { .. }) { 2 } else { 1 }
+        if matches!(self, Self::Harmonic { .. }) {
+            2
+        } else {
+            1
+        }
     }
 
     /// Size of the pattern in a run, by its law, without parity (any scale).
@@ -121,12 +125,25 @@ impl Pattern {
             Self::Size { .. } => Some(Harmonics::mean(size)),
             Self::Time { step, .. } => {
                 let share = run.view.elapsed;
-                Some(Harmonics::mean(size * step.map_or(share, |at| f64::from(share > at))))
+                Some(Harmonics::mean(
+                    size * step.map_or(share, |at| f64::from(share > at)),
+                ))
             }
             Self::Harmonic { order, machine, .. } => {
-                let waves = Harmonics::wave(order, if column == 0 { [size, 0.0] } else { [0.0, size] });
+                let waves = Harmonics::wave(
+                    order,
+                    if column == 0 {
+                        [size, 0.0]
+                    } else {
+                        [0.0, size]
+                    },
+                );
                 // Waves of the clock are waves of the recorded angle.
-                Some(if machine { waves } else { waves.seen_from(-run.turned_rad) })
+                Some(if machine {
+                    waves
+                } else {
+                    waves.seen_from(-run.turned_rad)
+                })
             }
             Self::Bump { .. } => None,
         }
@@ -134,13 +151,24 @@ impl Pattern {
 
     /// Values at each sample of a run (any scale); only bumps need them.
     pub fn samples(&self, run: &Prepared, out: &mut [f64]) {
-        let Self::Bump { centre_rad, width_rad, .. } = *self else { return };
+        let Self::Bump {
+            centre_rad,
+            width_rad,
+            ..
+        } = *self
+        else {
+            return;
+        };
         let size = self.amplitude_m(run);
         for (out, psi) in out.iter_mut().zip(run.view.psi_rad.iter()) {
             let turns = (psi - centre_rad) * (1.0 / std::f64::consts::TAU);
             let off = std::f64::consts::TAU * (turns - turns.round()) / width_rad;
             // Far out there is nothing left of it to the last bit.
-            *out = if off.abs() < FAR { size * (-0.5 * off * off).exp() } else { 0.0 };
+            *out = if off.abs() < FAR {
+                size * (-0.5 * off * off).exp()
+            } else {
+                0.0
+            };
         }
     }
 
@@ -162,7 +190,10 @@ impl Pattern {
         }
         for tenth in 1..10 {
             for law in [Law::new(0.0, 0.0), Law::new(0.0, 1.0)] {
-                out.push(Self::Time { step: Some(f64::from(tenth) / 10.0), law });
+                out.push(Self::Time {
+                    step: Some(f64::from(tenth) / 10.0),
+                    law,
+                });
             }
         }
         out
@@ -182,7 +213,12 @@ impl Pattern {
                             | (3, 0.0, 2.0, false)
                     );
                     if !covered {
-                        out.extend([true, false].map(|machine| Self::Harmonic { order, odd, machine, law }));
+                        out.extend([true, false].map(|machine| Self::Harmonic {
+                            order,
+                            odd,
+                            machine,
+                            law,
+                        }));
                     }
                 }
             }
@@ -192,15 +228,19 @@ impl Pattern {
 
     /// Centres and widths of the bumps all around the circle, rad.
     pub fn places_of_bumps() -> impl Iterator<Item = (f64, f64)> {
-        [(72, 3.0_f64), (36, 8.0), (18, 16.0)].into_iter().flat_map(|(places, width_deg)| {
-            let centre = move |place: i32| std::f64::consts::TAU * f64::from(place) / f64::from(places);
-            (0..places).map(move |place| (centre(place), width_deg.to_radians()))
-        })
+        [(72, 3.0_f64), (36, 8.0), (18, 16.0)]
+            .into_iter()
+            .flat_map(|(places, width_deg)| {
+                let centre =
+                    move |place: i32| std::f64::consts::TAU * f64::from(place) / f64::from(places);
+                (0..places).map(move |place| (centre(place), width_deg.to_radians()))
+            })
     }
 
     /// Laws of the bumps, and whether they flip with the direction.
     pub fn laws_of_bumps() -> impl Iterator<Item = (Law, bool)> {
         let laws = [Law::new(0.0, 0.0), Law::new(1.0, 0.0), Law::new(0.0, 1.0)];
-        laws.into_iter().flat_map(|law| [false, true].map(|odd| (law, odd)))
+        laws.into_iter()
+            .flat_map(|law| [false, true].map(|odd| (law, odd)))
     }
 }

@@ -31,7 +31,10 @@ pub struct RunPicture {
 pub fn draw(campaign: &Campaign, seen: &Campaign, found: &Explained) -> Vec<RunPicture> {
     // The baseline with its own coefficient fitted, as in `misfit`.
     let (_, amount) = of_baseline(found);
-    let (data, own) = (found.ledger.column(0), found.ledger.column(found.nuisance[0]));
+    let (data, own) = (
+        found.ledger.column(0),
+        found.ledger.column(found.nuisance[0]),
+    );
     let left = left_by_simulation(found);
     found
         .runs
@@ -53,7 +56,11 @@ pub fn draw(campaign: &Campaign, seen: &Campaign, found: &Explained) -> Vec<RunP
                 run.mask(&mut read);
                 let harmonics = run.basis.harmonics(&read).0;
                 let [c, s] = harmonics[1];
-                let free = samples.iter().zip(theta).map(|(y, a)| y - c * a.cos() - s * a.sin()).collect();
+                let free = samples
+                    .iter()
+                    .zip(theta)
+                    .map(|(y, a)| y - c * a.cos() - s * a.sin())
+                    .collect();
                 (harmonics[0][0], free)
             };
             let measured = centred(campaign.runs[run.index].samples.deviation_m.clone());
@@ -81,9 +88,13 @@ fn left_by_simulation(found: &Explained) -> Column {
     let mut left = residual(found);
     let columns = columns_of(&found.nuisance, &found.items, &found.chosen);
     for &item in &found.chosen {
-        let Kind::Pattern(_) = found.items[item].kind else { continue };
+        let Kind::Pattern(_) = found.items[item].kind else {
+            continue;
+        };
         for own in &found.items[item].columns {
-            let Some(at) = columns.iter().position(|column| column == own) else { continue };
+            let Some(at) = columns.iter().position(|column| column == own) else {
+                continue;
+            };
             left.add(found.solution.coefficients[at], found.ledger.column(*own));
         }
     }
@@ -95,19 +106,28 @@ fn rms(samples: &[f64], read: impl Fn(usize) -> bool) -> f64 {
         .iter()
         .enumerate()
         .filter(|(i, _)| read(*i))
-        .fold((0.0, 0.0), |(sum, count), (_, y)| (sum + y * y, count + 1.0));
+        .fold((0.0, 0.0), |(sum, count), (_, y)| {
+            (sum + y * y, count + 1.0)
+        });
     (sum / f64::max(count, 1.0)).sqrt()
 }
 
 fn sectors(theta: &[f64], samples: &[f64], read: impl Fn(usize) -> bool) -> Vec<Option<f64>> {
     let mut sums = vec![(0.0, 0.0); SECTORS];
-    for (_, (angle, y)) in theta.iter().zip(samples).enumerate().filter(|(i, _)| read(*i)) {
+    for (_, (angle, y)) in theta
+        .iter()
+        .zip(samples)
+        .enumerate()
+        .filter(|(i, _)| read(*i))
+    {
         let at = (angle.rem_euclid(TAU) / TAU * SECTORS as f64) as usize;
         let slot = &mut sums[at.min(SECTORS - 1)];
         slot.0 += y;
         slot.1 += 1.0;
     }
-    sums.into_iter().map(|(sum, count)| (count > 0.0).then(|| sum / count)).collect()
+    sums.into_iter()
+        .map(|(sum, count)| (count > 0.0).then(|| sum / count))
+        .collect()
 }
 
 #[cfg(test)]
@@ -136,11 +156,17 @@ mod tests {
             name: "oval".into(),
             machine_name: "simulated".into(),
             machine: Machine {
-                servo: [PositionLoop { kv_per_s: 40.0, feed_forward: 0.0 }; 2],
+                servo: [PositionLoop {
+                    kv_per_s: 40.0,
+                    feed_forward: 0.0,
+                }; 2],
                 squareness_rad: 200e-6,
                 ..Machine::default()
             },
-            instrument: Instrument { setup_m: [30e-6, -20e-6], ..Instrument::ballbar() },
+            instrument: Instrument {
+                setup_m: [30e-6, -20e-6],
+                ..Instrument::ballbar()
+            },
             tests,
             shuffle: true,
         };
@@ -150,15 +176,26 @@ mod tests {
             let run = &campaign.runs[picture.index];
             // ½εR·sin2θ has an rms of ½εR/√2.
             let oval = 0.5 * 200e-6 * run.radius_m / std::f64::consts::SQRT_2;
-            assert!((picture.rms_m[0] / oval - 1.0).abs() < 0.05, "{} {oval}", picture.rms_m[0]);
+            assert!(
+                (picture.rms_m[0] / oval - 1.0).abs() < 0.05,
+                "{} {oval}",
+                picture.rms_m[0]
+            );
             assert!(picture.rms_m[1] < 2e-6, "{}", picture.rms_m[1]);
             // ΔR = −½ω²/kv²·R
             let shrink = -0.5 * (run.omega_rad_s() / 40.0).powi(2) * run.radius_m;
-            assert!((picture.size_m[0] - shrink).abs() < 2.5e-6, "{} {shrink}", picture.size_m[0]);
+            assert!(
+                (picture.size_m[0] - shrink).abs() < 2.5e-6,
+                "{} {shrink}",
+                picture.size_m[0]
+            );
             assert!(picture.size_m[1].abs() < 2.5e-6 && picture.size_m[2].abs() < 2.5e-6);
             // At 45° the oval is at its largest whatever the direction; the set-up offset is not in it.
             let there = picture.profile_m[0][22].unwrap() - picture.size_m[0];
-            assert!((there.abs() / (0.5 * 200e-6 * run.radius_m) - 1.0).abs() < 0.25, "{there}");
+            assert!(
+                (there.abs() / (0.5 * 200e-6 * run.radius_m) - 1.0).abs() < 0.25,
+                "{there}"
+            );
         }
     }
 }

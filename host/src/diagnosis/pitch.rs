@@ -64,9 +64,18 @@ pub fn scan(
             let turn = Complex::cis(std::f64::consts::TAU * k as f64 * middle / length as f64);
             let (pull, doubled) = (pull[k] * turn, (own[2 * k] * turn * turn).re);
             let energy = [0.5 * (whole + doubled), 0.5 * (whole - doubled)];
-            let part = |pull: f64, own: f64| if own > 1e-6 * whole { pull * pull / own } else { 0.0 };
+            let part = |pull: f64, own: f64| {
+                if own > 1e-6 * whole {
+                    pull * pull / own
+                } else {
+                    0.0
+                }
+            };
             let gain = noise_m2 * (part(pull.re, energy[0]) + part(pull.im, energy[1]));
-            Best { pitch_m: 1.0 / (k as f64 * step_per_m), gain }
+            Best {
+                pitch_m: 1.0 / (k as f64 * step_per_m),
+                gain,
+            }
         })
         .max_by(|a, b| a.gain.total_cmp(&b.gain))
 }

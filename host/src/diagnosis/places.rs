@@ -24,7 +24,13 @@ pub fn place_means(runs: &[Prepared], column: &Column) -> Vec<[f64; PLACES]> {
             sums[bin] += value;
             counts[bin] += 1.0;
         }
-        std::array::from_fn(|bin| if counts[bin] > 0.0 { sums[bin] / counts[bin] } else { 0.0 })
+        std::array::from_fn(|bin| {
+            if counts[bin] > 0.0 {
+                sums[bin] / counts[bin]
+            } else {
+                0.0
+            }
+        })
     };
     runs.par_iter().enumerate().map(means).collect()
 }
@@ -39,8 +45,20 @@ pub fn bump_weights(centre_rad: f64, width_rad: f64) -> [f64; PLACES] {
     });
     let n = PLACES as f64;
     let mean = weights.iter().sum::<f64>() / n;
-    let cos = weights.iter().enumerate().map(|(b, w)| w * angle(b).cos()).sum::<f64>() * 2.0 / n;
-    let sin = weights.iter().enumerate().map(|(b, w)| w * angle(b).sin()).sum::<f64>() * 2.0 / n;
+    let cos = weights
+        .iter()
+        .enumerate()
+        .map(|(b, w)| w * angle(b).cos())
+        .sum::<f64>()
+        * 2.0
+        / n;
+    let sin = weights
+        .iter()
+        .enumerate()
+        .map(|(b, w)| w * angle(b).sin())
+        .sum::<f64>()
+        * 2.0
+        / n;
     for (bin, weight) in weights.iter_mut().enumerate() {
         *weight -= mean + cos * angle(bin).cos() + sin * angle(bin).sin();
     }

@@ -16,7 +16,10 @@ const fn place(i: usize, j: usize) -> usize {
 impl Products {
     /// Of so many columns, all zero.
     pub fn zeros(size: usize) -> Self {
-        Self { size, packed: vec![0.0; size * (size + 1) / 2] }
+        Self {
+            size,
+            packed: vec![0.0; size * (size + 1) / 2],
+        }
     }
 
     /// From each product of column `i` with column `j ≤ i`.
@@ -72,7 +75,10 @@ mod tests {
         for (j, value) in [20.0, 21.0, 22.0].into_iter().enumerate() {
             *products.at_mut(2, j) = value;
         }
-        assert_eq!((products.at(2, 1), products.at(1, 2), products.at(1, 0)), (21.0, 21.0, 10.0));
+        assert_eq!(
+            (products.at(2, 1), products.at(1, 2), products.at(1, 0)),
+            (21.0, 21.0, 10.0)
+        );
         *products.at_mut(0, 2) += 5.0;
         assert_eq!(products.at(2, 0), 25.0);
         let mut sum = Products::zeros(3);

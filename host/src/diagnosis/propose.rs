@@ -47,7 +47,11 @@ pub fn propose_patterns(found: &mut Explained) {
             new.push(candidate.pattern);
         }
     }
-    found.enter(new.into_iter().map(|pattern| (Kind::Pattern(pattern), 1)).collect());
+    found.enter(
+        new.into_iter()
+            .map(|pattern| (Kind::Pattern(pattern), 1))
+            .collect(),
+    );
 }
 
 /// The laws that patterns go by, in every run.
@@ -58,15 +62,24 @@ struct Sizes {
 
 impl Sizes {
     fn new(runs: &[Prepared]) -> Self {
-        let by_law = LAWS.iter().map(|law| runs.iter().map(|run| law.at(run)).collect()).collect();
-        Self { sign: runs.iter().map(|run| run.view.sign).collect(), by_law }
+        let by_law = LAWS
+            .iter()
+            .map(|law| runs.iter().map(|run| law.at(run)).collect())
+            .collect();
+        Self {
+            sign: runs.iter().map(|run| run.view.sign).collect(),
+            by_law,
+        }
     }
 
     /// Run by run; every pattern goes by one of the laws.
     fn of(&self, law: Law, odd: bool) -> impl Iterator<Item = f64> {
         let at = LAWS.iter().position(|other| *other == law);
         let sizes = at.map_or(&[][..], |at| &self.by_law[at]);
-        sizes.iter().zip(&self.sign).map(move |(size, sign)| if odd { size * sign } else { *size })
+        sizes
+            .iter()
+            .zip(&self.sign)
+            .map(move |(size, sign)| if odd { size * sign } else { *size })
     }
 }
 
@@ -83,10 +96,20 @@ fn views(found: &Explained) -> Vec<Vec<Harmonics>> {
                 }
             }
         }
-        found.runs.iter().zip(&low).map(|(run, low)| run.basis.harmonics_of(low)).collect()
+        found
+            .runs
+            .iter()
+            .zip(&low)
+            .map(|(run, low)| run.basis.harmonics_of(low))
+            .collect()
     };
-    let listed = found.chosen.iter().filter(|&&item| found.items[item].listed());
-    std::iter::once(view(&[])).chain(listed.map(|&item| view(&found.items[item].columns))).collect()
+    let listed = found
+        .chosen
+        .iter()
+        .filter(|&&item| found.items[item].listed());
+    std::iter::once(view(&[]))
+        .chain(listed.map(|&item| view(&found.items[item].columns)))
+        .collect()
 }
 
 fn harmonics(found: &Explained, sizes: &Sizes) -> Vec<Candidate> {
@@ -96,7 +119,15 @@ fn harmonics(found: &Explained, sizes: &Sizes) -> Vec<Candidate> {
         let turned = |(run, waves): (&Prepared, &Harmonics)| waves.seen_from(-run.turned_rad);
         let by_machine: Vec<Harmonics> = runs.iter().zip(&by_clock).map(turned).collect();
         let candidate = |pattern: &Pattern| {
-            let Pattern::Harmonic { order, odd, machine, law } = *pattern else { return None };
+            let Pattern::Harmonic {
+                order,
+                odd,
+                machine,
+                law,
+            } = *pattern
+            else {
+                return None;
+            };
             let waves = if machine { &by_machine } else { &by_clock };
             let (mut re, mut im, mut own, mut energy) = (0.0, 0.0, 0.0, 0.0);
             for ((run, waves), size) in runs.iter().zip(waves).zip(sizes.of(law, odd)) {
@@ -117,7 +148,10 @@ fn harmonics(found: &Explained, sizes: &Sizes) -> Vec<Candidate> {
         };
         patterns.iter().filter_map(candidate).collect()
     };
-    views(found).into_par_iter().flat_map_iter(one_view).collect()
+    views(found)
+        .into_par_iter()
+        .flat_map_iter(one_view)
+        .collect()
 }
 
 fn bumps(found: &Explained, sizes: &Sizes) -> Vec<Candidate> {
@@ -140,13 +174,26 @@ fn bumps(found: &Explained, sizes: &Sizes) -> Vec<Candidate> {
         let weights = bump_weights(centre_rad, width_rad);
         let square: f64 = weights.iter().map(|weight| weight * weight).sum();
         for (law, odd, pulls, own) in &laws {
-            let sum: f64 = weights.iter().zip(pulls).map(|(weight, pull)| weight * pull).sum();
+            let sum: f64 = weights
+                .iter()
+                .zip(pulls)
+                .map(|(weight, pull)| weight * pull)
+                .sum();
             let own = own * square;
             if own > 0.0 {
                 // What takes χ² off white samples takes noise²·χ² of energy.
                 let gain = sum * sum / own;
-                let pattern = Pattern::Bump { centre_rad, width_rad, odd: *odd, law: *law };
-                out.push(Candidate { pattern, gain, energy_m2: gain * noise_m2 });
+                let pattern = Pattern::Bump {
+                    centre_rad,
+                    width_rad,
+                    odd: *odd,
+                    law: *law,
+                };
+                out.push(Candidate {
+                    pattern,
+                    gain,
+                    energy_m2: gain * noise_m2,
+                });
             }
         }
     }

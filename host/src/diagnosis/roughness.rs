@@ -46,8 +46,14 @@ pub fn find(runs: &[Prepared], residual: &[Vec<f64>], spread: &Spread) -> Vec<Te
     match both {
         // One axis's teeth lie where the other is fast: hide them before the other is believed.
         [Some(x), Some(y)] => {
-            let (first, other) = if rougher(&x, &y) { (x, Axis::Y) } else { (y, Axis::X) };
-            std::iter::once(first).chain(find_on(other, runs, residual, spread, Some(&first))).collect()
+            let (first, other) = if rougher(&x, &y) {
+                (x, Axis::Y)
+            } else {
+                (y, Axis::X)
+            };
+            std::iter::once(first)
+                .chain(find_on(other, runs, residual, spread, Some(&first)))
+                .collect()
         }
         [x, y] => x.into_iter().chain(y).collect(),
     }
@@ -100,7 +106,12 @@ fn find_on(
         })
         .reduce(
             || ([0.0; BINS], [0.0; BINS]),
-            |a, b| (std::array::from_fn(|k| a.0[k] + b.0[k]), std::array::from_fn(|k| a.1[k] + b.1[k])),
+            |a, b| {
+                (
+                    std::array::from_fn(|k| a.0[k] + b.0[k]),
+                    std::array::from_fn(|k| a.1[k] + b.1[k]),
+                )
+            },
         );
     // Second differences are correlated: about a third of the samples count.
     let excess = |bin: usize| -> (f64, f64) {
@@ -117,7 +128,9 @@ fn find_on(
     let (&highest, &lowest) = (rough.last()?, rough.first()?);
     // Rough up to a speed, which lies within the bin above the last rough one, and smooth beyond it; else it is
     // something else.
-    let above: Vec<usize> = (highest + 2..BINS).filter(|&bin| counts[bin] >= 50.0).collect();
+    let above: Vec<usize> = (highest + 2..BINS)
+        .filter(|&bin| counts[bin] >= 50.0)
+        .collect();
     if above.is_empty()
         || highest - lowest + 1 > rough.len() + 2
         || above.iter().any(|&bin| excess(bin).0 > SMOOTH)
@@ -125,7 +138,8 @@ fn find_on(
         return None;
     }
     let significance = rough.iter().map(|&bin| excess(bin).1).fold(0.0, f64::max);
-    let reached = highest + 1 + usize::from(counts[highest + 1] >= 20.0 && excess(highest + 1).0 > PARTLY);
+    let reached =
+        highest + 1 + usize::from(counts[highest + 1] >= 20.0 && excess(highest + 1).0 > PARTLY);
     let below_m_s = FIRST_EDGE_M_S * 2f64.powf(0.5 * reached as f64);
     if !contrast(axis, below_m_s, runs, residual, spread.noise_m2) {
         return None;
@@ -157,14 +171,32 @@ fn find_on(
         return None;
     }
     let height_m = heights.iter().map(|h| h.0 * h.1).sum::<f64>() / weight;
-    let variance = heights.iter().map(|h| h.1 * (h.0 - height_m).powi(2)).sum::<f64>() / weight;
-    let se_m = (variance / (heights.len() - 1) as f64).sqrt().max(0.07 * height_m);
-    Some(Teeth { axis, below_m_s, height_m, se_m, significance })
+    let variance = heights
+        .iter()
+        .map(|h| h.1 * (h.0 - height_m).powi(2))
+        .sum::<f64>()
+        / weight;
+    let se_m = (variance / (heights.len() - 1) as f64)
+        .sqrt()
+        .max(0.07 * height_m);
+    Some(Teeth {
+        axis,
+        below_m_s,
+        height_m,
+        se_m,
+        significance,
+    })
 }
 
 /// Runs in which the axis is both slow and fast have to be rough where it is slow and smooth where it is fast: a
 /// tone seen by a slow sampling is rough all around its run, and slow runs are those in which the axis is slow.
-fn contrast(axis: Axis, below_m_s: f64, runs: &[Prepared], residual: &[Vec<f64>], noise_m2: f64) -> bool {
+fn contrast(
+    axis: Axis,
+    below_m_s: f64,
+    runs: &[Prepared],
+    residual: &[Vec<f64>],
+    noise_m2: f64,
+) -> bool {
     let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
     for (run, left) in runs.iter().zip(residual) {
         let (mut own, mut count) = ([0.0; 2], [0.0; 2]);
@@ -174,7 +206,8 @@ fn contrast(axis: Axis, below_m_s: f64, runs: &[Prepared], residual: &[Vec<f64>]
                 continue;
             }
             let at = usize::from(speed > below_m_s);
-            own[at] += ((left[i - 1] - 2.0 * left[i] + left[i + 1]).powi(2) / 6.0).min(400.0 * noise_m2);
+            own[at] +=
+                ((left[i - 1] - 2.0 * left[i] + left[i + 1]).powi(2) / 6.0).min(400.0 * noise_m2);
             count[at] += 1.0;
         }
         if count.iter().all(|n| *n >= 20.0) {
@@ -190,8 +223,14 @@ fn contrast(axis: Axis, below_m_s: f64, runs: &[Prepared], residual: &[Vec<f64>]
 
 /// Energy of the teeth on the samples that are hidden for them, m².
 pub fn energy_m2(teeth: &Teeth, runs: &[Prepared]) -> f64 {
-    let hidden: usize =
-        runs.iter().map(|run| (0..run.hidden.len()).filter(|&i| teeth.covers(run, i)).count()).sum();
+    let hidden: usize = runs
+        .iter()
+        .map(|run| {
+            (0..run.hidden.len())
+                .filter(|&i| teeth.covers(run, i))
+                .count()
+        })
+        .sum();
     // A ramp from nothing to the height, seen along the radius.
     hidden as f64 * teeth.height_m.powi(2) / 3.0 * 0.5
 }

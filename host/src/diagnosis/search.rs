@@ -13,14 +13,23 @@ use std::cell::Cell;
 const MOST: usize = 14;
 
 /// Evidence of a set: `None` where its columns are not independent in these runs.
-pub fn evidence(products: &Products, nuisance: &[usize], items: &[Item], set: &[usize]) -> Option<f64> {
+pub fn evidence(
+    products: &Products,
+    nuisance: &[usize],
+    items: &[Item],
+    set: &[usize],
+) -> Option<f64> {
     let price: f64 = set.iter().map(|&i| items[i].price).sum();
     Factor::new(products, &columns_of(nuisance, items, set)).map(|factor| factor.gain() - price)
 }
 
 /// Columns of nuisance and set.
 pub fn columns_of(nuisance: &[usize], items: &[Item], set: &[usize]) -> Vec<usize> {
-    nuisance.iter().copied().chain(set.iter().flat_map(|&i| items[i].columns.iter().copied())).collect()
+    nuisance
+        .iter()
+        .copied()
+        .chain(set.iter().flat_map(|&i| items[i].columns.iter().copied()))
+        .collect()
 }
 
 /// The best set, starting from `start` and without the `barred`.
@@ -40,8 +49,9 @@ pub fn select(
     }
     for _ in 0..4 * MOST {
         let best = factor(&set).map_or(f64::NEG_INFINITY, |factor| factor.gain() - price(&set));
-        let outside: Vec<usize> =
-            (0..items.len()).filter(|i| !set.contains(i) && !barred.contains(i)).collect();
+        let outside: Vec<usize> = (0..items.len())
+            .filter(|i| !set.contains(i) && !barred.contains(i))
+            .collect();
         let mut next: Option<(f64, Vec<usize>)> = None;
         let improved = Cell::new(false);
         let mut consider = |value: f64, base: &[usize], further: &[usize]| {
@@ -53,7 +63,9 @@ pub fn select(
         // Without one of the members (or all kept), alone and with one from outside.
         for at in (0..set.len()).map(Some).chain([None]) {
             let base = at.map_or_else(|| set.clone(), |at| without(&set, at));
-            let Some(mut factor) = factor(&base) else { continue };
+            let Some(mut factor) = factor(&base) else {
+                continue;
+            };
             let paid = price(&base);
             consider(factor.gain() - paid, &base, &[]);
             if base.len() == MOST {
@@ -67,10 +79,16 @@ pub fn select(
         }
         // Two that nearly cancel show only together; looked at where one alone no longer helps.
         if !improved.get() {
-            let listed: Vec<usize> = outside.iter().copied().filter(|&i| items[i].listed()).collect();
+            let listed: Vec<usize> = outside
+                .iter()
+                .copied()
+                .filter(|&i| items[i].listed())
+                .collect();
             for at in (0..set.len()).map(Some).chain([None]) {
                 let base = at.map_or_else(|| set.clone(), |at| without(&set, at));
-                let Some(mut factor) = factor(&base).filter(|_| base.len() + 2 <= MOST) else { continue };
+                let Some(mut factor) = factor(&base).filter(|_| base.len() + 2 <= MOST) else {
+                    continue;
+                };
                 let paid = price(&base);
                 for (i, &one) in listed.iter().enumerate() {
                     let paid = paid + items[one].price;
@@ -92,7 +110,11 @@ pub fn select(
 }
 
 fn without(set: &[usize], at: usize) -> Vec<usize> {
-    set.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, v)| *v).collect()
+    set.iter()
+        .enumerate()
+        .filter(|(i, _)| *i != at)
+        .map(|(_, v)| *v)
+        .collect()
 }
 
 #[cfg(test)]
@@ -104,12 +126,18 @@ mod tests {
     /// Products of the data and three columns: the first explains it, the second nearly does, the third not at all.
     fn products() -> Products {
         let columns: [Vec<f64>; 4] = [
-            (0..60).map(|i| 2.0 * f64::from(i % 7) + 0.3 * f64::from((i * 13) % 5)).collect(),
+            (0..60)
+                .map(|i| 2.0 * f64::from(i % 7) + 0.3 * f64::from((i * 13) % 5))
+                .collect(),
             (0..60).map(|i| f64::from(i % 7)).collect(),
-            (0..60).map(|i| f64::from(i % 7) + f64::from(i % 3)).collect(),
+            (0..60)
+                .map(|i| f64::from(i % 7) + f64::from(i % 3))
+                .collect(),
             (0..60).map(|i| f64::from((i * 31) % 11) - 5.0).collect(),
         ];
-        Products::from_fn(4, |i, j| columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum())
+        Products::from_fn(4, |i, j| {
+            columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum()
+        })
     }
 
     fn items(price: f64) -> Vec<Item> {
@@ -117,7 +145,11 @@ mod tests {
             .into_iter()
             .enumerate()
             .map(|(i, cause)| Item {
-                kind: Kind::Cause { cause, axis: None, shape: Vec::new() },
+                kind: Kind::Cause {
+                    cause,
+                    axis: None,
+                    shape: Vec::new(),
+                },
                 columns: vec![i + 1],
                 price,
                 fitted_beside: None,
@@ -129,7 +161,11 @@ mod tests {
     fn the_best_column_is_chosen_and_its_neighbour_exchanged_for_it() {
         let (products, items) = (products(), items(60.0));
         assert_eq!(select(&products, &[], &items, &[], &[]), vec![0]);
-        assert_eq!(select(&products, &[], &items, &[1], &[]), vec![0], "from the wrong start");
+        assert_eq!(
+            select(&products, &[], &items, &[1], &[]),
+            vec![0],
+            "from the wrong start"
+        );
         assert_eq!(
             select(&products, &[], &items, &[], &[0]),
             vec![1],
@@ -144,11 +180,18 @@ mod tests {
         let other: Vec<f64> = (0..60).map(|i| -wave(i, 3) + 0.2 * wave(i, 5)).collect();
         let sum: Vec<f64> = one.iter().zip(&other).map(|(a, b)| a + b).collect();
         let columns = [sum, one, other, (0..60).map(|i| wave(i, 7)).collect()];
-        let products =
-            Products::from_fn(4, |i, j| columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum());
+        let products = Products::from_fn(4, |i, j| {
+            columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum()
+        });
         let worth = products.at(0, 0);
-        assert_eq!(select(&products, &[], &items(0.4 * worth), &[], &[]), vec![0, 1]);
-        assert!(select(&products, &[], &items(0.6 * worth), &[], &[]).is_empty(), "above their worth");
+        assert_eq!(
+            select(&products, &[], &items(0.4 * worth), &[], &[]),
+            vec![0, 1]
+        );
+        assert!(
+            select(&products, &[], &items(0.6 * worth), &[], &[]).is_empty(),
+            "above their worth"
+        );
     }
 
     #[test]

@@ -50,11 +50,16 @@ pub fn improve(found: &mut Explained) {
     let (chosen, others): (Vec<usize>, Vec<usize>) =
         (0..found.items.len()).partition(|item| found.chosen.contains(item));
     for item in chosen {
-        let Some(task) = Task::of(found, item) else { continue };
+        let Some(task) = Task::of(found, item) else {
+            continue;
+        };
         let shape = Fit::new(found).best(&task);
         settle(found, [(&task, shape)]);
     }
-    let tasks: Vec<Task> = others.into_iter().filter_map(|item| Task::of(found, item)).collect();
+    let tasks: Vec<Task> = others
+        .into_iter()
+        .filter_map(|item| Task::of(found, item))
+        .collect();
     if tasks.is_empty() {
         return;
     }
@@ -90,7 +95,9 @@ struct Task {
 impl Task {
     /// `None`: it has no shape, or none that is to be fitted here and now.
     fn of(found: &mut Explained, item: usize) -> Option<Self> {
-        let Kind::Cause { cause, axis, shape } = found.items[item].kind.clone() else { return None };
+        let Kind::Cause { cause, axis, shape } = found.items[item].kind.clone() else {
+            return None;
+        };
         let model = cause.model();
         if model.shape_names().is_empty() {
             return None;
@@ -101,17 +108,34 @@ impl Task {
         if chosen && (0..shape.len()).all(slope) {
             return None;
         }
-        let others: Vec<usize> = found.chosen.iter().copied().filter(|&i| i != item).collect();
+        let others: Vec<usize> = found
+            .chosen
+            .iter()
+            .copied()
+            .filter(|&i| i != item)
+            .collect();
         let with = columns_of(&found.nuisance, &found.items, &others);
         if found.items[item].fitted_beside.as_ref() == Some(&with) {
             return None;
         }
         found.items[item].fitted_beside = Some(with.clone());
-        Some(Self { item, cause, axis, shape, chosen, price: found.items[item].price, with })
+        Some(Self {
+            item,
+            cause,
+            axis,
+            shape,
+            chosen,
+            price: found.items[item].price,
+            with,
+        })
     }
 
     fn kind(&self, shape: &[f64]) -> Kind {
-        Kind::Cause { cause: self.cause, axis: self.axis, shape: shape.to_vec() }
+        Kind::Cause {
+            cause: self.cause,
+            axis: self.axis,
+            shape: shape.to_vec(),
+        }
     }
 }
 
@@ -156,8 +180,14 @@ impl<'a> Fit<'a> {
             let best = match (task.cause, task.axis) {
                 (Cause::CyclicError, Some(axis)) => {
                     let finest = crate::causes::cyclic_error::finest_wave_per_m(&self.views);
-                    pitch::scan(&self.runs, &self.whitened, self.found.spread.noise_m2, axis, finest)
-                        .map(|found| (found.gain / share, vec![found.pitch_m]))
+                    pitch::scan(
+                        &self.runs,
+                        &self.whitened,
+                        self.found.spread.noise_m2,
+                        axis,
+                        finest,
+                    )
+                    .map(|found| (found.gain / share, vec![found.pitch_m]))
                 }
                 _ => best_of(model.shapes(&self.views), &self.sample),
             };
@@ -166,8 +196,8 @@ impl<'a> Fit<'a> {
                 _ => return task.shape.clone(),
             }
         };
-        let choice =
-            (0..start.len()).any(|which| matches!(model.bend(which, start[which], 1.0), Bend::Choice(_)));
+        let choice = (0..start.len())
+            .any(|which| matches!(model.bend(which, start[which], 1.0), Bend::Choice(_)));
         let mut polished = if choice {
             best_of(model.shapes(&self.views), &self.all).map_or(start, |(_, shape)| shape)
         } else if (0..start.len())
@@ -176,7 +206,11 @@ impl<'a> Fit<'a> {
             self.climb(task, start)
         } else {
             let near = simplex(&start, 0.15, 40, |shape| score(shape, &self.sample));
-            if task.chosen { simplex(&near, 0.03, 20, |shape| score(shape, &self.all)) } else { near }
+            if task.chosen {
+                simplex(&near, 0.03, 20, |shape| score(shape, &self.all))
+            } else {
+                near
+            }
         };
         model.tidy(&mut polished);
         polished
@@ -185,7 +219,12 @@ impl<'a> Fit<'a> {
     /// Climbs from a shape to the nearest best one along its tangents, over the runs of the scan.
     fn climb(&self, task: &Task, start: Vec<f64>) -> Vec<f64> {
         let model = task.cause.model();
-        let travel_m = 2.0 * self.views.iter().map(|view| view.radius_m).fold(1e-3, f64::max);
+        let travel_m = 2.0
+            * self
+                .views
+                .iter()
+                .map(|view| view.radius_m)
+                .fold(1e-3, f64::max);
         let mut shape = start;
         for _ in 0..CLIMBS {
             let steps: Vec<f64> = (0..shape.len())
@@ -194,7 +233,9 @@ impl<'a> Fit<'a> {
                     Bend::Choice(_) | Bend::Stiff => 0.0,
                 })
                 .collect();
-            let Some(climb) = self.slope(task, &shape, &steps) else { break };
+            let Some(climb) = self.slope(task, &shape, &steps) else {
+                break;
+            };
             if climb.promised < WORTH {
                 break;
             }
@@ -236,14 +277,23 @@ impl<'a> Fit<'a> {
             match column.checked_sub(known + wide) {
                 None => vec![(column, 1.0)],
                 Some(which) => (0..wide)
-                    .flat_map(|k| [(known + (which + 1) * wide + k, amounts[k]), (known + k, -amounts[k])])
+                    .flat_map(|k| {
+                        [
+                            (known + (which + 1) * wide + k, amounts[k]),
+                            (known + k, -amounts[k]),
+                        ]
+                    })
                     .collect(),
             }
         };
         let parts: Vec<Vec<(usize, f64)>> = (0..size).map(parts).collect();
         let mut along = Products::from_fn(size, |i, j| {
-            let pairs = parts[i].iter().flat_map(|a| parts[j].iter().map(move |b| (a, b)));
-            pairs.map(|((a, x), (b, y))| x * y * products.at(*a, *b)).sum()
+            let pairs = parts[i]
+                .iter()
+                .flat_map(|a| parts[j].iter().map(move |b| (a, b)));
+            pairs
+                .map(|((a, x), (b, y))| x * y * products.at(*a, *b))
+                .sum()
         });
         for tangent in known + wide..size {
             *along.at_mut(tangent, tangent) += PRIOR.powi(-2);
@@ -263,7 +313,9 @@ impl<'a> Fit<'a> {
         let (without, further): (Vec<usize>, Vec<usize>) =
             ((1..known).collect(), (known..products.size()).collect());
         let gain = |mut factor: Factor<'_>| Some(factor.gain_with(&further)? - factor.gain());
-        Factor::new(&products, &without).and_then(gain).unwrap_or(0.0)
+        Factor::new(&products, &without)
+            .and_then(gain)
+            .unwrap_or(0.0)
     }
 
     /// White products over some runs: of the data and the columns `with`, as many as the second number says, and of the
@@ -290,7 +342,10 @@ impl<'a> Fit<'a> {
                 *products.at_mut(i, j) += white.at(a, b);
             }
         }
-        let parts: Vec<Part> = trials.iter().flat_map(|kind| Part::all(kind, prepared)).collect();
+        let parts: Vec<Part> = trials
+            .iter()
+            .flat_map(|kind| Part::all(kind, prepared))
+            .collect();
         for (index, part) in parts.iter().enumerate() {
             let at = base.len() + index;
             for (i, &other) in base.iter().enumerate() {
@@ -301,7 +356,8 @@ impl<'a> Fit<'a> {
                 *products.at_mut(at, i) += white / ledger.noise_m2();
             }
             for (earlier, other) in parts[..=index].iter().enumerate() {
-                *products.at_mut(at, base.len() + earlier) += part.white(other, discount) / ledger.noise_m2();
+                *products.at_mut(at, base.len() + earlier) +=
+                    part.white(other, discount) / ledger.noise_m2();
             }
         }
     }
@@ -324,16 +380,27 @@ struct Part {
 
 impl Part {
     fn all(kind: &Kind, run: &Prepared) -> Vec<Self> {
-        let low: Option<Vec<Low>> = (0..kind.columns()).map(|index| kind.low(index, run)).collect();
+        let low: Option<Vec<Low>> = (0..kind.columns())
+            .map(|index| kind.low(index, run))
+            .collect();
         match low {
-            Some(low) => low.into_iter().map(|low| Self { low, samples: Vec::new() }).collect(),
+            Some(low) => low
+                .into_iter()
+                .map(|low| Self {
+                    low,
+                    samples: Vec::new(),
+                })
+                .collect(),
             None => {
                 let mut all = vec![vec![0.0; run.deviation_m.len()]; kind.columns()];
                 let mut out: Vec<&mut [f64]> = all.iter_mut().map(Vec::as_mut_slice).collect();
                 kind.samples(run, &mut out);
                 let part = |mut samples: Vec<f64>| {
                     run.mask(&mut samples);
-                    Self { low: run.basis.coordinates(&samples), samples }
+                    Self {
+                        low: run.basis.coordinates(&samples),
+                        samples,
+                    }
                 };
                 all.into_iter().map(part).collect()
             }
@@ -344,7 +411,9 @@ impl Part {
         if self.samples.is_empty() || other.samples.is_empty() {
             return kept(&self.low, &other.low, discount);
         }
-        let scatter: f64 = (0..COLUMNS).map(|k| discount[k] * self.low[k] * other.low[k]).sum();
+        let scatter: f64 = (0..COLUMNS)
+            .map(|k| discount[k] * self.low[k] * other.low[k])
+            .sum();
         dot(&self.samples, &other.samples) - scatter
     }
 }
@@ -364,12 +433,22 @@ fn whitened_residual(found: &Explained) -> Column {
 fn stratified(runs: &[Prepared]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..runs.len()).collect();
     order.sort_by(|&a, &b| {
-        let key = |i: usize| (runs[i].view.radius_m, runs[i].view.feed_m_s, runs[i].view.sign);
+        let key = |i: usize| {
+            (
+                runs[i].view.radius_m,
+                runs[i].view.feed_m_s,
+                runs[i].view.sign,
+            )
+        };
         let (a, b) = (key(a), key(b));
-        a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.total_cmp(&b.2))
+        a.0.total_cmp(&b.0)
+            .then(a.1.total_cmp(&b.1))
+            .then(a.2.total_cmp(&b.2))
     });
     let step = (runs.len() as f64 / SCAN_RUNS as f64).max(1.0);
-    (0..SCAN_RUNS.min(runs.len())).map(|i| order[((i as f64 + 0.5) * step) as usize % order.len()]).collect()
+    (0..SCAN_RUNS.min(runs.len()))
+        .map(|i| order[((i as f64 + 0.5) * step) as usize % order.len()])
+        .collect()
 }
 
 /// Nelder–Mead upwards; each parameter first moves by a share of itself, or by 1 ms (or mm) from zero.
@@ -378,22 +457,35 @@ fn simplex(start: &[f64], first_step: f64, most: usize, score: impl Fn(&[f64]) -
     let mut points: Vec<(f64, Vec<f64>)> = vec![(score(start), start.to_vec())];
     for axis in 0..n {
         let mut moved = start.to_vec();
-        moved[axis] += if moved[axis].abs() > 1e-9 { first_step * moved[axis] } else { 1e-3 };
+        moved[axis] += if moved[axis].abs() > 1e-9 {
+            first_step * moved[axis]
+        } else {
+            1e-3
+        };
         points.push((score(&moved), moved));
     }
     for _ in 0..most {
         points.sort_by(|a, b| b.0.total_cmp(&a.0));
         let worst = points[n].clone();
-        let centre: Vec<f64> =
-            (0..n).map(|k| points[..n].iter().map(|(_, p)| p[k]).sum::<f64>() / n as f64).collect();
+        let centre: Vec<f64> = (0..n)
+            .map(|k| points[..n].iter().map(|(_, p)| p[k]).sum::<f64>() / n as f64)
+            .collect();
         let towards = |factor: f64| -> (f64, Vec<f64>) {
-            let point: Vec<f64> = centre.iter().zip(&worst.1).map(|(c, w)| c + factor * (w - c)).collect();
+            let point: Vec<f64> = centre
+                .iter()
+                .zip(&worst.1)
+                .map(|(c, w)| c + factor * (w - c))
+                .collect();
             (score(&point), point)
         };
         let reflected = towards(-1.0);
         points[n] = if reflected.0 > points[0].0 {
             let expanded = towards(-2.0);
-            if expanded.0 > reflected.0 { expanded } else { reflected }
+            if expanded.0 > reflected.0 {
+                expanded
+            } else {
+                reflected
+            }
         } else if reflected.0 > points[n - 1].0 {
             reflected
         } else {
@@ -403,7 +495,12 @@ fn simplex(start: &[f64], first_step: f64, most: usize, score: impl Fn(&[f64]) -
             } else {
                 let best = points[0].1.clone();
                 for point in points.iter_mut().skip(1) {
-                    point.1 = point.1.iter().zip(&best).map(|(p, b)| 0.5 * (p + b)).collect();
+                    point.1 = point
+                        .1
+                        .iter()
+                        .zip(&best)
+                        .map(|(p, b)| 0.5 * (p + b))
+                        .collect();
                     point.0 = score(&point.1);
                 }
                 points[n].clone()
@@ -415,5 +512,8 @@ fn simplex(start: &[f64], first_step: f64, most: usize, score: impl Fn(&[f64]) -
             break;
         }
     }
-    points.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).map_or_else(|| start.to_vec(), |(_, point)| point)
+    points
+        .into_iter()
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map_or_else(|| start.to_vec(), |(_, point)| point)
 }

@@ -64,7 +64,15 @@ pub fn measure(runs: &[Prepared], residual: &[Vec<f64>]) -> Spread {
         let within = noise_m2 * mean_inverse_samples(&runs) * if order == 0 { 1.0 } else { 2.0 };
         let parts = if order == 0 { 1 } else { 2 };
         let total: f64 = (0..parts)
-            .map(|part| pure_error(&runs, &harmonics.iter().map(|h| h.0[order][part]).collect::<Vec<_>>()))
+            .map(|part| {
+                pure_error(
+                    &runs,
+                    &harmonics
+                        .iter()
+                        .map(|h| h.0[order][part])
+                        .collect::<Vec<_>>(),
+                )
+            })
             .sum();
         *slot = (total / parts as f64 - within).max(0.0);
     }
@@ -72,7 +80,10 @@ pub fn measure(runs: &[Prepared], residual: &[Vec<f64>]) -> Spread {
 }
 
 fn mean_inverse_samples(runs: &[&Prepared]) -> f64 {
-    runs.iter().map(|run| 1.0 / run.visible().max(1) as f64).sum::<f64>() / runs.len().max(1) as f64
+    runs.iter()
+        .map(|run| 1.0 / run.visible().max(1) as f64)
+        .sum::<f64>()
+        / runs.len().max(1) as f64
 }
 
 /// Variance of a sample from second differences: smooth effects cancel, and the median over the runs ignores
@@ -82,8 +93,10 @@ fn noise(residual: &[Vec<f64>]) -> f64 {
         .par_iter()
         .filter(|run| run.len() >= 16)
         .map(|run| {
-            let mut squares: Vec<f64> =
-                run.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).powi(2) / 6.0).collect();
+            let mut squares: Vec<f64> = run
+                .windows(3)
+                .map(|w| (w[0] - 2.0 * w[1] + w[2]).powi(2) / 6.0)
+                .collect();
             // Mean of the smaller 90 %, scaled to the mean of χ²₁: robust to steps and spikes.
             let keep = squares.len() * 9 / 10;
             squares.select_nth_unstable_by(keep, f64::total_cmp);
@@ -144,7 +157,9 @@ mod tests {
         let normal = Normal::new(0.0, 1e-6).unwrap();
         let runs: Vec<Vec<f64>> = (0..40)
             .map(|_| {
-                (0..1000).map(|i| 50e-6 * (f64::from(i) * 0.0126).cos() + normal.sample(&mut rng)).collect()
+                (0..1000)
+                    .map(|i| 50e-6 * (f64::from(i) * 0.0126).cos() + normal.sample(&mut rng))
+                    .collect()
             })
             .collect();
         let sd = noise(&runs).sqrt();

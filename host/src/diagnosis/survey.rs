@@ -47,12 +47,23 @@ impl Response {
     /// Of a model file.
     pub fn of(servo: &Servo) -> Self {
         match *servo {
-            Servo::Beta { beta1_s2, beta2_s4, .. } => {
+            Servo::Beta {
+                beta1_s2, beta2_s4, ..
+            } => {
                 let a_s2 = -2.0 * beta1_s2;
-                Self { a_s2, b_s4: 2.0 * (0.375 * a_s2 * a_s2 - beta2_s4) }
+                Self {
+                    a_s2,
+                    b_s4: 2.0 * (0.375 * a_s2 * a_s2 - beta2_s4),
+                }
             }
-            Servo::Lag { kv_per_s } => Self { a_s2: kv_per_s.powi(-2), b_s4: 0.0 },
-            Servo::SecondOrder { omega_n_rad_s, zeta } => Self {
+            Servo::Lag { kv_per_s } => Self {
+                a_s2: kv_per_s.powi(-2),
+                b_s4: 0.0,
+            },
+            Servo::SecondOrder {
+                omega_n_rad_s,
+                zeta,
+            } => Self {
                 a_s2: -2.0 * (1.0 - 2.0 * zeta * zeta) / omega_n_rad_s.powi(2),
                 b_s4: omega_n_rad_s.powi(-4),
             },
@@ -66,17 +77,30 @@ impl Response {
             let omega_n = self.b_s4.powf(-0.25);
             let zeta = (0.5 + 0.25 * self.a_s2 * omega_n * omega_n).max(0.0).sqrt();
             let tau3_s3 = (8.0 / 3.0 * zeta.powi(3) - 2.0 * zeta) / omega_n.powi(3);
-            Lag { tau_s: 2.0 * zeta / omega_n, tau3_s3, measured: false, se_s: UNSEEN_S }
+            Lag {
+                tau_s: 2.0 * zeta / omega_n,
+                tau3_s3,
+                measured: false,
+                se_s: UNSEEN_S,
+            }
         } else {
             let tau_s = self.a_s2.max(0.0).sqrt();
-            Lag { tau_s, tau3_s3: tau_s.powi(3) / 3.0, measured: false, se_s: UNSEEN_S }
+            Lag {
+                tau_s,
+                tau3_s3: tau_s.powi(3) / 3.0,
+                measured: false,
+                se_s: UNSEEN_S,
+            }
         }
     }
 
     /// |G(jω)|.
     pub fn gain(&self, omega_rad_s: f64) -> f64 {
         let w2 = omega_rad_s * omega_rad_s;
-        (1.0 + self.a_s2 * w2 + self.b_s4 * w2 * w2).max(1e-3).sqrt().recip()
+        (1.0 + self.a_s2 * w2 + self.b_s4 * w2 * w2)
+            .max(1e-3)
+            .sqrt()
+            .recip()
     }
 }
 
@@ -84,8 +108,12 @@ impl Prepared {
     /// Takes the recorded pattern as one that runs ahead of the machine by the lag `lag_rad`.
     pub fn turn_to(&mut self, lag_rad: f64) {
         let turned_rad = self.view.sign * lag_rad;
-        let psi: Arc<[f64]> =
-            self.view.psi_rad.iter().map(|psi| psi + self.turned_rad - turned_rad).collect();
+        let psi: Arc<[f64]> = self
+            .view
+            .psi_rad
+            .iter()
+            .map(|psi| psi + self.turned_rad - turned_rad)
+            .collect();
         self.view.lag_rad = lag_rad;
         self.turned_rad = turned_rad;
         self.view.place(psi);
@@ -93,7 +121,12 @@ impl Prepared {
 
     /// Hides samples from every product.
     pub fn hide(&mut self, hidden: Vec<bool>) {
-        let angle: Vec<f64> = self.view.psi_rad.iter().map(|psi| psi + self.turned_rad).collect();
+        let angle: Vec<f64> = self
+            .view
+            .psi_rad
+            .iter()
+            .map(|psi| psi + self.turned_rad)
+            .collect();
         self.basis = Arc::new(Basis::masked(&angle, &hidden));
         self.hidden = hidden.into();
         let mut deviation = std::mem::take(&mut self.deviation_m);
@@ -150,7 +183,11 @@ pub fn believed_feed_m_s(run: &Run) -> f64 {
     match run.turn_s() {
         Some(turn_s) if turn_s > 0.0 => {
             let measured = turn_m / turn_s;
-            if (SLOWED..=1.0 / SLOWED).contains(&(measured / run.feed_m_s)) { run.feed_m_s } else { measured }
+            if (SLOWED..=1.0 / SLOWED).contains(&(measured / run.feed_m_s)) {
+                run.feed_m_s
+            } else {
+                measured
+            }
         }
         _ => run.feed_m_s,
     }
@@ -172,8 +209,12 @@ pub struct Survey {
 impl Survey {
     /// Reads a campaign.
     pub fn new(campaign: &Campaign) -> Self {
-        let starts: Vec<f64> =
-            campaign.runs.iter().enumerate().map(|(i, run)| run.started_s.unwrap_or(i as f64)).collect();
+        let starts: Vec<f64> = campaign
+            .runs
+            .iter()
+            .enumerate()
+            .map(|(i, run)| run.started_s.unwrap_or(i as f64))
+            .collect();
         let began = starts.iter().copied().fold(f64::INFINITY, f64::min);
         let span = starts.iter().copied().fold(f64::NEG_INFINITY, f64::max) - began;
         let timed = campaign.runs.iter().all(|run| run.started_s.is_some());
@@ -182,7 +223,11 @@ impl Survey {
             Some(started_s) => started_s + std::f64::consts::PI / omega,
             None => starts[index],
         };
-        let largest = campaign.runs.iter().map(|run| run.radius_m).fold(0.0, f64::max);
+        let largest = campaign
+            .runs
+            .iter()
+            .map(|run| run.radius_m)
+            .fold(0.0, f64::max);
         let ends: Vec<usize> = campaign
             .runs
             .iter()
@@ -203,7 +248,10 @@ impl Survey {
                 let from = theta.first().copied().unwrap_or(0.0);
                 let time_s = match &run.samples.time_s {
                     Some(time_s) => time_s.as_slice().into(),
-                    None => theta.iter().map(|angle| (angle - from).abs() / omega).collect(),
+                    None => theta
+                        .iter()
+                        .map(|angle| (angle - from).abs() / omega)
+                        .collect(),
                 };
                 let basis = Basis::new(theta);
                 let [_, first, ..] = basis.harmonics(&run.samples.deviation_m).0;
@@ -220,7 +268,11 @@ impl Survey {
                         feed_m_s: feed,
                         omega_rad_s: omega,
                         sign: run.sign(),
-                        elapsed: if span > 0.0 { (middle(index, omega) - began) / span } else { 0.0 },
+                        elapsed: if span > 0.0 {
+                            (middle(index, omega) - began) / span
+                        } else {
+                            0.0
+                        },
                         campaign_s: if timed && span > 0.0 { span } else { UNTIMED_S },
                         largest_radius_m: largest,
                         psi_rad: theta.as_slice().into(),
@@ -235,7 +287,11 @@ impl Survey {
             })
             .unzip();
         let inferred = campaign.runs.iter().any(|run| run.samples.angle_inferred);
-        Self { runs, firsts, inferred }
+        Self {
+            runs,
+            firsts,
+            inferred,
+        }
     }
 
     /// The low orders of each run about its recorded angle, nothing hidden.
@@ -248,7 +304,12 @@ impl Survey {
         if self.inferred {
             self.measure_lag(response)
         } else {
-            Lag { tau_s: 0.0, tau3_s3: 0.0, measured: true, se_s: 0.0 }
+            Lag {
+                tau_s: 0.0,
+                tau3_s3: 0.0,
+                measured: true,
+                se_s: 0.0,
+            }
         }
     }
 
@@ -277,7 +338,11 @@ impl Survey {
 pub fn misfit(runs: &[Prepared]) -> Column {
     let left = |run: &Prepared, out: &mut [&mut [f64]]| {
         let shrink = run.view.radius_m * (run.view.gain - 1.0);
-        for (out, deviation) in out.iter_mut().flat_map(|out| out.iter_mut()).zip(&run.deviation_m) {
+        for (out, deviation) in out
+            .iter_mut()
+            .flat_map(|out| out.iter_mut())
+            .zip(&run.deviation_m)
+        {
             *out = deviation - shrink;
         }
     };
@@ -312,7 +377,13 @@ impl Survey {
             }
             let n = points.len() as f64;
             let (re, im) = (re / n, im / n);
-            let left = points.iter().map(|(_, _, [c, s])| c * c + s * s).sum::<f64>() / n - re * re - im * im;
+            let left = points
+                .iter()
+                .map(|(_, _, [c, s])| c * c + s * s)
+                .sum::<f64>()
+                / n
+                - re * re
+                - im * im;
             (left.max(0.0), re.hypot(im))
         };
         let fastest = points.iter().map(|p| p.1).fold(0.0, f64::max);
@@ -327,12 +398,22 @@ impl Survey {
             .min_by(|l, r| cost(*l, 0.0).0.total_cmp(&cost(*r, 0.0).0))
             .unwrap_or(guess);
         let mut tau3 = 0.0;
-        let mut step = [widest / 80.0, 0.2 * tau.abs().max(1e-3) / (fastest * fastest)];
-        #[allow(clippy::needless_range_loop, reason = "the axis is a choice of parameter")]
+        let mut step = [
+            widest / 80.0,
+            0.2 * tau.abs().max(1e-3) / (fastest * fastest),
+        ];
+        #[allow(
+            clippy::needless_range_loop,
+            reason = "the axis is a choice of parameter"
+        )]
         for _ in 0..60 {
             for axis in 0..2 {
                 let at = |delta: f64| {
-                    if axis == 0 { cost(tau + delta, tau3).0 } else { cost(tau, tau3 + delta).0 }
+                    if axis == 0 {
+                        cost(tau + delta, tau3).0
+                    } else {
+                        cost(tau, tau3 + delta).0
+                    }
                 };
                 let (low, mid, high) = (at(-step[axis]), at(0.0), at(step[axis]));
                 let bend = low - 2.0 * mid + high;
@@ -342,7 +423,11 @@ impl Survey {
                     0.0
                 };
                 if at(delta) <= mid {
-                    if axis == 0 { tau += delta } else { tau3 += delta }
+                    if axis == 0 {
+                        tau += delta
+                    } else {
+                        tau3 += delta
+                    }
                 }
                 step[axis] *= 0.85;
             }
@@ -354,7 +439,12 @@ impl Survey {
             return unmeasured;
         }
         // τ and τ3 share what the fastest runs tell.
-        Lag { tau_s: tau, tau3_s3: tau3, measured: true, se_s: 2.0 * se / fastest }
+        Lag {
+            tau_s: tau,
+            tau3_s3: tau3,
+            measured: true,
+            se_s: 2.0 * se / fastest,
+        }
     }
 }
 
@@ -365,12 +455,21 @@ mod tests {
     #[test]
     fn own_lag_is_the_phase_of_the_chain() {
         let (omega_n, zeta) = (38.0_f64, 0.72_f64);
-        let second = Response::of(&Servo::SecondOrder { omega_n_rad_s: omega_n, zeta });
+        let second = Response::of(&Servo::SecondOrder {
+            omega_n_rad_s: omega_n,
+            zeta,
+        });
         let lag = Response::of(&Servo::Lag { kv_per_s: 90.0 });
         for omega in [0.5, 3.0, 7.0] {
             let exact = (2.0 * zeta * omega / omega_n).atan2(1.0 - (omega / omega_n).powi(2));
-            assert!((second.own_lag().phase(omega) - exact).abs() < 2e-4, "{omega}: {exact}");
-            assert!((lag.own_lag().phase(omega) - (omega / 90.0).atan()).abs() < 1e-6, "{omega}");
+            assert!(
+                (second.own_lag().phase(omega) - exact).abs() < 2e-4,
+                "{omega}: {exact}"
+            );
+            assert!(
+                (lag.own_lag().phase(omega) - (omega / 90.0).atan()).abs() < 1e-6,
+                "{omega}"
+            );
         }
     }
 }

@@ -52,7 +52,11 @@ const WORTH: f64 = 0.3;
 /// with [`Ledger::truncate`](super::ledger::Ledger::truncate).
 fn lay(found: &mut Explained, weights: &[f64], whole: bool) -> Option<Tangents> {
     let runs = Arc::clone(&found.runs);
-    let travel_m = 2.0 * runs.iter().map(|run| run.view.radius_m).fold(1e-3, f64::max);
+    let travel_m = 2.0
+        * runs
+            .iter()
+            .map(|run| run.view.radius_m)
+            .fold(1e-3, f64::max);
     let mut columns = columns_of(&found.nuisance, &found.items, &found.chosen);
     let amounts: Vec<(usize, Vec<f64>)> = found
         .chosen
@@ -67,7 +71,9 @@ fn lay(found: &mut Explained, weights: &[f64], whole: bool) -> Option<Tangents> 
         .collect();
     let mut shapes = Vec::new();
     for (item, amounts) in &amounts {
-        let Kind::Cause { cause, axis, shape } = found.items[*item].kind.clone() else { continue };
+        let Kind::Cause { cause, axis, shape } = found.items[*item].kind.clone() else {
+            continue;
+        };
         for which in 0..shape.len() {
             let (step, prior) = match cause.model().bend(which, shape[which], travel_m) {
                 Bend::Amount(step) => (step, PRIOR),
@@ -79,7 +85,12 @@ fn lay(found: &mut Explained, weights: &[f64], whole: bool) -> Option<Tangents> 
             let moved = Kind::Cause { cause, axis, shape };
             let tangent = difference(found, *item, amounts, &moved, &runs);
             columns.push(found.ledger.push(tangent));
-            shapes.push(Shape { item: *item, which, step, prior });
+            shapes.push(Shape {
+                item: *item,
+                which,
+                step,
+                prior,
+            });
         }
     }
     // Angles that were measured hold no lag.
@@ -112,13 +123,27 @@ fn lay(found: &mut Explained, weights: &[f64], whole: bool) -> Option<Tangents> 
         *products.at_mut(column, 0) -= stiff * found.more_lag_s / LAG_STEP_S;
     }
     let solution = solve(&products, &columns)?;
-    Some(Tangents { shapes, lag, columns, solution })
+    Some(Tangents {
+        shapes,
+        lag,
+        columns,
+        solution,
+    })
 }
 
 /// What the explanation `item` does as `moved` on `runs`, beyond what it does now, at its present amounts.
-fn difference(found: &Explained, item: usize, amounts: &[f64], moved: &Kind, runs: &[Prepared]) -> Column {
+fn difference(
+    found: &Explained,
+    item: usize,
+    amounts: &[f64],
+    moved: &Kind,
+    runs: &[Prepared],
+) -> Column {
     let mut out = Column::zero(runs.len());
-    let columns = found.items[item].columns.iter().zip(moved.columns_over(runs));
+    let columns = found.items[item]
+        .columns
+        .iter()
+        .zip(moved.columns_over(runs));
     for (&amount, (&now, moved)) in amounts.iter().zip(columns) {
         out.add(amount, &moved);
         out.add(-amount, found.ledger.column(now));
@@ -133,7 +158,8 @@ pub fn polish(found: &mut Explained, weights: &[f64]) {
         let tangents = lay(found, weights, false);
         found.ledger.truncate(size);
         let Some(tangents) = tangents else { return };
-        if tangents.solution.gain - found.solution.gain < WORTH || !step(found, weights, &tangents) {
+        if tangents.solution.gain - found.solution.gain < WORTH || !step(found, weights, &tangents)
+        {
             return;
         }
     }
@@ -145,7 +171,11 @@ fn step(found: &mut Explained, weights: &[f64], tangents: &Tangents) -> bool {
     let before: Vec<Kind> = found.items.iter().map(|item| item.kind.clone()).collect();
     let solution = found.solution.clone();
     for share in [1.0, 0.4, 0.1] {
-        for (shape, steps) in tangents.shapes.iter().zip(&tangents.solution.coefficients[first..]) {
+        for (shape, steps) in tangents
+            .shapes
+            .iter()
+            .zip(&tangents.solution.coefficients[first..])
+        {
             if let Kind::Cause { shape: values, .. } = &mut found.items[shape.item].kind {
                 values[shape.which] += share * steps.clamp(-LONGEST, LONGEST) * shape.step;
             }
@@ -180,7 +210,11 @@ fn relay(found: &mut Explained, shapes: &[Shape]) {
 pub fn finish(found: &mut Explained, weights: &[f64]) -> f64 {
     found.tangents = lay(found, weights, true);
     match &found.tangents {
-        Some(Tangents { lag: true, solution, .. }) => {
+        Some(Tangents {
+            lag: true,
+            solution,
+            ..
+        }) => {
             let steps = solution.coefficients.last().copied().unwrap_or(0.0);
             (LAG_STEP_S * steps).clamp(-LONGEST_LAG_S, LONGEST_LAG_S)
         }
@@ -191,9 +225,11 @@ pub fn finish(found: &mut Explained, weights: &[f64]) -> f64 {
 /// Covariance and columns with the tangents, or without where there are none.
 pub fn covariance(found: &Explained) -> (&DMatrix<f64>, Vec<usize>, Vec<f64>) {
     match &found.tangents {
-        Some(tangents) => {
-            (&tangents.solution.covariance, tangents.columns.clone(), tangents.solution.coefficients.clone())
-        }
+        Some(tangents) => (
+            &tangents.solution.covariance,
+            tangents.columns.clone(),
+            tangents.solution.coefficients.clone(),
+        ),
         None => (
             &found.solution.covariance,
             columns_of(&found.nuisance, &found.items, &found.chosen),

@@ -95,7 +95,11 @@ pub fn find(runs: &[Prepared], residual: &Column, spread: &Spread) -> Option<Ton
     let spectra: Vec<Spectrum> = clean
         .par_iter()
         .filter_map(|clean| {
-            Some(spectrum(clean, transforms.get(&padded(clean.samples.len()))?, spread.noise_m2))
+            Some(spectrum(
+                clean,
+                transforms.get(&padded(clean.samples.len()))?,
+                spread.noise_m2,
+            ))
         })
         .collect();
     let longest = spectra.iter().map(|s| s.turn_s).fold(0.0, f64::max);
@@ -130,7 +134,10 @@ pub fn find(runs: &[Prepared], residual: &Column, spread: &Spread) -> Option<Ton
     let width = (*levels.select_nth_unstable_by(high, f64::total_cmp).1 - floor).max(1e-9);
     // Where much else is rough, a capped mean is never far above it: a tone that nearly every run shows is one all the same.
     let shown = |hz: f64, count: usize| {
-        let those = spectra.iter().filter(|s| s.sees(hz) && s.stands_out(hz)).count();
+        let those = spectra
+            .iter()
+            .filter(|s| s.sees(hz) && s.stands_out(hz))
+            .count();
         those as f64 > NEARLY_EVERY * count as f64
     };
     let best = grid
@@ -162,13 +169,18 @@ fn refine(
         })
         .collect();
     let swung = |axis: Option<Axis>| -> Vec<Vec<f64>> {
-        usable.par_iter().map(|clean| swing(clean.run, clean.samples, axis)).collect()
+        usable
+            .par_iter()
+            .map(|clean| swing(clean.run, clean.samples, axis))
+            .collect()
     };
     let sum_at = |swung: &[Vec<f64>], axis: Option<Axis>, hz: f64| -> f64 {
         usable
             .iter()
             .zip(swung)
-            .map(|(clean, samples)| power(samples, clean.turn_s, hz, spread.noise_m2) * loudness(axis))
+            .map(|(clean, samples)| {
+                power(samples, clean.turn_s, hz, spread.noise_m2) * loudness(axis)
+            })
             .sum()
     };
     // A swing along an axis shows on the circle as two sidebands, one turn below and above.
@@ -202,7 +214,11 @@ fn refine(
     }
     let h = 0.02 * step_hz;
     let bend = (total(centre + h) - 2.0 * total(centre) + total(centre - h)) / (h * h);
-    let se_hz = if bend < 0.0 { (2.0 / -bend).sqrt() } else { step_hz };
+    let se_hz = if bend < 0.0 {
+        (2.0 / -bend).sqrt()
+    } else {
+        step_hz
+    };
     let powers: Vec<(f64, f64, f64)> = usable
         .iter()
         .zip(&swung)
@@ -225,20 +241,34 @@ fn refine(
                 .sum()
         };
         let start = (powers.iter().map(|p| (p.0 - 2.0).max(0.0)).sum::<f64>()
-            / powers.iter().map(|p| p.1 * weight(p.2).powi(2)).sum::<f64>())
+            / powers
+                .iter()
+                .map(|p| p.1 * weight(p.2).powi(2))
+                .sum::<f64>())
         .sqrt();
         let mut best = (misfit(start), start);
         for i in -40..=40 {
             let scale = start * 1.05_f64.powi(i);
-            best = if misfit(scale) < best.0 { (misfit(scale), scale) } else { best };
+            best = if misfit(scale) < best.0 {
+                (misfit(scale), scale)
+            } else {
+                best
+            };
         }
         best
     };
     let constant = law(&|_| 1.0);
     let centripetal = law(&|x| x);
-    let amplitude = if constant.0 <= centripetal.0 { Amplitude::Constant } else { Amplitude::Centripetal };
-    let mean_square: f64 =
-        powers.iter().map(|(power, unit, _)| (power - 2.0) / unit).sum::<f64>() / powers.len() as f64;
+    let amplitude = if constant.0 <= centripetal.0 {
+        Amplitude::Constant
+    } else {
+        Amplitude::Centripetal
+    };
+    let mean_square: f64 = powers
+        .iter()
+        .map(|(power, unit, _)| (power - 2.0) / unit)
+        .sum::<f64>()
+        / powers.len() as f64;
     let mut tone = Tone {
         frequency_hz: centre,
         se_hz,
@@ -298,11 +328,18 @@ impl Tone {
     fn remove_from(&self, run: &Prepared, samples: &mut [f64]) {
         let n = samples.len();
         let turn_s = std::f64::consts::TAU / run.view.omega_rad_s;
-        let overtones = if self.amplitude == Amplitude::Centripetal { 3 } else { 1 };
+        let overtones = if self.amplitude == Amplitude::Centripetal {
+            3
+        } else {
+            1
+        };
         for overtone in 1..=overtones {
             let hz = self.frequency_hz * f64::from(overtone);
             let wave = std::f64::consts::TAU * hz * turn_s / n as f64;
-            let swing = |i: usize| self.axis.map_or(1.0, |axis| run.view.direction[i][axis.index()]);
+            let swing = |i: usize| {
+                self.axis
+                    .map_or(1.0, |axis| run.view.direction[i][axis.index()])
+            };
             let mut columns: [Vec<f64>; 2] = [
                 (0..n).map(|i| swing(i) * (wave * i as f64).cos()).collect(),
                 (0..n).map(|i| swing(i) * (wave * i as f64).sin()).collect(),
@@ -346,13 +383,19 @@ fn spectrum(clean: &Clean<'_>, transform: &Arc<dyn Fft<f64>>, noise_m2: f64) -> 
 fn powers(samples: &[f64], transform: &Arc<dyn Fft<f64>>, noise_m2: f64) -> Vec<f64> {
     let n = samples.len() as f64;
     let hann = |i: usize| 1.0 - (std::f64::consts::TAU / n * (i as f64 + 0.5)).cos();
-    let mut buffer: Vec<Complex<f64>> =
-        samples.iter().enumerate().map(|(i, &x)| Complex::new(x * hann(i), 0.0)).collect();
+    let mut buffer: Vec<Complex<f64>> = samples
+        .iter()
+        .enumerate()
+        .map(|(i, &x)| Complex::new(x * hann(i), 0.0))
+        .collect();
     buffer.resize(transform.len(), Complex::default());
     transform.process(&mut buffer);
     // The mean square of the window is 3/2.
     let scale = 2.0 / (1.5 * n * noise_m2);
-    buffer[..transform.len() / 2].iter().map(|x| scale * x.norm_sqr()).collect()
+    buffer[..transform.len() / 2]
+        .iter()
+        .map(|x| scale * x.norm_sqr())
+        .collect()
 }
 
 impl Spectrum {
@@ -369,7 +412,10 @@ impl Spectrum {
 
     fn at(&self, hz: f64) -> f64 {
         // The nearest, of frequencies above zero.
-        self.power.get((hz * self.per_hz + 0.5) as usize).copied().unwrap_or(0.0)
+        self.power
+            .get((hz * self.per_hz + 0.5) as usize)
+            .copied()
+            .unwrap_or(0.0)
     }
 }
 
@@ -377,9 +423,11 @@ impl Spectrum {
 fn swing(run: &Prepared, samples: &[f64], axis: Option<Axis>) -> Vec<f64> {
     match axis {
         None => samples.to_vec(),
-        Some(axis) => {
-            samples.iter().zip(run.view.direction.iter()).map(|(x, d)| x * d[axis.index()]).collect()
-        }
+        Some(axis) => samples
+            .iter()
+            .zip(run.view.direction.iter())
+            .map(|(x, d)| x * d[axis.index()])
+            .collect(),
     }
 }
 
@@ -390,7 +438,10 @@ fn loudness(axis: Option<Axis>) -> f64 {
 
 /// Power at one frequency, in units of χ²₂.
 fn power(samples: &[f64], turn_s: f64, hz: f64, noise_m2: f64) -> f64 {
-    let [re, im] = wave_sum(samples, std::f64::consts::TAU * hz * turn_s / samples.len() as f64);
+    let [re, im] = wave_sum(
+        samples,
+        std::f64::consts::TAU * hz * turn_s / samples.len() as f64,
+    );
     2.0 * (re * re + im * im) / (samples.len() as f64 * noise_m2)
 }
 
@@ -404,32 +455,56 @@ mod tests {
     /// A run of 400 samples in 2 s with this spectrum at multiples of 1/8 Hz.
     fn spectrum_of(power: impl Fn(f64) -> f64) -> Spectrum {
         let step_hz: f64 = 0.125;
-        let power = (0..800).map(|line| power(f64::from(line) * step_hz)).collect();
-        Spectrum { turn_s: 2.0, nyquist_hz: 100.0, power, per_hz: step_hz.recip() }
+        let power = (0..800)
+            .map(|line| power(f64::from(line) * step_hz))
+            .collect();
+        Spectrum {
+            turn_s: 2.0,
+            nyquist_hz: 100.0,
+            power,
+            per_hz: step_hz.recip(),
+        }
     }
 
     #[test]
     fn noise_has_power_two_and_a_loud_tone_does_not_leak() {
         let transform = FftPlanner::new().plan_fft_forward(padded(1000));
         let mut random = ChaCha8Rng::seed_from_u64(1);
-        let noise: Vec<f64> = (0..1000).map(|_| 3.0 * random.sample::<f64, _>(StandardNormal)).collect();
+        let noise: Vec<f64> = (0..1000)
+            .map(|_| 3.0 * random.sample::<f64, _>(StandardNormal))
+            .collect();
         let powers_of = |samples: &[f64]| powers(samples, &transform, 9.0);
         let levels = powers_of(&noise);
         let mean = levels.iter().sum::<f64>() / levels.len() as f64;
         assert!((mean - 2.0).abs() < 0.2, "{mean}");
         // Thirty waves and a half: n·A²/2σ² = 5556 without a window, two thirds of it with one.
-        let tone: Vec<f64> =
-            (0..1000).map(|i| 10.0 * (std::f64::consts::TAU * 30.5e-3 * f64::from(i)).sin()).collect();
+        let tone: Vec<f64> = (0..1000)
+            .map(|i| 10.0 * (std::f64::consts::TAU * 30.5e-3 * f64::from(i)).sin())
+            .collect();
         let levels = powers_of(&tone);
         let line = |waves: f64| levels[(waves * transform.len() as f64 * 1e-3).round() as usize];
-        assert!((line(30.5) / (5555.6 * 2.0 / 3.0) - 1.0).abs() < 0.02, "{}", line(30.5));
-        assert!((12..200).filter(|k| !(24..=37).contains(k)).all(|k| line(f64::from(k)) < 1.0));
+        assert!(
+            (line(30.5) / (5555.6 * 2.0 / 3.0) - 1.0).abs() < 0.02,
+            "{}",
+            line(30.5)
+        );
+        assert!(
+            (12..200)
+                .filter(|k| !(24..=37).contains(k))
+                .all(|k| line(f64::from(k)) < 1.0)
+        );
     }
 
     #[test]
     fn a_tone_stands_out_from_beside_it_and_a_slope_does_not() {
         let around = |waves: f64, loud: f64| {
-            spectrum_of(move |hz| if (hz - 30.0).abs() <= waves / 2.0 { loud } else { 0.5 })
+            spectrum_of(move |hz| {
+                if (hz - 30.0).abs() <= waves / 2.0 {
+                    loud
+                } else {
+                    0.5
+                }
+            })
         };
         // The main lobe of a Hann window, two waves a turn to either side, and the sidebands of a swing along an axis.
         let tone = |loud: f64| around(3.0, loud);
@@ -438,7 +513,10 @@ mod tests {
         assert!(tone(8.5).stands_out(30.0) && !tone(7.5).stands_out(30.0));
         assert!(!tone(1e6).stands_out(32.0), "four waves beside it");
         assert!(!around(5.0, 1e6).stands_out(30.0), "wider than any tone");
-        assert!(!spectrum_of(|hz| 1e6 / (hz * hz + 1.0)).stands_out(30.0), "the foot of something slow");
+        assert!(
+            !spectrum_of(|hz| 1e6 / (hz * hz + 1.0)).stands_out(30.0),
+            "the foot of something slow"
+        );
         assert!(!spectrum_of(|_| 1e6).stands_out(30.0), "loud everywhere");
     }
 

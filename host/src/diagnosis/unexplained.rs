@@ -9,7 +9,11 @@ use super::pattern::{Law, Pattern};
 pub fn describe(found: &Explained, durations: &Durations) -> Unexplained {
     let weights = found.all();
     let (each, _) = energies(found, &weights);
-    let samples: f64 = found.runs.iter().map(|run| run.deviation_m.len() as f64).sum();
+    let samples: f64 = found
+        .runs
+        .iter()
+        .map(|run| run.deviation_m.len() as f64)
+        .sum();
     let mut patterns: Vec<(f64, Pattern)> = found
         .chosen
         .iter()
@@ -29,11 +33,17 @@ pub fn describe(found: &Explained, durations: &Durations) -> Unexplained {
         .iter()
         .take(4)
         .map(|(energy, pattern)| {
-            format!("{} ({:.2} µm rms)", words(pattern), (energy / samples).sqrt() * 1e6)
+            format!(
+                "{} ({:.2} µm rms)",
+                words(pattern),
+                (energy / samples).sqrt() * 1e6
+            )
         })
         .collect();
     if patterns.len() > 4 {
-        signature.words.push(format!("and {} more of the kind", patterns.len() - 4));
+        signature
+            .words
+            .push(format!("and {} more of the kind", patterns.len() - 4));
     }
     let mut present = !patterns.is_empty();
     if let Durations::Unexplained { runs, smallest } = durations {
@@ -44,7 +54,11 @@ pub fn describe(found: &Explained, durations: &Durations) -> Unexplained {
             100.0 * smallest
         ));
     }
-    Unexplained { present, rms_um: (energy / samples.max(1.0)).sqrt() * 1e6, signature }
+    Unexplained {
+        present,
+        rms_um: (energy / samples.max(1.0)).sqrt() * 1e6,
+        signature,
+    }
 }
 
 fn parity(odd: bool) -> &'static str {
@@ -71,12 +85,19 @@ fn fill(signature: &mut Signature, pattern: &Pattern) {
                 Some(at) => format!("steps at {:.0} % of the campaign", 100.0 * at),
             });
         }
-        Pattern::Harmonic { order, odd, law, .. } => {
+        Pattern::Harmonic {
+            order, odd, law, ..
+        } => {
             scale(law);
             signature.harmonic = Some(order);
             signature.direction_parity = Some(parity(odd));
         }
-        Pattern::Bump { centre_rad, odd, law, .. } => {
+        Pattern::Bump {
+            centre_rad,
+            odd,
+            law,
+            ..
+        } => {
             scale(law);
             signature.direction_parity = Some(parity(odd));
             signature.angle_deg = Some(centre_rad.to_degrees());
@@ -89,19 +110,39 @@ fn words(pattern: &Pattern) -> String {
         (0.0, 0.0) => "independent of speed and radius".to_string(),
         (f, r) => format!("∝ f^{f}·R^{r}"),
     };
-    let ways = |odd: bool| if odd { "flips with the direction" } else { "the same both ways" };
+    let ways = |odd: bool| {
+        if odd {
+            "flips with the direction"
+        } else {
+            "the same both ways"
+        }
+    };
     match *pattern {
         Pattern::Size { odd, law: l } => format!("a change of size, {}, {}", ways(odd), law(l)),
         Pattern::Time { step: None, law: l } => {
             format!("a change of size that grows over the campaign, {}", law(l))
         }
-        Pattern::Time { step: Some(at), law: l } => {
-            format!("a step of size after {:.0} % of the campaign, {}", 100.0 * at, law(l))
+        Pattern::Time {
+            step: Some(at),
+            law: l,
+        } => {
+            format!(
+                "a step of size after {:.0} % of the campaign, {}",
+                100.0 * at,
+                law(l)
+            )
         }
-        Pattern::Harmonic { order, odd, law: l, .. } => {
+        Pattern::Harmonic {
+            order, odd, law: l, ..
+        } => {
             format!("{order} waves a turn, {}, {}", ways(odd), law(l))
         }
-        Pattern::Bump { centre_rad, width_rad, odd, law: l } => format!(
+        Pattern::Bump {
+            centre_rad,
+            width_rad,
+            odd,
+            law: l,
+        } => format!(
             "a bump at {:.0}° about {:.0}° wide, {}, {}",
             centre_rad.to_degrees(),
             2.0 * width_rad.to_degrees(),

@@ -35,7 +35,11 @@ pub fn wave_sum(x: &[f64], wave_rad: f64) -> [f64; 2] {
     let at = |i: usize| (wave_rad * i as f64).sin_cos();
     let first = std::array::from_fn(at).map(|(sin, cos)| [cos, sin]);
     let (sin, cos) = at(WAVES);
-    Arch::new().dispatch(WaveSum { x, first, step: [cos, sin] })
+    Arch::new().dispatch(WaveSum {
+        x,
+        first,
+        step: [cos, sin],
+    })
 }
 
 // What is dispatched has to be inlined into the function that may use all of the processor, or it is made for the least.
@@ -101,7 +105,10 @@ impl WithSimd for WaveSum<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> [f64; 2] {
-        let (mut re, mut im) = (self.first.map(|turn| turn[0]), self.first.map(|turn| turn[1]));
+        let (mut re, mut im) = (
+            self.first.map(|turn| turn[0]),
+            self.first.map(|turn| turn[1]),
+        );
         let [step_re, step_im] = self.step;
         let [mut sum_re, mut sum_im] = [[0.0; WAVES]; 2];
         let (parts, rest) = self.x.as_chunks::<WAVES>();
@@ -109,7 +116,10 @@ impl WithSimd for WaveSum<'_> {
             for k in 0..WAVES {
                 sum_re[k] += part[k] * re[k];
                 sum_im[k] += part[k] * im[k];
-                (re[k], im[k]) = (re[k] * step_re - im[k] * step_im, im[k] * step_re + re[k] * step_im);
+                (re[k], im[k]) = (
+                    re[k] * step_re - im[k] * step_im,
+                    im[k] * step_re + re[k] * step_im,
+                );
             }
         }
         for (k, x) in rest.iter().enumerate() {
@@ -152,20 +162,30 @@ mod tests {
         let (mut one, mut all) = (a.clone(), a.clone());
         axpy(0.3, &b, &mut one);
         axpys(&[0.3], &b, &mut all);
-        assert!(one.iter().zip(&a).zip(&b).all(|((y, a), b)| y.to_bits() == (a + 0.3 * b).to_bits()));
+        assert!(
+            one.iter()
+                .zip(&a)
+                .zip(&b)
+                .all(|((y, a), b)| y.to_bits() == (a + 0.3 * b).to_bits())
+        );
         assert_eq!(one, all);
     }
 
     #[test]
     fn a_wave_is_summed_as_sines_and_cosines_are() {
-        let x: Vec<f64> = (0..1003).map(|i| f64::from((i * 7919) % 41) - 20.0).collect();
+        let x: Vec<f64> = (0..1003)
+            .map(|i| f64::from((i * 7919) % 41) - 20.0)
+            .collect();
         for wave in [0.0, 0.013, 1.7, 3.0] {
             let plain = x.iter().enumerate().fold([0.0; 2], |[re, im], (i, x)| {
                 let (sin, cos) = (wave * i as f64).sin_cos();
                 [re + x * cos, im + x * sin]
             });
             let sum = wave_sum(&x, wave);
-            assert!((sum[0] - plain[0]).hypot(sum[1] - plain[1]) < 1e-9, "{wave}: {sum:?} {plain:?}");
+            assert!(
+                (sum[0] - plain[0]).hypot(sum[1] - plain[1]) < 1e-9,
+                "{wave}: {sum:?} {plain:?}"
+            );
         }
     }
 }

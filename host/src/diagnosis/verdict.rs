@@ -20,41 +20,72 @@ const HIGHEST: f64 = 0.999;
 /// Findings, largest share first. `clamp_energy_m2` is what the clamp's slower feed explains.
 pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> {
     let weights = found.all();
-    let samples: f64 = found.runs.iter().map(|run| run.deviation_m.len() as f64).sum();
+    let samples: f64 = found
+        .runs
+        .iter()
+        .map(|run| run.deviation_m.len() as f64)
+        .sum();
     let (each, _) = energies(found, &weights);
     let tone_energies: Vec<f64> = found.tones.iter().map(Tone::whole_energy_m2).collect();
     let tone_energy: f64 = tone_energies.iter().sum();
-    let teeth_energy: Vec<f64> =
-        found.teeth.iter().map(|teeth| roughness::energy_m2(teeth, &found.runs)).collect();
+    let teeth_energy: Vec<f64> = found
+        .teeth
+        .iter()
+        .map(|teeth| roughness::energy_m2(teeth, &found.runs))
+        .collect();
     let total = each.iter().sum::<f64>()
         + tone_energy
         + teeth_energy.iter().sum::<f64>()
         + clamp.map_or(0.0, |(_, energy)| energy);
-    let share = |energy: f64| if total > 0.0 { 100.0 * energy / total } else { 0.0 };
+    let share = |energy: f64| {
+        if total > 0.0 {
+            100.0 * energy / total
+        } else {
+            0.0
+        }
+    };
     let rms = |energy: f64| (energy / samples).sqrt() * 1e6;
     let stated = |(at, &item): (usize, &usize)| {
-        let Kind::Cause { cause, axis, .. } = &found.items[item].kind else { return None };
+        let Kind::Cause { cause, axis, .. } = &found.items[item].kind else {
+            return None;
+        };
         let words = cause.model().words();
         let (value, half) = estimate(found, item);
         let params = parameters(found, item);
         let ci95 = [value - half, value + half];
-        let effect = Effect { cause: *cause, axis: *axis, value, ci95, params: params.clone() };
+        let effect = Effect {
+            cause: *cause,
+            axis: *axis,
+            value,
+            ci95,
+            params: params.clone(),
+        };
         Some(Finding {
             cause: *cause,
             axis: *axis,
             probability: probability(found, &weights, at),
-            estimate: Estimate { value, ci95, unit: words.unit },
+            estimate: Estimate {
+                value,
+                ci95,
+                unit: words.unit,
+            },
             share_percent: share(each[at]),
             rms_um: rms(each[at]),
             indistinguishable_from: look_alikes(found, &weights, at),
             compensable: compensable(&effect),
             next_measurement: words.next.to_string(),
-            note: (*cause == Cause::HigherOrderDynamics).then(|| dynamics_note(found, &weights, at)),
+            note: (*cause == Cause::HigherOrderDynamics)
+                .then(|| dynamics_note(found, &weights, at)),
             params,
             effects: vec![effect],
         })
     };
-    let out = found.chosen.par_iter().enumerate().filter_map(stated).collect();
+    let out = found
+        .chosen
+        .par_iter()
+        .enumerate()
+        .filter_map(stated)
+        .collect();
     let out = without_bent(out, unexplained_energy(found, &each), found);
     let mut out = join_axes(out);
     if let Some((clamp, energy)) = clamp {
@@ -73,14 +104,34 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
     }
     let (pieces, energy) = unexplained_energy(found, &each);
     let hidden_by_pieces = pieces >= PIECES && tone_energy < 9.0 * energy;
-    for (tone, energy) in found.tones.iter().zip(tone_energies).filter(|_| !hidden_by_pieces) {
+    for (tone, energy) in found
+        .tones
+        .iter()
+        .zip(tone_energies)
+        .filter(|_| !hidden_by_pieces)
+    {
         out.push(tone_finding(tone, share(energy), rms(energy)));
     }
     for (teeth, energy) in found.teeth.iter().zip(teeth_energy) {
         let odds = 0.5 * teeth.significance.powi(2) - 14.0;
-        let Effect { cause, axis, value, ci95, params } = teeth_effect(teeth);
+        let Effect {
+            cause,
+            axis,
+            value,
+            ci95,
+            params,
+        } = teeth_effect(teeth);
         let half = 0.5 * (ci95[1] - ci95[0]);
-        out.push(plain(cause, axis, value, half, sigmoid(odds), share(energy), rms(energy), params));
+        out.push(plain(
+            cause,
+            axis,
+            value,
+            half,
+            sigmoid(odds),
+            share(energy),
+            rms(energy),
+            params,
+        ));
     }
     out.sort_by(|a, b| b.share_percent.total_cmp(&a.share_percent));
     out
@@ -93,7 +144,9 @@ fn unexplained_energy(found: &Explained, each: &[f64]) -> (usize, f64) {
         .iter()
         .zip(each)
         .filter(|(item, _)| !found.items[**item].listed())
-        .fold((0, 0.0), |(count, sum), (_, energy)| (count + 1, sum + energy))
+        .fold((0, 0.0), |(count, sum), (_, energy)| {
+            (count + 1, sum + energy)
+        })
 }
 
 /// So many patterns side by side are pieces of one thing that none of them describes.
@@ -108,20 +161,34 @@ const LARGER_THAN_PIECES: [f64; 2] = [1.0 / 3.0, 3.0];
 /// Takes out findings that the best set does without, and those that may be pieces of something unlisted: where three
 /// patterns or more were needed, a cause counts only if it is not far smaller than all of them, and one with shape parameters
 /// only if it is far larger.
-fn without_bent(findings: Vec<Finding>, (pieces, energy): (usize, f64), found: &Explained) -> Vec<Finding> {
-    let samples: f64 = found.runs.iter().map(|run| run.deviation_m.len() as f64).sum();
+fn without_bent(
+    findings: Vec<Finding>,
+    (pieces, energy): (usize, f64),
+    found: &Explained,
+) -> Vec<Finding> {
+    let samples: f64 = found
+        .runs
+        .iter()
+        .map(|run| run.deviation_m.len() as f64)
+        .sum();
     let unexplained_um = (energy / samples).sqrt() * 1e6;
     findings
         .into_iter()
         .filter(|f| {
-            let flexible = !f.cause.model().shape_names().is_empty() || f.cause == Cause::LateralPlay;
+            let flexible =
+                !f.cause.model().shape_names().is_empty() || f.cause == Cause::LateralPlay;
             let piece = is_piece(f.rms_um, flexible, pieces, unexplained_um);
             // Teeth smear out of the zone in which they are hidden.
             let smear = flexible
-                && found.teeth.iter().filter(|teeth| f.axis == Some(teeth.axis)).any(|teeth| {
-                    let teeth_um = (roughness::energy_m2(teeth, &found.runs) / samples).sqrt() * 1e6;
-                    f.rms_um < 0.25 * teeth_um
-                });
+                && found
+                    .teeth
+                    .iter()
+                    .filter(|teeth| f.axis == Some(teeth.axis))
+                    .any(|teeth| {
+                        let teeth_um =
+                            (roughness::energy_m2(teeth, &found.runs) / samples).sqrt() * 1e6;
+                        f.rms_um < 0.25 * teeth_um
+                    });
             f.probability >= EVEN && !piece && !smear
         })
         .collect()
@@ -145,15 +212,29 @@ fn plain(
 ) -> Finding {
     let words = cause.model().words();
     let ci95 = [value - half, value + half];
-    let effect = Effect { cause, axis, value, ci95, params: params.clone() };
+    let effect = Effect {
+        cause,
+        axis,
+        value,
+        ci95,
+        params: params.clone(),
+    };
     Finding {
         cause,
         axis,
         probability,
-        estimate: Estimate { value, ci95, unit: words.unit },
+        estimate: Estimate {
+            value,
+            ci95,
+            unit: words.unit,
+        },
         share_percent,
         rms_um,
-        indistinguishable_from: words.never_told_from.iter().map(|s| (*s).to_string()).collect(),
+        indistinguishable_from: words
+            .never_told_from
+            .iter()
+            .map(|s| (*s).to_string())
+            .collect(),
         compensable: compensable(&effect),
         next_measurement: words.next.to_string(),
         note: None,
@@ -186,14 +267,22 @@ fn tone_finding(tone: &Tone, share: f64, rms: f64) -> Finding {
         Amplitude::Constant => (Cause::Vibration, tone.frequency_hz, 2.0 * se_hz),
         Amplitude::Centripetal => {
             let period = 1.0 / tone.frequency_hz;
-            (Cause::InterpolationChord, period, 2.0 * se_hz * period * period)
+            (
+                Cause::InterpolationChord,
+                period,
+                2.0 * se_hz * period * period,
+            )
         }
     };
     let other = match tone.amplitude {
         Amplitude::Constant => Cause::InterpolationChord,
         Amplitude::Centripetal => Cause::Vibration,
     };
-    let axis = if cause == Cause::Vibration { tone.axis } else { None };
+    let axis = if cause == Cause::Vibration {
+        tone.axis
+    } else {
+        None
+    };
     let mut finding = plain(cause, axis, value, half, law, share, rms, params);
     if tone.law_evidence < 3.0 {
         finding.indistinguishable_from.push(other.id().to_string());
@@ -217,7 +306,10 @@ const ROBUST: f64 = 1.5;
 fn estimate(found: &Explained, item: usize) -> (f64, f64) {
     let columns = columns_of(&found.nuisance, &found.items, &found.chosen);
     let own = &found.items[item].columns;
-    let at: Vec<usize> = own.iter().filter_map(|c| columns.iter().position(|other| other == c)).collect();
+    let at: Vec<usize> = own
+        .iter()
+        .filter_map(|c| columns.iter().position(|other| other == c))
+        .collect();
     let dof = (found.runs.len().saturating_sub(columns.len())).max(1) as f64;
     let t = StudentsT::new(0.0, 1.0, dof).map_or(2.0, |t| t.inverse_cdf(0.975));
     // Nuisance and chosen come first with the tangents, too.
@@ -227,7 +319,11 @@ fn estimate(found: &Explained, item: usize) -> (f64, f64) {
     // The scatter of the runs' pulls is itself uncertain by a quarter or so: it counts where it says clearly more.
     let variance = |i: usize| {
         let robust = robust.get(i).copied().unwrap_or(0.0);
-        if robust > ROBUST * covariance[(i, i)] { robust } else { covariance[(i, i)] }
+        if robust > ROBUST * covariance[(i, i)] {
+            robust
+        } else {
+            covariance[(i, i)]
+        }
     };
     let doubt = match &found.items[item].kind {
         Kind::Cause { cause, .. } => cause.model().relative_doubt(),
@@ -255,7 +351,11 @@ fn robust_variances(found: &Explained) -> Vec<f64> {
         let pull: Vec<f64> = columns
             .iter()
             .map(|&a| {
-                let fitted: f64 = columns.iter().zip(&coefficients).map(|(&b, x)| white.at(a, b) * x).sum();
+                let fitted: f64 = columns
+                    .iter()
+                    .zip(&coefficients)
+                    .map(|(&b, x)| white.at(a, b) * x)
+                    .sum();
                 white.at(a, 0) - fitted
             })
             .collect();
@@ -279,17 +379,28 @@ fn dynamics_note(found: &Explained, weights: &[f64], at: usize) -> String {
         solve(&products, &columns_of(&found.nuisance, &found.items, set))
             .map_or(0.0, |solution| solution.gain)
     };
-    let rest: Vec<usize> =
-        found.chosen.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, c)| *c).collect();
+    let rest: Vec<usize> = found
+        .chosen
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| *i != at)
+        .map(|(_, c)| *c)
+        .collect();
     let partial_f = gain(&found.chosen) - gain(&rest);
-    let dof = found.runs.len().saturating_sub(columns_of(&found.nuisance, &found.items, &found.chosen).len());
+    let dof = found
+        .runs
+        .len()
+        .saturating_sub(columns_of(&found.nuisance, &found.items, &found.chosen).len());
     let (a, b) = (found.response.a_s2, found.response.b_s4);
     // κ4 = 24β2 − 3κ2² with β2 = 3κ2²/8 − b/2.
     let ratio = (6.0 * a * a - 12.0 * b) / (a * a);
     let class = if b > 0.0 {
         let omega_n2 = b.powf(-0.5);
         let zeta = (0.5 + 0.25 * a * omega_n2).max(0.0).sqrt();
-        format!("a second-order response with ωn = {:.1} rad/s, ζ = {zeta:.2}", omega_n2.sqrt())
+        format!(
+            "a second-order response with ωn = {:.1} rad/s, ζ = {zeta:.2}",
+            omega_n2.sqrt()
+        )
     } else {
         "a lag with feed-forward, or friction".to_string()
     };
@@ -304,13 +415,20 @@ fn probability(found: &Explained, weights: &[f64], at: usize) -> f64 {
         let set = select(&products, &found.nuisance, &found.items, start, barred);
         evidence(&products, &found.nuisance, &found.items, &set)
     };
-    let rest: Vec<usize> =
-        found.chosen.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, c)| *c).collect();
+    let rest: Vec<usize> = found
+        .chosen
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| *i != at)
+        .map(|(_, c)| *c)
+        .collect();
     let same_cause: Vec<usize> = (0..found.items.len())
-        .filter(|&i| match (&found.items[i].kind, &found.items[found.chosen[at]].kind) {
-            (Kind::Cause { cause: a, .. }, Kind::Cause { cause: b, .. }) => a == b,
-            _ => false,
-        })
+        .filter(
+            |&i| match (&found.items[i].kind, &found.items[found.chosen[at]].kind) {
+                (Kind::Cause { cause: a, .. }, Kind::Cause { cause: b, .. }) => a == b,
+                _ => false,
+            },
+        )
         .collect();
     match (best(&found.chosen, &[]), best(&rest, &same_cause)) {
         (Some(with), Some(without)) => sigmoid(0.5 * (with - without)),
@@ -323,18 +441,27 @@ fn look_alikes(found: &Explained, weights: &[f64], at: usize) -> Vec<String> {
     let products = found.ledger.white(weights);
     let best = evidence(&products, &found.nuisance, &found.items, &found.chosen).unwrap_or(0.0);
     let own = found.chosen[at];
-    let Kind::Cause { cause, .. } = &found.items[own].kind else { return Vec::new() };
-    let mut out: Vec<String> =
-        cause.model().words().never_told_from.iter().map(|s| (*s).to_string()).collect();
+    let Kind::Cause { cause, .. } = &found.items[own].kind else {
+        return Vec::new();
+    };
+    let mut out: Vec<String> = cause
+        .model()
+        .words()
+        .never_told_from
+        .iter()
+        .map(|s| (*s).to_string())
+        .collect();
     for (index, item) in found.items.iter().enumerate() {
-        let Kind::Cause { cause: other, .. } = &item.kind else { continue };
+        let Kind::Cause { cause: other, .. } = &item.kind else {
+            continue;
+        };
         if other == cause || found.chosen.contains(&index) {
             continue;
         }
         let mut swapped = found.chosen.clone();
         swapped[at] = index;
-        let close =
-            evidence(&products, &found.nuisance, &found.items, &swapped).is_some_and(|e| e > best - 6.0);
+        let close = evidence(&products, &found.nuisance, &found.items, &swapped)
+            .is_some_and(|e| e > best - 6.0);
         let id = other.id().to_string();
         if close && !out.contains(&id) {
             out.push(id);
@@ -345,9 +472,15 @@ fn look_alikes(found: &Explained, weights: &[f64], at: usize) -> Vec<String> {
 
 /// Further parameters of an explanation, in the units of their names.
 pub fn parameters(found: &Explained, item: usize) -> BTreeMap<String, f64> {
-    let Kind::Cause { cause, shape, .. } = &found.items[item].kind else { return BTreeMap::new() };
+    let Kind::Cause { cause, shape, .. } = &found.items[item].kind else {
+        return BTreeMap::new();
+    };
     let names = cause.model().shape_names();
-    let mut params = names.iter().map(|n| (*n).to_string()).zip(shape.iter().copied()).collect();
+    let mut params = names
+        .iter()
+        .map(|n| (*n).to_string())
+        .zip(shape.iter().copied())
+        .collect();
     complete(*cause, found, item, &mut params);
     params
 }
@@ -370,12 +503,18 @@ fn complete(cause: Cause, found: &Explained, item: usize, params: &mut BTreeMap<
             }
         }
         Cause::Straightness => {
-            let largest = found.runs.iter().map(|run| run.view.largest_radius_m).fold(0.0, f64::max);
+            let largest = found
+                .runs
+                .iter()
+                .map(|run| run.view.largest_radius_m)
+                .fold(0.0, f64::max);
             params.insert("over_radius_mm".into(), largest * 1e3);
         }
         Cause::ThermalDrift => {
             // Time constant as a share of the campaign; 0: linear.
-            let curvature = params.remove("curvature").filter(|curvature| *curvature > 1e-3);
+            let curvature = params
+                .remove("curvature")
+                .filter(|curvature| *curvature > 1e-3);
             params.insert("settling".into(), curvature.map_or(0.0, f64::recip));
             let campaign_s = found.runs.first().map(|run| run.view.campaign_s);
             params.insert("campaign_s".into(), campaign_s.unwrap_or_default());
@@ -391,12 +530,13 @@ fn complete(cause: Cause, found: &Explained, item: usize, params: &mut BTreeMap<
 fn join_axes(findings: Vec<Finding>) -> Vec<Finding> {
     let mut out: Vec<Finding> = Vec::new();
     for finding in findings {
-        let twin = out
-            .iter_mut()
-            .find(|other| other.cause == finding.cause && other.axis.is_some() && finding.axis.is_some());
+        let twin = out.iter_mut().find(|other| {
+            other.cause == finding.cause && other.axis.is_some() && finding.axis.is_some()
+        });
         match twin {
             Some(twin) if alike(twin, &finding) => {
-                let halves = [&twin.estimate, &finding.estimate].map(|e| 0.5 * (e.ci95[1] - e.ci95[0]));
+                let halves =
+                    [&twin.estimate, &finding.estimate].map(|e| 0.5 * (e.ci95[1] - e.ci95[0]));
                 let value = 0.5 * (twin.estimate.value + finding.estimate.value);
                 let half = 0.5 * halves[0].hypot(halves[1]);
                 twin.axis = None;
@@ -429,7 +569,10 @@ mod tests {
         for (flexible, bound_um) in [(false, 0.5), (true, 4.5)] {
             assert!(is_piece(0.95 * bound_um, flexible, 3, 1.5));
             assert!(!is_piece(1.05 * bound_um, flexible, 3, 1.5));
-            assert!(!is_piece(0.01 * bound_um, flexible, 2, 1.5), "two patterns are no pieces");
+            assert!(
+                !is_piece(0.01 * bound_um, flexible, 2, 1.5),
+                "two patterns are no pieces"
+            );
         }
     }
 }

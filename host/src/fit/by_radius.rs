@@ -33,8 +33,10 @@ pub(super) fn by_radius<'a>(observations: &'a [Observation]) -> Vec<OfRadius<'a>
     let mut radii: Vec<f64> = Vec::new();
     // Runs of one radius mostly follow each other.
     let stretch = |runs: &'a [Observation]| Some((runs.first()?.radius_m, runs));
-    let stretches: Vec<(f64, &[Observation])> =
-        observations.chunk_by(|a, b| a.radius_m == b.radius_m).filter_map(stretch).collect();
+    let stretches: Vec<(f64, &[Observation])> = observations
+        .chunk_by(|a, b| a.radius_m == b.radius_m)
+        .filter_map(stretch)
+        .collect();
     for (radius_m, _) in &stretches {
         if !radii[radii.len().saturating_sub(SEEN)..].contains(radius_m) {
             radii.push(*radius_m);
@@ -42,7 +44,10 @@ pub(super) fn by_radius<'a>(observations: &'a [Observation]) -> Vec<OfRadius<'a>
     }
     radii.sort_by(f64::total_cmp);
     radii.dedup_by(|a, b| same_radius(*a, *b));
-    let of = |&radius_m: &f64| OfRadius { radius_m, stretches: Vec::new() };
+    let of = |&radius_m: &f64| OfRadius {
+        radius_m,
+        stretches: Vec::new(),
+    };
     let mut groups: Vec<OfRadius<'a>> = radii.iter().map(of).collect();
     for (radius_m, stretch) in stretches {
         let at = radii.partition_point(|r| *r <= radius_m).saturating_sub(1);
@@ -64,13 +69,20 @@ impl<'a> OfRadius<'a> {
 
     /// Highest of the feeds that count as the lowest, m/s.
     pub(super) fn reference_m_s(&self) -> f64 {
-        self.runs().map(|o| o.feed_m_s).fold(f64::INFINITY, f64::min) * (1.0 + SAME_FEED)
+        self.runs()
+            .map(|o| o.feed_m_s)
+            .fold(f64::INFINITY, f64::min)
+            * (1.0 + SAME_FEED)
     }
 
     /// Mean radius error at the lowest feed, m.
     pub(super) fn lowest_m(&self) -> f64 {
         let highest = self.reference_m_s();
-        mean(self.runs().filter(|o| o.feed_m_s <= highest).map(|o| o.radius_error_m))
+        mean(
+            self.runs()
+                .filter(|o| o.feed_m_s <= highest)
+                .map(|o| o.radius_error_m),
+        )
     }
 }
 
@@ -118,11 +130,23 @@ impl Reduction {
                 reduced.take(rows);
             }
             // Further rows are rounding.
-            std::array::from_fn(|i| std::array::from_fn(|j| if i < count { reduced.at(i, j) } else { 0.0 }))
+            std::array::from_fn(|i| {
+                std::array::from_fn(|j| if i < count { reduced.at(i, j) } else { 0.0 })
+            })
         };
-        let plain = Self { r: reduce([1.0; WIDTH]), scales: [1.0; WIDTH], lowest_m, runs: count };
+        let plain = Self {
+            r: reduce([1.0; WIDTH]),
+            scales: [1.0; WIDTH],
+            lowest_m,
+            runs: count,
+        };
         let safe = |j| {
-            let norm = plain.r.iter().map(|row| row[j] * row[j]).sum::<f64>().sqrt();
+            let norm = plain
+                .r
+                .iter()
+                .map(|row| row[j] * row[j])
+                .sum::<f64>()
+                .sqrt();
             SAFE_NORMS.contains(&norm)
         };
         if (0..WIDTH).all(safe) {
@@ -131,9 +155,15 @@ impl Reduction {
         let largest = group
             .runs()
             .map(|o| [1.0, o.f2_r(), o.f4_r3(), o.radius_error_m - off_m])
-            .fold([0.0_f64; WIDTH], |top, row| std::array::from_fn(|j| top[j].max(row[j].abs())));
+            .fold([0.0_f64; WIDTH], |top, row| {
+                std::array::from_fn(|j| top[j].max(row[j].abs()))
+            });
         let scales = largest.map(|top| if top > 0.0 { top } else { 1.0 });
-        Self { r: reduce(scales), scales, ..plain }
+        Self {
+            r: reduce(scales),
+            scales,
+            ..plain
+        }
     }
 
     /// Whether all numbers in it are.
@@ -148,9 +178,16 @@ impl Reduction {
 /// Constants of different radii have no run in common: the first row of each radius is a row of the whole, and only the
 /// others have to be reduced further.
 pub(super) fn joined(radii: &[&Reduction]) -> Triangle {
-    let scales: [f64; WIDTH] =
-        std::array::from_fn(|j| radii.iter().map(|radius| radius.scales[j]).fold(0.0, f64::max));
-    let constants = radii.iter().filter(|radius| radius.lowest_m.is_none()).count();
+    let scales: [f64; WIDTH] = std::array::from_fn(|j| {
+        radii
+            .iter()
+            .map(|radius| radius.scales[j])
+            .fold(0.0, f64::max)
+    });
+    let constants = radii
+        .iter()
+        .filter(|radius| radius.lowest_m.is_none())
+        .count();
     let last = 2 + constants;
     let mut r = DMatrix::zeros(constants + 3, constants + 3);
     let mut reduced = Reduced::new(3);
@@ -179,10 +216,20 @@ pub(super) fn joined(radii: &[&Reduction]) -> Triangle {
         }
     }
     let [_, x1, x2, y] = scales;
-    let names = TERMS.into_iter().chain(std::iter::repeat_n("the offset of a radius", constants));
-    let scales = [x1, x2].into_iter().chain(std::iter::repeat_n(1.0, constants)).chain([y]);
+    let names = TERMS
+        .into_iter()
+        .chain(std::iter::repeat_n("the offset of a radius", constants));
+    let scales = [x1, x2]
+        .into_iter()
+        .chain(std::iter::repeat_n(1.0, constants))
+        .chain([y]);
     let runs = radii.iter().map(|radius| radius.runs).sum();
-    Triangle::of_reduced(names.map(str::to_owned).collect(), r, scales.collect(), runs)
+    Triangle::of_reduced(
+        names.map(str::to_owned).collect(),
+        r,
+        scales.collect(),
+        runs,
+    )
 }
 
 #[cfg(test)]
@@ -190,14 +237,25 @@ mod tests {
     use super::*;
 
     fn run(radius_m: f64, feed_m_s: f64, radius_error_m: f64) -> Observation {
-        Observation { radius_m, feed_m_s, radius_error_m, out_of_roundness_m: None }
+        Observation {
+            radius_m,
+            feed_m_s,
+            radius_error_m,
+            out_of_roundness_m: None,
+        }
     }
 
     /// In turns, more than a block of each radius; errors times `size`.
     fn runs(size: f64) -> Vec<Observation> {
         let error = |k: usize| size * (1e-6 * (k as f64 * 0.618).sin() + 1e-5 * (k % 3) as f64);
         (0..3 * BLOCK_ROWS + 100)
-            .map(|k| run([0.3, 0.1, 0.15][k % 3], 0.02 + 0.68 * (k as f64 * 0.377).fract(), error(k)))
+            .map(|k| {
+                run(
+                    [0.3, 0.1, 0.15][k % 3],
+                    0.02 + 0.68 * (k as f64 * 0.377).fract(),
+                    error(k),
+                )
+            })
             .collect()
     }
 
@@ -207,11 +265,17 @@ mod tests {
         for size in [1.0, 1e-190, 1e190] {
             let runs = runs(size);
             let groups = by_radius(&runs);
-            let reductions: Vec<Reduction> = groups.iter().map(|group| Reduction::new(group, None)).collect();
-            let column = |of: &dyn Fn(&Observation) -> f64| runs.iter().map(of).collect::<Vec<f64>>();
+            let reductions: Vec<Reduction> = groups
+                .iter()
+                .map(|group| Reduction::new(group, None))
+                .collect();
+            let column =
+                |of: &dyn Fn(&Observation) -> f64| runs.iter().map(of).collect::<Vec<f64>>();
             let mut columns = vec![column(&Observation::f2_r), column(&Observation::f4_r3)];
             for group in &groups {
-                columns.push(column(&|o| f64::from(u8::from(o.radius_m == group.radius_m))));
+                columns.push(column(&|o| {
+                    f64::from(u8::from(o.radius_m == group.radius_m))
+                }));
             }
             let named: Vec<(&str, &[f64])> = columns.iter().map(|c| ("x", c.as_slice())).collect();
             let whole = Triangle::new(&named, &column(&|o| o.radius_error_m), false).unwrap();
@@ -222,7 +286,8 @@ mod tests {
                 for j in 0..chosen.len() {
                     let off = got.coefficients[j] / want.coefficients[j] - 1.0;
                     assert!(off.abs() < 1e-11, "{size} {j}: {off}");
-                    let off = got.unscaled_covariance[(j, j)] / want.unscaled_covariance[(j, j)] - 1.0;
+                    let off =
+                        got.unscaled_covariance[(j, j)] / want.unscaled_covariance[(j, j)] - 1.0;
                     assert!(off.abs() < 1e-11, "{size} {j}: {off}");
                 }
             }
@@ -235,12 +300,24 @@ mod tests {
         // The third is too far from the first, however near to the second.
         let radii = [0.1, 0.1 + apart, 0.1 + 2.0 * apart, 0.3];
         for order in [[0, 1, 2, 3], [3, 2, 1, 0], [1, 3, 0, 2]] {
-            let runs: Vec<Observation> = order.iter().map(|&k| run(radii[k], 0.1, k as f64)).collect();
+            let runs: Vec<Observation> = order
+                .iter()
+                .map(|&k| run(radii[k], 0.1, k as f64))
+                .collect();
             let groups = by_radius(&runs);
-            assert_eq!(groups.iter().map(|g| g.radius_m).collect::<Vec<_>>(), [radii[0], radii[2], radii[3]]);
-            assert_eq!(groups.iter().map(|g| g.count()).collect::<Vec<_>>(), [2, 1, 1]);
+            assert_eq!(
+                groups.iter().map(|g| g.radius_m).collect::<Vec<_>>(),
+                [radii[0], radii[2], radii[3]]
+            );
+            assert_eq!(
+                groups.iter().map(|g| g.count()).collect::<Vec<_>>(),
+                [2, 1, 1]
+            );
         }
         assert!(by_radius(&[]).is_empty());
-        assert_eq!(by_radius(&[run(f64::NAN, 0.1, 0.0), run(0.1, 0.1, 0.0)])[0].count(), 2);
+        assert_eq!(
+            by_radius(&[run(f64::NAN, 0.1, 0.0), run(0.1, 0.1, 0.0)])[0].count(),
+            2
+        );
     }
 }

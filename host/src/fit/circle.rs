@@ -22,8 +22,11 @@ impl Points for Parallel<'_> {
         if x.len() <= chunk {
             return lanes::sum(part, walk, x, y);
         }
-        let parts: Vec<P::Sum> =
-            x.par_chunks(chunk).zip(y.par_chunks(chunk)).map(|(x, y)| lanes::sum(part, walk, x, y)).collect();
+        let parts: Vec<P::Sum> = x
+            .par_chunks(chunk)
+            .zip(y.par_chunks(chunk))
+            .map(|(x, y)| lanes::sum(part, walk, x, y))
+            .collect();
         let mut total = P::Sum::default();
         for part in &parts {
             total.merge(part);
@@ -48,7 +51,9 @@ mod tests {
     #[test]
     fn threads_and_none_give_the_same_bits() {
         let at = |i: usize| (i as f64 * 0.618).sin_cos();
-        let (x, y): (Vec<f64>, Vec<f64>) = (0..3003).map(|i| (at(i).0 + 1e-3 * at(7 * i).1, at(i).1)).unzip();
+        let (x, y): (Vec<f64>, Vec<f64>) = (0..3003)
+            .map(|i| (at(i).0 + 1e-3 * at(7 * i).1, at(i).1))
+            .unzip();
         assert_eq!(fit_circle(&x, &y), circle::fit(&Xy::new(&x, &y).unwrap()));
     }
 
@@ -56,10 +61,14 @@ mod tests {
     fn any_number_of_threads_gives_the_same_bits() {
         let n = 25 * BLOCKS_A_TASK * BLOCK + 12345;
         let at = |i: usize| (i as f64 * 0.618).sin_cos();
-        let (x, y): (Vec<f64>, Vec<f64>) =
-            (0..n).map(|i| (0.1 * at(i).0 + 1e-6 * at(7 * i).1, 0.1 * at(i).1)).unzip();
+        let (x, y): (Vec<f64>, Vec<f64>) = (0..n)
+            .map(|i| (0.1 * at(i).0 + 1e-6 * at(7 * i).1, 0.1 * at(i).1))
+            .unzip();
         let with = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap();
             pool.install(|| fit_circle(&x, &y).unwrap())
         };
         let one = with(1);

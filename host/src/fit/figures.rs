@@ -56,9 +56,17 @@ pub fn figures(points: &[Point], model: &RadiusModel<f64>) -> Result<Vec<Figure>
         "radius size error, µm",
         &series(points, None, |p| Some(p.observation.radius_error_m)),
     )?];
-    if points.iter().any(|p| p.observation.out_of_roundness_m.is_some()) {
+    if points
+        .iter()
+        .any(|p| p.observation.out_of_roundness_m.is_some())
+    {
         let roundness = series(points, None, |p| p.observation.out_of_roundness_m);
-        figures.push(draw("figure09.svg", "Out-of-roundness", "out-of-roundness, µm", &roundness)?);
+        figures.push(draw(
+            "figure09.svg",
+            "Out-of-roundness",
+            "out-of-roundness, µm",
+            &roundness,
+        )?);
     }
     figures.push(draw(
         "figure10.svg",
@@ -85,9 +93,16 @@ fn series(
         let radius_m = p.observation.radius_m;
         let Some(value) = value(p) else { continue };
         let mark = (p.observation.f2_r(), value * 1e6, p.part == Part::Train);
-        match all.iter_mut().find(|s| (s.radius_m - radius_m).abs() < 1e-9) {
+        match all
+            .iter_mut()
+            .find(|s| (s.radius_m - radius_m).abs() < 1e-9)
+        {
             Some(s) => s.points.push(mark),
-            None => all.push(Series { radius_m, points: vec![mark], curve: Vec::new() }),
+            None => all.push(Series {
+                radius_m,
+                points: vec![mark],
+                curve: Vec::new(),
+            }),
         }
     }
     all.sort_by(|a, b| a.radius_m.total_cmp(&b.radius_m));
@@ -96,7 +111,10 @@ fn series(
             let top = s.points.iter().map(|p| p.0).fold(0.0, f64::max);
             let at = |i: usize| {
                 let acceleration = top * i as f64 / CURVE_STEPS as f64;
-                (acceleration, 1e6 * model.radius_error_m(s.radius_m, (acceleration * s.radius_m).sqrt()))
+                (
+                    acceleration,
+                    1e6 * model.radius_error_m(s.radius_m, (acceleration * s.radius_m).sqrt()),
+                )
             };
             s.curve = (0..=CURVE_STEPS).map(at).collect();
         }
@@ -106,12 +124,19 @@ fn series(
 
 /// A range that holds all values and zero, with room around them.
 fn room(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
-    let (low, high) = values.fold((0.0_f64, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
+    let (low, high) = values.fold((0.0_f64, 0.0_f64), |(low, high), v| {
+        (low.min(v), high.max(v))
+    });
     let margin = 0.05 * (high - low).max(1e-3);
     low - margin..high + margin
 }
 
-fn draw(file: &'static str, title: &str, value: &str, series: &[Series]) -> Result<Figure, FigureError> {
+fn draw(
+    file: &'static str,
+    title: &str,
+    value: &str,
+    series: &[Series],
+) -> Result<Figure, FigureError> {
     let mut svg = String::new();
     render(&mut svg, title, value, series).map_err(|why| FigureError { file, why })?;
     Ok(Figure { file, svg })
@@ -148,12 +173,25 @@ fn render(svg: &mut String, title: &str, value: &str, series: &[Series]) -> Resu
     for (s, colour) in series.iter().zip(COLOURS.iter().cycle()) {
         let colour = *colour;
         chart
-            .draw_series(LineSeries::new(s.curve.iter().copied(), colour.stroke_width(1)))
+            .draw_series(LineSeries::new(
+                s.curve.iter().copied(),
+                colour.stroke_width(1),
+            ))
             .map_err(|e| words(&e))?;
         let mark = |p: &(f64, f64, bool)| {
-            Circle::new((p.0, p.1), 4, if p.2 { colour.filled() } else { colour.stroke_width(2) })
+            Circle::new(
+                (p.0, p.1),
+                4,
+                if p.2 {
+                    colour.filled()
+                } else {
+                    colour.stroke_width(2)
+                },
+            )
         };
-        chart.draw_series(s.points.iter().map(mark)).map_err(|e| words(&e))?;
+        chart
+            .draw_series(s.points.iter().map(mark))
+            .map_err(|e| words(&e))?;
     }
     drop(chart);
     // The key has a line of its own: nothing lies under it.
@@ -161,11 +199,20 @@ fn render(svg: &mut String, title: &str, value: &str, series: &[Series]) -> Resu
     for (i, (s, colour)) in series.iter().zip(COLOURS.iter().cycle()).enumerate() {
         let x = 80 + 200 * i as i32;
         let fitted = s.points.iter().any(|p| p.2);
-        let text =
-            format!("R {} mm, {}", trimmed_mm(s.radius_m), if fitted { "fitted" } else { "predicted" });
-        let style = if fitted { colour.filled() } else { colour.stroke_width(2) };
-        root.draw(&Circle::new((x, y), 4, style)).map_err(|e| words(&e))?;
-        root.draw(&Text::new(text, (x + 12, y - 6), (FONT, 13))).map_err(|e| words(&e))?;
+        let text = format!(
+            "R {} mm, {}",
+            trimmed_mm(s.radius_m),
+            if fitted { "fitted" } else { "predicted" }
+        );
+        let style = if fitted {
+            colour.filled()
+        } else {
+            colour.stroke_width(2)
+        };
+        root.draw(&Circle::new((x, y), 4, style))
+            .map_err(|e| words(&e))?;
+        root.draw(&Text::new(text, (x + 12, y - 6), (FONT, 13)))
+            .map_err(|e| words(&e))?;
     }
     root.present().map_err(|e| words(&e))
 }

@@ -32,15 +32,17 @@ pub(super) struct Sums {
 
 impl FromIterator<(f64, f64)> for Sums {
     fn from_iter<I: IntoIterator<Item = (f64, f64)>>(pairs: I) -> Self {
-        pairs.into_iter().fold(Self::default(), |sums, (measured, predicted)| {
-            let residual: f64 = measured - predicted;
-            Self {
-                runs: sums.runs + 1,
-                squares: sums.squares + residual * residual,
-                total: sums.total + measured * measured,
-                max_m: sums.max_m.max(residual.abs()),
-            }
-        })
+        pairs
+            .into_iter()
+            .fold(Self::default(), |sums, (measured, predicted)| {
+                let residual: f64 = measured - predicted;
+                Self {
+                    runs: sums.runs + 1,
+                    squares: sums.squares + residual * residual,
+                    total: sums.total + measured * measured,
+                    max_m: sums.max_m.max(residual.abs()),
+                }
+            })
     }
 }
 

@@ -28,7 +28,13 @@ mod avx {
         }
 
         pub(super) fn sum<P: Part>(self, part: &P, walk: Walk, x: &[f64], y: &[f64]) -> P::Sum {
-            self.0.vectorize(Sum { lanes: self, part, walk, x, y })
+            self.0.vectorize(Sum {
+                lanes: self,
+                part,
+                walk,
+                x,
+                y,
+            })
         }
     }
 
@@ -55,7 +61,10 @@ mod avx {
 
         #[inline(always)]
         fn four(self, numbers: [f64; 4]) -> Vector {
-            Vector { avx: self.0, lanes: cast(numbers) }
+            Vector {
+                avx: self.0,
+                lanes: cast(numbers),
+            }
         }
     }
 
@@ -72,7 +81,10 @@ mod avx {
 
                 #[inline(always)]
                 fn $method(self, other: Self) -> Self {
-                    Self { lanes: self.avx.$instruction(self.lanes, other.lanes), ..self }
+                    Self {
+                        lanes: self.avx.$instruction(self.lanes, other.lanes),
+                        ..self
+                    }
                 }
             }
         };
@@ -85,12 +97,18 @@ mod avx {
     impl Four for Vector {
         #[inline(always)]
         fn sqrt(self) -> Self {
-            Self { lanes: self.avx.sqrt_f64x4(self.lanes), ..self }
+            Self {
+                lanes: self.avx.sqrt_f64x4(self.lanes),
+                ..self
+            }
         }
 
         #[inline(always)]
         fn max(self, other: Self) -> Self {
-            Self { lanes: self.avx.max_f64x4(self.lanes, other.lanes), ..self }
+            Self {
+                lanes: self.avx.max_f64x4(self.lanes, other.lanes),
+                ..self
+            }
         }
 
         #[inline(always)]

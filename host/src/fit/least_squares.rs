@@ -41,7 +41,11 @@ pub struct LeastSquares {
 impl LeastSquares {
     /// Residual variance σ², Eq. 21 (equal to Eq. 6), NaN without a degree of freedom.
     pub fn variance(&self) -> f64 {
-        if self.dof == 0 { f64::NAN } else { self.rss / self.dof as f64 }
+        if self.dof == 0 {
+            f64::NAN
+        } else {
+            self.rss / self.dof as f64
+        }
     }
 
     /// Residual standard deviation.
@@ -70,27 +74,52 @@ impl Triangle {
     ///
     /// # Errors
     /// [`FitError`] for values that are not finite or columns of another length, and where there are no observations.
-    pub fn new(columns: &[(&str, &[f64])], observations: &[f64], intercept: bool) -> Result<Self, FitError> {
+    pub fn new(
+        columns: &[(&str, &[f64])],
+        observations: &[f64],
+        intercept: bool,
+    ) -> Result<Self, FitError> {
         let n = observations.len();
         if n == 0 {
-            return Err(FitError::TooFew { observations: 0, parameters: columns.len() });
+            return Err(FitError::TooFew {
+                observations: 0,
+                parameters: columns.len(),
+            });
         }
-        for (name, values) in columns.iter().copied().chain([("the observations", observations)]) {
+        for (name, values) in columns
+            .iter()
+            .copied()
+            .chain([("the observations", observations)])
+        {
             if values.len() != n {
-                return Err(FitError::Length { column: name.to_owned(), expected: n, found: values.len() });
+                return Err(FitError::Length {
+                    column: name.to_owned(),
+                    expected: n,
+                    found: values.len(),
+                });
             }
             if let Some(index) = values.iter().position(|v| !v.is_finite()) {
-                return Err(FitError::NonFinite { column: name.to_owned(), index });
+                return Err(FitError::NonFinite {
+                    column: name.to_owned(),
+                    index,
+                });
             }
         }
         let width = columns.len() + 1;
         let all: Vec<&[f64]> = columns.iter().map(|c| c.1).chain([observations]).collect();
-        let means: Vec<f64> = all.iter().map(|values| if intercept { mean(values) } else { 0.0 }).collect();
+        let means: Vec<f64> = all
+            .iter()
+            .map(|values| if intercept { mean(values) } else { 0.0 })
+            .collect();
         // Largest values first to 1: squares neither overflow nor vanish.
         let largest: Vec<f64> = all
             .iter()
             .zip(&means)
-            .map(|(values, mean)| values.iter().fold(0.0, |top: f64, v| top.max((v - mean).abs())))
+            .map(|(values, mean)| {
+                values
+                    .iter()
+                    .fold(0.0, |top: f64, v| top.max((v - mean).abs()))
+            })
             .map(|top| if top > 0.0 { top } else { 1.0 })
             .collect();
         let mut reduced = Reduced::new(width);
@@ -98,7 +127,11 @@ impl Triangle {
             let rows = BLOCK_ROWS.min(n - start);
             for (j, values) in all.iter().enumerate() {
                 let (mean, by) = (means[j], 1.0 / largest[j]);
-                for (to, value) in reduced.block(j).iter_mut().zip(&values[start..start + rows]) {
+                for (to, value) in reduced
+                    .block(j)
+                    .iter_mut()
+                    .zip(&values[start..start + rows])
+                {
                     *to = (value - mean) * by;
                 }
             }
@@ -106,7 +139,10 @@ impl Triangle {
         }
         let names = columns.iter().map(|c| c.0.to_owned()).collect();
         let triangle = Self::of_reduced(names, reduced.triangle(n.min(width)), largest, n);
-        Ok(Self { means: intercept.then_some(means), ..triangle })
+        Ok(Self {
+            means: intercept.then_some(means),
+            ..triangle
+        })
     }
 
     /// From columns already reduced: `r` has the scalar products of the columns, each divided by its scale, the observations
@@ -127,8 +163,19 @@ impl Triangle {
             }
         }
         let last = names.len();
-        let total = if r.column(last).amax() > 0.0 { scales[last].powi(2) } else { 0.0 };
-        Self { names, r, scales, means: None, observations, total }
+        let total = if r.column(last).amax() > 0.0 {
+            scales[last].powi(2)
+        } else {
+            0.0
+        };
+        Self {
+            names,
+            r,
+            scales,
+            means: None,
+            observations,
+            total,
+        }
     }
 
     /// Number of observations.
@@ -155,7 +202,10 @@ impl Triangle {
         let (n, k) = (self.observations, columns.len());
         let parameters = self.parameters(k);
         if n < parameters {
-            return Err(FitError::TooFew { observations: n, parameters });
+            return Err(FitError::TooFew {
+                observations: n,
+                parameters,
+            });
         }
         let last = self.scales.len() - 1;
         let part = self.r.select_columns(columns);
@@ -164,22 +214,35 @@ impl Triangle {
             (DVector::zeros(0), DMatrix::zeros(0, 0), y.norm_squared())
         } else {
             if self.r.nrows() < k {
-                return Err(FitError::TooFew { observations: n, parameters });
+                return Err(FitError::TooFew {
+                    observations: n,
+                    parameters,
+                });
             }
             let qr = part.qr();
             let r = qr.r();
             for (j, &column) in columns.iter().enumerate() {
                 if r[(j, j)].abs() < RANK_TOLERANCE {
-                    return Err(FitError::Collinear { column: self.names[column].clone() });
+                    return Err(FitError::Collinear {
+                        column: self.names[column].clone(),
+                    });
                 }
             }
             let mut rotated = y;
             qr.q_tr_mul(&mut rotated);
             let head = rotated.rows(0, k).into_owned();
-            let singular = || FitError::Collinear { column: self.names[columns[k - 1]].clone() };
+            let singular = || FitError::Collinear {
+                column: self.names[columns[k - 1]].clone(),
+            };
             let solution = r.solve_upper_triangular(&head).ok_or_else(singular)?;
-            let inverse = r.solve_upper_triangular(&DMatrix::identity(k, k)).ok_or_else(singular)?;
-            (solution, inverse, rotated.rows(k, rotated.len() - k).norm_squared())
+            let inverse = r
+                .solve_upper_triangular(&DMatrix::identity(k, k))
+                .ok_or_else(singular)?;
+            (
+                solution,
+                inverse,
+                rotated.rows(k, rotated.len() - k).norm_squared(),
+            )
         };
         let y_scale = self.scales[last];
         let slopes = DVector::from_fn(k, |j, _| solution[j] * y_scale / self.scales[columns[j]]);
@@ -196,7 +259,13 @@ impl Triangle {
             ),
         };
         let rss = rss * y_scale * y_scale;
-        Ok(LeastSquares { coefficients, unscaled_covariance, rss, total: self.total, dof: n - parameters })
+        Ok(LeastSquares {
+            coefficients,
+            unscaled_covariance,
+            rss,
+            total: self.total,
+            dof: n - parameters,
+        })
     }
 }
 
@@ -218,7 +287,12 @@ fn with_intercept(
         (i, 0) => cross[i - 1],
         (i, j) => covariance[(i - 1, j - 1)],
     });
-    (std::iter::once(intercept).chain(slopes.iter().copied()).collect(), full)
+    (
+        std::iter::once(intercept)
+            .chain(slopes.iter().copied())
+            .collect(),
+        full,
+    )
 }
 
 /// Mean, its rounding removed by a second pass.

@@ -26,7 +26,10 @@ mod radius;
 mod reduced;
 mod stepwise;
 #[cfg(test)]
-#[allow(clippy::excessive_precision, reason = "reference numbers are quoted as published")]
+#[allow(
+    clippy::excessive_precision,
+    reason = "reference numbers are quoted as published"
+)]
 mod tests;
 
 pub use circle::{Parallel, fit_circle};

@@ -7,7 +7,10 @@ use statrs::distribution::{Continuous, ContinuousCDF, FisherSnedecor, Normal, St
 /// # Errors
 /// [`FitError::Quantile`] for `alpha` outside (0, 1) or no degrees of freedom.
 pub fn critical_f(alpha: f64, numerator: usize, denominator: usize) -> Result<f64, FitError> {
-    let error = FitError::Quantile { alpha, dof: (numerator, denominator) };
+    let error = FitError::Quantile {
+        alpha,
+        dof: (numerator, denominator),
+    };
     if !(alpha > 0.0 && alpha < 1.0) || numerator == 0 || denominator == 0 {
         return Err(error);
     }
@@ -25,7 +28,10 @@ pub fn critical_f(alpha: f64, numerator: usize, denominator: usize) -> Result<f6
 /// # Errors
 /// As [`critical_f`].
 pub fn critical_t(alpha: f64, dof: usize) -> Result<f64, FitError> {
-    let error = FitError::Quantile { alpha, dof: (1, dof) };
+    let error = FitError::Quantile {
+        alpha,
+        dof: (1, dof),
+    };
     if !(alpha > 0.0 && alpha < 1.0) || dof == 0 {
         return Err(error);
     }
@@ -43,7 +49,8 @@ fn refined(t: &StudentsT, tail: f64, dof: f64) -> Option<f64> {
         (square + 1.0) / 4.0,
         ((5.0 * square + 16.0) * square + 3.0) / 96.0,
         (((3.0 * square + 19.0) * square + 17.0) * square - 15.0) / 384.0,
-        ((((79.0 * square + 776.0) * square + 1482.0) * square - 1920.0) * square - 945.0) / 92_160.0,
+        ((((79.0 * square + 776.0) * square + 1482.0) * square - 1920.0) * square - 945.0)
+            / 92_160.0,
     ];
     let mut x = z + z * terms.iter().rev().fold(0.0, |sum, term| (sum + term) / dof);
     for _ in 0..6 {
@@ -75,11 +82,16 @@ mod tests {
             (0.01, 3, 10, 6.552313),
         ] {
             let got = critical_f(alpha, n, d).unwrap();
-            assert!((got / want - 1.0).abs() < 1e-6, "F({alpha}; {n}, {d}) = {got}");
+            assert!(
+                (got / want - 1.0).abs() < 1e-6,
+                "F({alpha}; {n}, {d}) = {got}"
+            );
         }
-        for (alpha, d, want) in
-            [(0.05, 1, 12.7062047362), (0.05, 24, 2.0638985616), (0.05, 9997, 1.960201311)]
-        {
+        for (alpha, d, want) in [
+            (0.05, 1, 12.7062047362),
+            (0.05, 24, 2.0638985616),
+            (0.05, 9997, 1.960201311),
+        ] {
             let got = critical_t(alpha, d).unwrap();
             assert!((got / want - 1.0).abs() < 1e-8, "t({alpha}; {d}) = {got}");
         }
@@ -89,16 +101,27 @@ mod tests {
     fn the_short_way_and_the_long_way_agree() {
         for dof in [1, 2, 3, 5, 10, 27, 300, 9_997] {
             for alpha in [0.5, 0.1, 0.05, 0.01, 1e-4] {
-                let long = StudentsT::new(0.0, 1.0, f64::from(dof)).unwrap().inverse_cdf(1.0 - 0.5 * alpha);
+                let long = StudentsT::new(0.0, 1.0, f64::from(dof))
+                    .unwrap()
+                    .inverse_cdf(1.0 - 0.5 * alpha);
                 let short = critical_t(alpha, dof as usize).unwrap();
-                assert!((short / long - 1.0).abs() < 1e-9, "t({alpha}; {dof}) = {short}, not {long}");
+                assert!(
+                    (short / long - 1.0).abs() < 1e-9,
+                    "t({alpha}; {dof}) = {short}, not {long}"
+                );
             }
         }
     }
 
     #[test]
     fn nonsense_is_an_error_not_a_panic() {
-        for (alpha, n, d) in [(0.0, 1, 5), (1.0, 1, 5), (f64::NAN, 1, 5), (0.05, 0, 5), (0.05, 1, 0)] {
+        for (alpha, n, d) in [
+            (0.0, 1, 5),
+            (1.0, 1, 5),
+            (f64::NAN, 1, 5),
+            (0.05, 0, 5),
+            (0.05, 1, 0),
+        ] {
             assert!(critical_f(alpha, n, d).is_err());
         }
     }

@@ -62,7 +62,12 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { train_radius_m: None, offset: Offset::Joint, alpha: ALPHA, partial_f: PartialF::Textbook }
+        Self {
+            train_radius_m: None,
+            offset: Offset::Joint,
+            alpha: ALPHA,
+            partial_f: PartialF::Textbook,
+        }
     }
 }
 
@@ -155,30 +160,50 @@ fn core_of(radii: &[&Reduction], options: &Options) -> Result<Core, FitError> {
     };
     let parameters = forced.len() + 2;
     if observations <= parameters {
-        return Err(FitError::TooFew { observations, parameters });
+        return Err(FitError::TooFew {
+            observations,
+            parameters,
+        });
     }
-    let rules = StepwiseOptions { enter: options.alpha, remove: options.alpha, partial_f: options.partial_f };
+    let rules = StepwiseOptions {
+        enter: options.alpha,
+        remove: options.alpha,
+        partial_f: options.partial_f,
+    };
     let selection = stepwise(&triangle, &forced, &[0, 1], rules)?;
     let both: Vec<usize> = forced.iter().copied().chain([0, 1]).collect();
-    let full = if selection.columns == both { selection.fit.clone() } else { triangle.solve(&both)? };
+    let full = if selection.columns == both {
+        selection.fit.clone()
+    } else {
+        triangle.solve(&both)?
+    };
     let full_t = critical_t(ALPHA, full.dof)?;
     let mut beta = [0.0; 2];
     let mut ci95 = [[0.0; 2]; 2];
     for term in 0..2 {
         if let Some(j) = selection.columns.iter().position(|&c| c == term) {
             beta[term] = selection.fit.coefficients[j];
-            let t =
-                if selection.fit.dof == full.dof { full_t } else { critical_t(ALPHA, selection.fit.dof)? };
+            let t = if selection.fit.dof == full.dof {
+                full_t
+            } else {
+                critical_t(ALPHA, selection.fit.dof)?
+            };
             ci95[term] = interval(&selection.fit, j, t);
         } else {
             ci95[term] = interval(&full, forced.len() + term, full_t);
         }
     }
     let joint = |k: usize| selection.fit.coefficients[k];
-    let offsets_m =
-        radii.iter().enumerate().map(|(k, radius)| radius.lowest_m.unwrap_or_else(|| joint(k))).collect();
+    let offsets_m = radii
+        .iter()
+        .enumerate()
+        .map(|(k, radius)| radius.lowest_m.unwrap_or_else(|| joint(k)))
+        .collect();
     Ok(Core {
-        model: RadiusModel { beta1_s2: beta[0], beta2_s4: beta[1] },
+        model: RadiusModel {
+            beta1_s2: beta[0],
+            beta2_s4: beta[1],
+        },
         ci95,
         steps: selection.steps,
         offsets_m,
@@ -221,7 +246,12 @@ struct Beside<'a> {
 impl<'a> Beside<'a> {
     /// Runs that were fitted.
     fn fitted(model: &'a RadiusModel<f64>, offset_m: f64) -> Self {
-        Self { model, offset_m, part: Part::Train, reference_m_s: f64::NEG_INFINITY }
+        Self {
+            model,
+            offset_m,
+            part: Part::Train,
+            reference_m_s: f64::NEG_INFINITY,
+        }
     }
 
     /// Runs of one radius that had no part in `model`. Their offset is no matter of the servo and cannot be predicted:
@@ -232,20 +262,32 @@ impl<'a> Beside<'a> {
             Offset::Joint => (mean(group.runs().map(|o| o.radius_error_m - servo(o))), 0.0),
             Offset::LowestSpeed => (group.lowest_m(), group.reference_m_s()),
         };
-        Self { model, offset_m, part: Part::Heldout, reference_m_s }
+        Self {
+            model,
+            offset_m,
+            part: Part::Heldout,
+            reference_m_s,
+        }
     }
 
     fn point(&self, o: &Observation) -> Point {
         Point {
             observation: *o,
-            part: if o.feed_m_s <= self.reference_m_s { Part::Reference } else { self.part },
+            part: if o.feed_m_s <= self.reference_m_s {
+                Part::Reference
+            } else {
+                self.part
+            },
             offset_m: self.offset_m,
             predicted_m: self.model.radius_error_m(o.radius_m, o.feed_m_s),
         }
     }
 
     fn score(&self, group: &OfRadius<'_>) -> Sums {
-        let points = group.runs().map(|o| self.point(o)).filter(|p| p.part == Part::Heldout);
+        let points = group
+            .runs()
+            .map(|o| self.point(o))
+            .filter(|p| p.part == Part::Heldout);
         points.map(|p| (p.measured_m(), p.predicted_m)).collect()
     }
 }
@@ -262,7 +304,10 @@ fn not_finite<'a>(observations: impl Iterator<Item = &'a Observation> + Clone) -
     ];
     columns.into_iter().find_map(|(name, of)| {
         let index = observations.clone().position(|o| !of(o).is_finite())?;
-        Some(FitError::NonFinite { column: name.to_owned(), index })
+        Some(FitError::NonFinite {
+            column: name.to_owned(),
+            index,
+        })
     })
 }
 
@@ -273,12 +318,20 @@ impl RadiusFit {
     /// [`FitError`]: too few runs, values that are not finite, a training radius that is not there.
     pub fn new(observations: &[Observation], options: Options) -> Result<Self, FitError> {
         let groups = by_radius(observations);
-        let fitted =
-            |o: &Observation| options.train_radius_m.is_none_or(|train| same_radius(train, o.radius_m));
+        let fitted = |o: &Observation| {
+            options
+                .train_radius_m
+                .is_none_or(|train| same_radius(train, o.radius_m))
+        };
         let reduction = |group: &OfRadius<'_>| {
             let lowest_m = || group.lowest_m();
             let fitted = options.train_radius_m.is_none() || group.runs().any(fitted);
-            fitted.then(|| Reduction::new(group, (options.offset == Offset::LowestSpeed).then(lowest_m)))
+            fitted.then(|| {
+                Reduction::new(
+                    group,
+                    (options.offset == Offset::LowestSpeed).then(lowest_m),
+                )
+            })
         };
         let reductions: Vec<Option<Reduction>> = groups.iter().map(reduction).collect();
         let train: Vec<&Reduction> = reductions.iter().flatten().collect();
@@ -286,9 +339,15 @@ impl RadiusFit {
             return Err(match options.train_radius_m {
                 Some(wanted) => FitError::NoSuchRadius {
                     wanted_mm: wanted * 1e3,
-                    present_mm: groups.iter().map(|g| (g.radius_m * 1e9).round() / 1e6).collect(),
+                    present_mm: groups
+                        .iter()
+                        .map(|g| (g.radius_m * 1e9).round() / 1e6)
+                        .collect(),
                 },
-                None => FitError::TooFew { observations: 0, parameters: 3 },
+                None => FitError::TooFew {
+                    observations: 0,
+                    parameters: 3,
+                },
             });
         }
         if train.iter().any(|radius| !radius.is_finite())
@@ -311,11 +370,16 @@ impl RadiusFit {
             let predicted = match own {
                 None => Some(beside.score(group)),
                 Some(own) if options.train_radius_m.is_none() && groups.len() > 1 => {
-                    let others: Vec<&Reduction> =
-                        train.iter().copied().filter(|radius| !std::ptr::eq(*radius, own)).collect();
+                    let others: Vec<&Reduction> = train
+                        .iter()
+                        .copied()
+                        .filter(|radius| !std::ptr::eq(*radius, own))
+                        .collect();
                     // What the other radii alone cannot determine is not predicted.
                     match core_of(&others, &options) {
-                        Ok(fold) => Some(Beside::not_fitted(group, &fold.model, options.offset).score(group)),
+                        Ok(fold) => Some(
+                            Beside::not_fitted(group, &fold.model, options.offset).score(group),
+                        ),
                         Err(FitError::TooFew { .. } | FitError::Collinear { .. }) => None,
                         Err(error) => return Err(error),
                     }
@@ -324,7 +388,8 @@ impl RadiusFit {
             };
             if let Some(sums) = predicted {
                 heldout.merge(&sums);
-                heldout_by_radius.extend(sums.heldout().map(|of_radius| (group.radius_m, of_radius)));
+                heldout_by_radius
+                    .extend(sums.heldout().map(|of_radius| (group.radius_m, of_radius)));
             }
         }
         Ok(Self {
@@ -344,10 +409,14 @@ impl RadiusFit {
 
     /// Every run beside the model, radius by radius: of the runs that this was fitted to.
     pub fn points(&self, observations: &[Observation]) -> Vec<Point> {
-        let Options { train_radius_m, offset, .. } = self.options;
+        let Options {
+            train_radius_m,
+            offset,
+            ..
+        } = self.options;
         let beside = |(group, &(_, offset_m)): (&OfRadius<'_>, &(f64, f64))| {
-            let fitted =
-                train_radius_m.is_none_or(|train| group.runs().any(|o| same_radius(train, o.radius_m)));
+            let fitted = train_radius_m
+                .is_none_or(|train| group.runs().any(|o| same_radius(train, o.radius_m)));
             let beside = if fitted {
                 Beside::fitted(&self.model, offset_m)
             } else {
@@ -355,7 +424,11 @@ impl RadiusFit {
             };
             group.runs().map(|o| beside.point(o)).collect::<Vec<_>>()
         };
-        by_radius(observations).iter().zip(&self.offsets_m).flat_map(beside).collect()
+        by_radius(observations)
+            .iter()
+            .zip(&self.offsets_m)
+            .flat_map(beside)
+            .collect()
     }
 
     /// κ2, κ4 of the model.
@@ -365,6 +438,10 @@ impl RadiusFit {
 
     /// Whether a term is in the model (0: f²/R, 1: f⁴/R³).
     pub fn entered(&self, term: usize) -> bool {
-        self.steps.iter().rev().find(|s| s.column == term).is_some_and(|s| s.action == Action::Enter)
+        self.steps
+            .iter()
+            .rev()
+            .find(|s| s.column == term)
+            .is_some_and(|s| s.action == Action::Enter)
     }
 }

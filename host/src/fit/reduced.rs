@@ -33,7 +33,11 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 impl Reduced {
     pub(super) fn new(width: usize) -> Self {
-        Self { width, triangle: vec![0.0; width * width], rows: vec![0.0; width * BLOCK_ROWS] }
+        Self {
+            width,
+            triangle: vec![0.0; width * width],
+            rows: vec![0.0; width * BLOCK_ROWS],
+        }
     }
 
     /// Where the next rows of a column go.
@@ -54,7 +58,11 @@ impl Reduced {
 
     /// Row `i`, column `j` of the triangle.
     pub(super) fn at(&self, i: usize, j: usize) -> f64 {
-        if j < i { 0.0 } else { self.triangle[i * self.width + j] }
+        if j < i {
+            0.0
+        } else {
+            self.triangle[i * self.width + j]
+        }
     }
 
     /// The first `rows` rows of the triangle.
@@ -92,7 +100,10 @@ impl WithSimd for Take<'_> {
                 let above = &mut reduced.triangle[j * width + j + 1 + k];
                 let along = twice * (first * *above + dot(own, column));
                 *above -= along * first;
-                column.iter_mut().zip(own).for_each(|(c, v)| *c -= along * v);
+                column
+                    .iter_mut()
+                    .zip(own)
+                    .for_each(|(c, v)| *c -= along * v);
             }
         }
     }
@@ -104,7 +115,12 @@ mod tests {
 
     #[test]
     fn the_triangle_is_that_of_the_whole_matrix() {
-        for (rows, width) in [(3, 5), (40, 4), (BLOCK_ROWS + 1, 6), (5 * BLOCK_ROWS + 77, 3)] {
+        for (rows, width) in [
+            (3, 5),
+            (40, 4),
+            (BLOCK_ROWS + 1, 6),
+            (5 * BLOCK_ROWS + 77, 3),
+        ] {
             let value = |i: usize, j: usize| {
                 ((i * 37 + j * 101) as f64 * 0.618).sin() + if i == j { 2.0 } else { 0.0 }
             };

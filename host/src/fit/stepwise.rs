@@ -27,7 +27,11 @@ pub struct StepwiseOptions {
 
 impl Default for StepwiseOptions {
     fn default() -> Self {
-        Self { enter: 0.05, remove: 0.05, partial_f: PartialF::Textbook }
+        Self {
+            enter: 0.05,
+            remove: 0.05,
+            partial_f: PartialF::Textbook,
+        }
     }
 }
 
@@ -80,7 +84,11 @@ fn partial_f(
         PartialF::Paper => parameters,
     };
     let gained = (reduced.rss - full.rss).max(0.0);
-    let f = if gained == 0.0 { 0.0 } else { gained / numerator as f64 / full.variance() };
+    let f = if gained == 0.0 {
+        0.0
+    } else {
+        gained / numerator as f64 / full.variance()
+    };
     (f, (numerator, full.dof))
 }
 
@@ -102,7 +110,9 @@ pub fn stepwise(
     let remove = options.remove.max(options.enter);
     // Each round raises the explained sum of squares beyond the bar, so rounds cannot repeat; the limit is for safety.
     for _ in 0..4 * candidates.len() + 4 {
-        let Some((enter, with)) = strongest(triangle, &columns, candidates, &fit, options)? else { break };
+        let Some((enter, with)) = strongest(triangle, &columns, candidates, &fit, options)? else {
+            break;
+        };
         steps.push(enter);
         if enter.action == Action::Reject {
             break;
@@ -111,7 +121,14 @@ pub fn stepwise(
         fit = with;
         // The only one there is the one that has just come in.
         while columns.len() > forced.len() + 1 {
-            match weakest(triangle, &columns, forced.len(), &fit, remove, options.partial_f)? {
+            match weakest(
+                triangle,
+                &columns,
+                forced.len(),
+                &fit,
+                remove,
+                options.partial_f,
+            )? {
                 Some(leave) if leave.column != enter.column => {
                     steps.push(leave);
                     columns.retain(|&c| c != leave.column);
@@ -121,7 +138,11 @@ pub fn stepwise(
             }
         }
     }
-    Ok(Selection { columns, steps, fit })
+    Ok(Selection {
+        columns,
+        steps,
+        fit,
+    })
 }
 
 /// The outside candidate with the largest F, marked as entering or rejected; none if none is left.
@@ -148,7 +169,13 @@ fn strongest(
         };
         let (f, dof) = partial_f(options.partial_f, fit, &with, parameters);
         if best.as_ref().is_none_or(|(step, _)| f > step.partial_f) {
-            let step = Step { action: Action::Enter, column, partial_f: f, critical_f: 0.0, dof };
+            let step = Step {
+                action: Action::Enter,
+                column,
+                partial_f: f,
+                critical_f: 0.0,
+                dof,
+            };
             best = Some((step, with));
         }
     }
@@ -181,12 +208,19 @@ fn weakest(
         let j = constant + place;
         fit.coefficients[j].powi(2) / fit.unscaled_covariance[(j, j)]
     };
-    let Some(place) = (forced..columns.len()).min_by(|&a, &b| gained(a).total_cmp(&gained(b))) else {
+    let Some(place) = (forced..columns.len()).min_by(|&a, &b| gained(a).total_cmp(&gained(b)))
+    else {
         return Ok(None);
     };
     let partial_f = gained(place) / numerator as f64 / fit.variance();
     let dof = (numerator, fit.dof);
     let critical_f = critical_f(remove, dof.0, dof.1)?;
-    let step = Step { action: Action::Remove, column: columns[place], partial_f, critical_f, dof };
+    let step = Step {
+        action: Action::Remove,
+        column: columns[place],
+        partial_f,
+        critical_f,
+        dof,
+    };
     Ok((partial_f < critical_f).then_some(step))
 }

@@ -2,7 +2,10 @@
 use super::*;
 
 fn assert_close(got: f64, want: f64, tolerance: f64) {
-    assert!((got - want).abs() <= tolerance * want.abs(), "{got} is not {want} to {tolerance}");
+    assert!(
+        (got - want).abs() <= tolerance * want.abs(),
+        "{got} is not {want} to {tolerance}"
+    );
 }
 
 fn powers(x: &[f64], k: i32) -> Vec<f64> {
@@ -13,7 +16,10 @@ fn powers(x: &[f64], k: i32) -> Vec<f64> {
 fn noint1_is_uncentred() {
     let x: Vec<f64> = (60..=70).map(f64::from).collect();
     let y: Vec<f64> = (130..=140).map(f64::from).collect();
-    let fit = Triangle::new(&[("x", &x)], &y, false).unwrap().solve(&[0]).unwrap();
+    let fit = Triangle::new(&[("x", &x)], &y, false)
+        .unwrap()
+        .solve(&[0])
+        .unwrap();
     assert_close(fit.coefficients[0], 2.07438016528926, 1e-13);
     assert_close(fit.standard_error(0), 0.0165289256198347, 1e-13);
     assert_close(fit.rss, 127.272727272727, 1e-12);
@@ -62,7 +68,10 @@ fn norris_is_centred() {
         (0.2, 0.5),
     ];
     let (y, x): (Vec<f64>, Vec<f64>) = yx.iter().copied().unzip();
-    let fit = Triangle::new(&[("x", &x)], &y, true).unwrap().solve(&[0]).unwrap();
+    let fit = Triangle::new(&[("x", &x)], &y, true)
+        .unwrap()
+        .solve(&[0])
+        .unwrap();
     assert_close(fit.coefficients[0], -0.262323073774029, 1e-10);
     assert_close(fit.coefficients[1], 1.00211681802045, 1e-13);
     assert_close(fit.standard_error(0), 0.232818234301152, 1e-11);
@@ -94,7 +103,10 @@ fn longley_keeps_eight_digits() {
     let column = |k: usize| rows.iter().map(|r| r[k]).collect::<Vec<f64>>();
     let columns: Vec<Vec<f64>> = (1..7).map(column).collect();
     let named: Vec<(&str, &[f64])> = columns.iter().map(|c| ("x", c.as_slice())).collect();
-    let fit = Triangle::new(&named, &column(0), true).unwrap().solve(&[0, 1, 2, 3, 4, 5]).unwrap();
+    let fit = Triangle::new(&named, &column(0), true)
+        .unwrap()
+        .solve(&[0, 1, 2, 3, 4, 5])
+        .unwrap();
     let certified = [
         -3482258.63459582,
         15.0618722713733,
@@ -116,8 +128,17 @@ fn wampler_polynomials_keep_seven_digits() {
     let x: Vec<f64> = (0..=20).map(f64::from).collect();
     let columns: Vec<Vec<f64>> = (1..=5).map(|k| powers(&x, k)).collect();
     let named: Vec<(&str, &[f64])> = columns.iter().map(|c| ("x^k", c.as_slice())).collect();
-    let solve = |y: &[f64]| Triangle::new(&named, y, true).unwrap().solve(&[0, 1, 2, 3, 4]).unwrap();
-    let sum = |base: f64| x.iter().map(|x| (0..=5).map(|k| (base * x).powi(k)).sum()).collect::<Vec<f64>>();
+    let solve = |y: &[f64]| {
+        Triangle::new(&named, y, true)
+            .unwrap()
+            .solve(&[0, 1, 2, 3, 4])
+            .unwrap()
+    };
+    let sum = |base: f64| {
+        x.iter()
+            .map(|x| (0..=5).map(|k| (base * x).powi(k)).sum())
+            .collect::<Vec<f64>>()
+    };
     let mut one = sum(1.0);
     for coefficient in solve(&one).coefficients {
         assert_close(coefficient, 1.0, 1e-8);
@@ -126,8 +147,8 @@ fn wampler_polynomials_keep_seven_digits() {
         assert_close(coefficient, 0.1f64.powi(k), 1e-10);
     }
     let deviations = [
-        759., -2048., 2048., -2048., 2523., -2048., 2048., -2048., 1838., -2048., 2048., -2048., 1838.,
-        -2048., 2048., -2048., 2523., -2048., 2048., -2048., 759.,
+        759., -2048., 2048., -2048., 2523., -2048., 2048., -2048., 1838., -2048., 2048., -2048.,
+        1838., -2048., 2048., -2048., 2523., -2048., 2048., -2048., 759.,
     ];
     one.iter_mut().zip(deviations).for_each(|(y, d)| *y += d);
     let third = solve(&one);
@@ -141,25 +162,38 @@ fn wampler_polynomials_keep_seven_digits() {
 fn hald() -> (Vec<Vec<f64>>, Vec<f64>) {
     let columns = vec![
         vec![7., 1., 11., 11., 7., 11., 3., 1., 2., 21., 1., 11., 10.],
-        vec![26., 29., 56., 31., 52., 55., 71., 31., 54., 47., 40., 66., 68.],
+        vec![
+            26., 29., 56., 31., 52., 55., 71., 31., 54., 47., 40., 66., 68.,
+        ],
         vec![6., 15., 8., 8., 6., 9., 17., 22., 18., 4., 23., 9., 8.],
-        vec![60., 52., 20., 47., 33., 22., 6., 44., 22., 26., 34., 12., 12.],
+        vec![
+            60., 52., 20., 47., 33., 22., 6., 44., 22., 26., 34., 12., 12.,
+        ],
     ];
-    let y = vec![78.5, 74.3, 104.3, 87.6, 95.9, 109.2, 102.7, 72.5, 93.1, 115.9, 83.8, 113.3, 109.4];
+    let y = vec![
+        78.5, 74.3, 104.3, 87.6, 95.9, 109.2, 102.7, 72.5, 93.1, 115.9, 83.8, 113.3, 109.4,
+    ];
     (columns, y)
 }
 
 fn hald_triangle() -> Triangle {
     let (columns, y) = hald();
     let names = ["x1", "x2", "x3", "x4"];
-    let named: Vec<(&str, &[f64])> = names.into_iter().zip(columns.iter().map(Vec::as_slice)).collect();
+    let named: Vec<(&str, &[f64])> = names
+        .into_iter()
+        .zip(columns.iter().map(Vec::as_slice))
+        .collect();
     Triangle::new(&named, &y, true).unwrap()
 }
 
 #[test]
 fn hald_goes_in_and_out_as_in_the_textbook() {
     // Draper and Smith: α = 0.10 to enter and to stay.
-    let rules = StepwiseOptions { enter: 0.10, remove: 0.10, partial_f: PartialF::Textbook };
+    let rules = StepwiseOptions {
+        enter: 0.10,
+        remove: 0.10,
+        partial_f: PartialF::Textbook,
+    };
     let selection = stepwise(&hald_triangle(), &[], &[0, 1, 2, 3], rules).unwrap();
     let want = [
         (Action::Enter, 3, 22.7985202014, (1, 11)),
@@ -175,16 +209,30 @@ fn hald_goes_in_and_out_as_in_the_textbook() {
     assert_eq!(selection.columns, [0, 1]);
     assert_close(selection.fit.rss, 57.9044831761, 1e-10);
     assert_close(selection.fit.r_squared(), 0.9786783745, 1e-9);
-    for (got, want) in selection.fit.coefficients.iter().zip([52.5773488821, 1.46830574222, 0.662250491275]) {
+    for (got, want) in
+        selection
+            .fit
+            .coefficients
+            .iter()
+            .zip([52.5773488821, 1.46830574222, 0.662250491275])
+    {
         assert_close(*got, want, 1e-10);
     }
 }
 
 #[test]
 fn the_papers_partial_f_divides_by_all_parameters() {
-    let rule = |partial_f| StepwiseOptions { enter: 0.10, remove: 0.10, partial_f };
-    let textbook = stepwise(&hald_triangle(), &[], &[3], rule(PartialF::Textbook)).unwrap().steps[0];
-    let paper = stepwise(&hald_triangle(), &[], &[3], rule(PartialF::Paper)).unwrap().steps[0];
+    let rule = |partial_f| StepwiseOptions {
+        enter: 0.10,
+        remove: 0.10,
+        partial_f,
+    };
+    let textbook = stepwise(&hald_triangle(), &[], &[3], rule(PartialF::Textbook))
+        .unwrap()
+        .steps[0];
+    let paper = stepwise(&hald_triangle(), &[], &[3], rule(PartialF::Paper))
+        .unwrap()
+        .steps[0];
     assert_close(paper.partial_f, textbook.partial_f / 2.0, 1e-14);
     assert_eq!((textbook.dof, paper.dof), ((1, 11), (2, 11)));
     assert!(paper.critical_f < textbook.critical_f);
@@ -194,53 +242,104 @@ fn the_papers_partial_f_divides_by_all_parameters() {
 fn what_cannot_be_solved_is_an_error() {
     let (x, twice, y) = ([1., 2., 3., 4.], [2., 4., 6., 8.], [1., 3., 2., 5.]);
     let triangle = Triangle::new(&[("x", &x), ("2x", &twice), ("0", &[0.0; 4])], &y, true).unwrap();
-    assert_eq!(triangle.solve(&[0, 1]).unwrap_err(), FitError::Collinear { column: "2x".into() });
-    assert_eq!(triangle.solve(&[2]).unwrap_err(), FitError::Collinear { column: "0".into() });
-    assert!(matches!(triangle.solve(&[0, 1, 2, 0]).unwrap_err(), FitError::TooFew { parameters: 5, .. }));
+    assert_eq!(
+        triangle.solve(&[0, 1]).unwrap_err(),
+        FitError::Collinear {
+            column: "2x".into()
+        }
+    );
+    assert_eq!(
+        triangle.solve(&[2]).unwrap_err(),
+        FitError::Collinear { column: "0".into() }
+    );
+    assert!(matches!(
+        triangle.solve(&[0, 1, 2, 0]).unwrap_err(),
+        FitError::TooFew { parameters: 5, .. }
+    ));
     let bad = Triangle::new(&[("x", &[1., f64::NAN, 3., 4.])], &y, true).unwrap_err();
-    assert_eq!(bad, FitError::NonFinite { column: "x".into(), index: 1 });
+    assert_eq!(
+        bad,
+        FitError::NonFinite {
+            column: "x".into(),
+            index: 1
+        }
+    );
     assert!(matches!(
         Triangle::new(&[("x", &[1.])], &y, true).unwrap_err(),
         FitError::Length { found: 1, .. }
     ));
     // The dependent twin is passed over, not fatal.
-    let selection =
-        stepwise(&triangle, &[], &[0, 1, 2], StepwiseOptions { enter: 0.5, ..Default::default() }).unwrap();
+    let selection = stepwise(
+        &triangle,
+        &[],
+        &[0, 1, 2],
+        StepwiseOptions {
+            enter: 0.5,
+            ..Default::default()
+        },
+    )
+    .unwrap();
     assert_eq!(selection.columns.len(), 1);
 }
 
 /// The paper's circles: 13 feeds from 20 to 700 mm/s, both directions.
-fn campaign(model: giotto_shared::model::RadiusModel<f64>, noise: impl Fn(usize) -> f64) -> Vec<Observation> {
+fn campaign(
+    model: giotto_shared::model::RadiusModel<f64>,
+    noise: impl Fn(usize) -> f64,
+) -> Vec<Observation> {
     let mut runs = Vec::new();
     for (radius_m, offset_m) in [(0.1, 1.96e-6), (0.15, -12e-6), (0.3, 40e-6)] {
         for i in 0..26 {
             let feed_m_s = 0.02 + 0.68 * f64::from(i / 2) / 12.0;
-            let radius_error_m = offset_m + model.radius_error_m(radius_m, feed_m_s) + noise(runs.len());
-            runs.push(Observation { radius_m, feed_m_s, radius_error_m, out_of_roundness_m: None });
+            let radius_error_m =
+                offset_m + model.radius_error_m(radius_m, feed_m_s) + noise(runs.len());
+            runs.push(Observation {
+                radius_m,
+                feed_m_s,
+                radius_error_m,
+                out_of_roundness_m: None,
+            });
         }
     }
     runs
 }
 
-const PAPER: giotto_shared::model::RadiusModel<f64> =
-    giotto_shared::model::RadiusModel { beta1_s2: -23.29e-6, beta2_s4: -0.23e-6 };
+const PAPER: giotto_shared::model::RadiusModel<f64> = giotto_shared::model::RadiusModel {
+    beta1_s2: -23.29e-6,
+    beta2_s4: -0.23e-6,
+};
 
 #[test]
 fn without_noise_the_model_comes_back_whole() {
     let runs = campaign(PAPER, |_| 0.0);
     for train_radius_m in [None, Some(0.1)] {
-        let fit = RadiusFit::new(&runs, Options { train_radius_m, ..Options::default() }).unwrap();
+        let fit = RadiusFit::new(
+            &runs,
+            Options {
+                train_radius_m,
+                ..Options::default()
+            },
+        )
+        .unwrap();
         assert_close(fit.model.beta1_s2, PAPER.beta1_s2, 1e-9);
         assert_close(fit.model.beta2_s4, PAPER.beta2_s4, 1e-9);
-        assert_eq!(fit.steps.iter().map(|s| s.action).collect::<Vec<_>>(), [Action::Enter, Action::Enter]);
+        assert_eq!(
+            fit.steps.iter().map(|s| s.action).collect::<Vec<_>>(),
+            [Action::Enter, Action::Enter]
+        );
         for ((radius_m, offset_m), want) in
-            fit.offsets_m.iter().zip([(0.1, 1.96e-6), (0.15, -12e-6), (0.3, 40e-6)])
+            fit.offsets_m
+                .iter()
+                .zip([(0.1, 1.96e-6), (0.15, -12e-6), (0.3, 40e-6)])
         {
             assert_eq!(*radius_m, want.0);
             assert!((offset_m - want.1).abs() < 1e-12);
         }
         let heldout = fit.heldout.unwrap();
-        assert!(heldout.explained_percent > 99.999999 && heldout.max_m < 1e-12, "{heldout:?}");
+        assert!(
+            heldout.explained_percent > 99.999999 && heldout.max_m < 1e-12,
+            "{heldout:?}"
+        );
         assert_eq!(heldout.runs, if train_radius_m.is_some() { 52 } else { 78 });
         assert_eq!(fit.classes.to_string(), "second_order");
     }
@@ -249,7 +348,14 @@ fn without_noise_the_model_comes_back_whole() {
 #[test]
 fn the_papers_subtraction_loses_the_servo_error_of_the_lowest_speed() {
     let runs = campaign(PAPER, |_| 0.0);
-    let fit = RadiusFit::new(&runs, Options { offset: Offset::LowestSpeed, ..Options::default() }).unwrap();
+    let fit = RadiusFit::new(
+        &runs,
+        Options {
+            offset: Offset::LowestSpeed,
+            ..Options::default()
+        },
+    )
+    .unwrap();
     // The two reference runs of each radius are not scored.
     assert_eq!(fit.heldout.unwrap().runs, 72);
     // 20 mm/s at R = 100 mm: β1·4e-3 m/s² = −0.093 µm, left in every run of that radius.
@@ -260,7 +366,9 @@ fn the_papers_subtraction_loses_the_servo_error_of_the_lowest_speed() {
 #[test]
 fn pure_noise_leaves_the_model_empty_and_the_class_open() {
     // A Weyl sequence, in no step with feed or direction.
-    let runs = campaign(Default::default(), |i| 1e-6 * ((i as f64 * 0.754877666).fract() - 0.5));
+    let runs = campaign(Default::default(), |i| {
+        1e-6 * ((i as f64 * 0.754877666).fract() - 0.5)
+    });
     let fit = RadiusFit::new(&runs, Options::default()).unwrap();
     assert_eq!(fit.steps.len(), 1);
     assert_eq!(fit.steps[0].action, Action::Reject);
@@ -273,13 +381,25 @@ fn pure_noise_leaves_the_model_empty_and_the_class_open() {
 fn a_radius_that_is_not_there_is_named() {
     let error = RadiusFit::new(
         &campaign(PAPER, |_| 0.0),
-        Options { train_radius_m: Some(0.2), ..Options::default() },
+        Options {
+            train_radius_m: Some(0.2),
+            ..Options::default()
+        },
     );
     let words = error.unwrap_err().to_string();
-    assert_eq!(words, "no run has a radius of 200 mm; the campaign has [100.0, 150.0, 300.0] mm");
-    assert!(matches!(RadiusFit::new(&[], Options::default()).unwrap_err(), FitError::TooFew { .. }));
+    assert_eq!(
+        words,
+        "no run has a radius of 200 mm; the campaign has [100.0, 150.0, 300.0] mm"
+    );
+    assert!(matches!(
+        RadiusFit::new(&[], Options::default()).unwrap_err(),
+        FitError::TooFew { .. }
+    ));
     let few = campaign(PAPER, |_| 0.0)[..3].to_vec();
-    assert!(matches!(RadiusFit::new(&few, Options::default()).unwrap_err(), FitError::TooFew { .. }));
+    assert!(matches!(
+        RadiusFit::new(&few, Options::default()).unwrap_err(),
+        FitError::TooFew { .. }
+    ));
 }
 
 /// The scatter comes of the reduction; the points of the runs themselves.
@@ -289,17 +409,29 @@ fn scatter_is_that_of_the_points() {
     let runs = campaign(PAPER, noise);
     for train_radius_m in [None, Some(0.15)] {
         for offset in [Offset::Joint, Offset::LowestSpeed] {
-            let fit =
-                RadiusFit::new(&runs, Options { train_radius_m, offset, ..Options::default() }).unwrap();
+            let fit = RadiusFit::new(
+                &runs,
+                Options {
+                    train_radius_m,
+                    offset,
+                    ..Options::default()
+                },
+            )
+            .unwrap();
             let points = fit.points(&runs);
             assert_eq!(points.len(), runs.len());
-            let squares: Vec<f64> =
-                points.iter().filter(|p| p.part == Part::Train).map(|p| p.residual_m().powi(2)).collect();
+            let squares: Vec<f64> = points
+                .iter()
+                .filter(|p| p.part == Part::Train)
+                .map(|p| p.residual_m().powi(2))
+                .collect();
             let rms_m = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
             assert_eq!(squares.len(), fit.train.0);
             assert_close(fit.train.1, rms_m, 1e-9);
-            let (is, wanted): (Vec<_>, _) =
-                (points.iter().filter(|p| p.part == Part::Heldout).collect(), fit.heldout);
+            let (is, wanted): (Vec<_>, _) = (
+                points.iter().filter(|p| p.part == Part::Heldout).collect(),
+                fit.heldout,
+            );
             if train_radius_m.is_some() {
                 let pairs = is.iter().map(|p| (p.measured_m(), p.predicted_m));
                 assert_eq!(Heldout::of(pairs).unwrap().runs, wanted.unwrap().runs);
@@ -311,13 +443,26 @@ fn scatter_is_that_of_the_points() {
 #[test]
 fn figures_are_drawn_with_every_run_in_them() {
     let mut runs = campaign(PAPER, |_| 0.0);
-    runs.iter_mut().for_each(|r| r.out_of_roundness_m = Some(20e-6));
-    let fit = RadiusFit::new(&runs, Options { train_radius_m: Some(0.1), ..Options::default() }).unwrap();
+    runs.iter_mut()
+        .for_each(|r| r.out_of_roundness_m = Some(20e-6));
+    let fit = RadiusFit::new(
+        &runs,
+        Options {
+            train_radius_m: Some(0.1),
+            ..Options::default()
+        },
+    )
+    .unwrap();
     let figures = figures(&fit.points(&runs), &fit.model).unwrap();
     assert_eq!(figures.len(), 4);
     for figure in figures {
         // A mark for each run and one for each radius in the key.
-        assert_eq!(figure.svg.matches("<circle").count(), 78 + 3, "{}", figure.file);
+        assert_eq!(
+            figure.svg.matches("<circle").count(),
+            78 + 3,
+            "{}",
+            figure.file
+        );
         assert!(figure.svg.contains("R 300 mm, predicted"));
     }
 }
@@ -326,10 +471,17 @@ fn figures_are_drawn_with_every_run_in_them() {
 fn a_radius_left_out_is_predicted_by_the_fit_on_the_others() {
     let runs = campaign(PAPER, |i| 1e-6 * ((i as f64 * 0.754877666).fract() - 0.5));
     for offset in [Offset::Joint, Offset::LowestSpeed] {
-        let options = Options { offset, ..Options::default() };
+        let options = Options {
+            offset,
+            ..Options::default()
+        };
         let whole = RadiusFit::new(&runs, options).unwrap();
         for (radius_m, heldout) in &whole.heldout_by_radius {
-            let others: Vec<Observation> = runs.iter().copied().filter(|o| o.radius_m != *radius_m).collect();
+            let others: Vec<Observation> = runs
+                .iter()
+                .copied()
+                .filter(|o| o.radius_m != *radius_m)
+                .collect();
             let model = RadiusFit::new(&others, options).unwrap().model;
             let own = || runs.iter().filter(|o| o.radius_m == *radius_m);
             let servo = |o: &Observation| model.radius_error_m(o.radius_m, o.feed_m_s);
@@ -338,7 +490,9 @@ fn a_radius_left_out_is_predicted_by_the_fit_on_the_others() {
                 Offset::LowestSpeed => (own().take(2).map(|o| o.radius_error_m).collect(), 2),
             };
             let offset_m = taken.iter().sum::<f64>() / taken.len() as f64;
-            let pairs = own().skip(skipped).map(|o| (o.radius_error_m - offset_m, servo(o)));
+            let pairs = own()
+                .skip(skipped)
+                .map(|o| (o.radius_error_m - offset_m, servo(o)));
             let want = Heldout::of(pairs).unwrap();
             assert_eq!(heldout.runs, want.runs);
             assert_close(heldout.rms_m, want.rms_m, 1e-11);
@@ -356,14 +510,32 @@ fn numbers_that_are_none_are_named_with_their_run() {
         change(&mut runs[40]);
         RadiusFit::new(&runs, Options::default()).unwrap_err()
     };
-    let named = |column: &str| FitError::NonFinite { column: column.to_owned(), index: 40 };
-    assert_eq!(spoilt(|o| o.radius_error_m = f64::NAN), named("the observations"));
-    assert_eq!(spoilt(|o| o.radius_error_m = f64::NEG_INFINITY), named("the observations"));
+    let named = |column: &str| FitError::NonFinite {
+        column: column.to_owned(),
+        index: 40,
+    };
+    assert_eq!(
+        spoilt(|o| o.radius_error_m = f64::NAN),
+        named("the observations")
+    );
+    assert_eq!(
+        spoilt(|o| o.radius_error_m = f64::NEG_INFINITY),
+        named("the observations")
+    );
     assert_eq!(spoilt(|o| o.feed_m_s = f64::INFINITY), named("f2_r"));
     assert_eq!(spoilt(|o| o.radius_m = f64::NAN), named("f2_r"));
     assert_eq!(spoilt(|o| o.feed_m_s = 1e90), named("f4_r3"));
     // Those of a radius that is not fitted have no part in it.
     let mut runs = good.clone();
     runs[40].radius_error_m = f64::NAN;
-    assert!(RadiusFit::new(&runs, Options { train_radius_m: Some(0.1), ..Options::default() }).is_ok());
+    assert!(
+        RadiusFit::new(
+            &runs,
+            Options {
+                train_radius_m: Some(0.1),
+                ..Options::default()
+            }
+        )
+        .is_ok()
+    );
 }

@@ -50,7 +50,11 @@ pub(super) const INSIDE_CURVATURE: f64 = 36.0;
 impl Exit {
     /// Way inside the arc, mm.
     pub(super) fn inside_mm(self) -> f64 {
-        if let Self::Inside { length_mm } = self { length_mm } else { 0.0 }
+        if let Self::Inside { length_mm } = self {
+            length_mm
+        } else {
+            0.0
+        }
     }
 }
 
@@ -96,9 +100,15 @@ pub(super) fn pieces(arc: &Arc, delta_mm: f64, entry: Entry, exit: Exit) -> Vec<
         let (sin, cos) = (start_angle + side * swept).sin_cos();
         let r = arc.radius_mm + offset;
         let outward = slope * arc.radius_mm;
-        let raw = [outward * cos - side * r * sin, outward * sin + side * r * cos];
+        let raw = [
+            outward * cos - side * r * sin,
+            outward * sin + side * r * cos,
+        ];
         let norm = raw[0].hypot(raw[1]);
-        ([arc.centre[0] + r * cos, arc.centre[1] + r * sin], raw.map(|v| v / norm))
+        (
+            [arc.centre[0] + r * cos, arc.centre[1] + r * sin],
+            raw.map(|v| v / norm),
+        )
     };
     let in_rad = entry.length_mm / arc.radius_mm;
     let out_rad = exit.inside_mm() / arc.radius_mm;
@@ -110,7 +120,11 @@ pub(super) fn pieces(arc: &Arc, delta_mm: f64, entry: Entry, exit: Exit) -> Vec<
     if in_rad > 0.0 {
         let rise = delta_mm - entry.from_mm;
         for (u, g, slope) in entry.shape.nodes() {
-            let next = node(u * in_rad, entry.from_mm + rise * g, rise * slope / entry.length_mm);
+            let next = node(
+                u * in_rad,
+                entry.from_mm + rise * g,
+                rise * slope / entry.length_mm,
+            );
             biarc(&mut list, last, next, u * in_rad / total);
             last = next;
         }
@@ -134,7 +148,11 @@ pub(super) fn pieces(arc: &Arc, delta_mm: f64, entry: Entry, exit: Exit) -> Vec<
             for k in (0..INSIDE_BIARCS).rev() {
                 let u = k as f64 / INSIDE_BIARCS as f64;
                 let [g, slope] = step_of_equal_area(u);
-                let mut next = node(total - u * out_rad, delta_mm * g, -delta_mm * slope / length_mm);
+                let mut next = node(
+                    total - u * out_rad,
+                    delta_mm * g,
+                    -delta_mm * slope / length_mm,
+                );
                 if k == 0 {
                     // The programmed end may lie off the circle by the program's rounding; it stays.
                     next.0 = arc.end;
@@ -143,14 +161,22 @@ pub(super) fn pieces(arc: &Arc, delta_mm: f64, entry: Entry, exit: Exit) -> Vec<
                 last = next;
             }
         }
-        Exit::RunOut { length_mm, shape, along } => {
+        Exit::RunOut {
+            length_mm,
+            shape,
+            along,
+        } => {
             // Outward of a CCW arc is to the right of travel.
             let across = [along[1] * side, -along[0] * side];
             for (u, g, slope) in shape.nodes() {
-                let (way, offset, tilt) =
-                    (u * length_mm, delta_mm * (1.0 - g), -delta_mm * slope / length_mm);
+                let (way, offset, tilt) = (
+                    u * length_mm,
+                    delta_mm * (1.0 - g),
+                    -delta_mm * slope / length_mm,
+                );
                 let norm = tilt.hypot(1.0);
-                let place = std::array::from_fn(|i| arc.end[i] + way * along[i] + offset * across[i]);
+                let place =
+                    std::array::from_fn(|i| arc.end[i] + way * along[i] + offset * across[i]);
                 let direction = std::array::from_fn(|i| (along[i] + tilt * across[i]) / norm);
                 biarc(&mut list, last, (place, direction), 1.0);
                 last = (place, direction);
@@ -185,13 +211,21 @@ fn piece(from: [f64; 2], end: [f64; 2], at: [f64; 2], tangent: [f64; 2], share: 
     let radius = (dx * dx + dy * dy) / (2.0 * (normal[0] * dx + normal[1] * dy));
     let chord = dx.hypot(dy);
     let straight = !radius.is_finite() || radius.abs() > STRAIGHT_MM;
-    let half = if straight { 0.0 } else { (chord / (2.0 * radius.abs())).min(1.0).asin() };
+    let half = if straight {
+        0.0
+    } else {
+        (chord / (2.0 * radius.abs())).min(1.0).asin()
+    };
     Piece {
         end,
         centre: (!straight).then(|| [at[0] + normal[0] * radius, at[1] + normal[1] * radius]),
         ccw: radius > 0.0,
         more_turns: 0,
         share,
-        length_mm: if straight { chord } else { 2.0 * half * radius.abs() },
+        length_mm: if straight {
+            chord
+        } else {
+            2.0 * half * radius.abs()
+        },
     }
 }

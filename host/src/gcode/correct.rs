@@ -27,8 +27,11 @@ const INSIDE_SHARE: f64 = 0.4;
 impl Plan {
     /// Largest share of the correction that remains as an error at a joint of the arc; what is not known counts as nothing.
     pub(super) fn joint_share(&self) -> f64 {
-        let known =
-            |shape: Transition| Some(shape.remaining()).filter(|share| share.is_finite()).unwrap_or(0.0);
+        let known = |shape: Transition| {
+            Some(shape.remaining())
+                .filter(|share| share.is_finite())
+                .unwrap_or(0.0)
+        };
         let delta = self.twin.delta_mm;
         let entry = known(self.entry.shape) * ((delta - self.entry.from_mm) / delta).abs();
         let exit = match self.exit {
@@ -65,7 +68,14 @@ pub(super) fn decide(
         .collect();
     // An arc that turns out too short may have carried on its neighbour's offset: until nothing changes.
     loop {
-        let room = Room { lines, actions, twins: &twins, inverse, options, least_mm };
+        let room = Room {
+            lines,
+            actions,
+            twins: &twins,
+            inverse,
+            options,
+            least_mm,
+        };
         let plans: Vec<_> = (0..lines.len()).map(|i| room.plan(i)).collect();
         let mut changed = false;
         for (twin, plan) in twins.iter_mut().zip(&plans) {
@@ -85,7 +95,11 @@ fn twin(arc: &Arc, inverse: &Inverse, options: &Options) -> Result<Twin, Left> {
         return Err(Left::OtherPlane);
     }
     let twin = inverse.twin(arc.radius_mm, arc.feed_mm_s)?;
-    if twin.delta_mm.abs() < NEGLIGIBLE_MM { Err(Left::Negligible) } else { Ok(twin) }
+    if twin.delta_mm.abs() < NEGLIGIBLE_MM {
+        Err(Left::Negligible)
+    } else {
+        Ok(twin)
+    }
 }
 
 /// What a decision looks at.
@@ -104,12 +118,19 @@ impl Room<'_> {
             Ok(twin) => twin,
             Err(left) => return Some(Err(left)),
         };
-        let Action::Arc(arc) = &self.actions[i] else { return None };
+        let Action::Arc(arc) = &self.actions[i] else {
+            return None;
+        };
         let (entry, exit) = (self.entry(i, arc, twin), self.exit(i, arc, twin));
         let room = entry.length_mm + exit.inside_mm() < arc.length_mm();
         let long = |piece: &Piece| piece.length_mm >= self.least_mm;
-        let fits = room && (self.least_mm == 0.0 || pieces(arc, twin.delta_mm, entry, exit).iter().all(long));
-        Some(if fits { Ok(Plan { twin, entry, exit }) } else { Err(Left::TooShort) })
+        let fits = room
+            && (self.least_mm == 0.0 || pieces(arc, twin.delta_mm, entry, exit).iter().all(long));
+        Some(if fits {
+            Ok(Plan { twin, entry, exit })
+        } else {
+            Err(Left::TooShort)
+        })
     }
 
     fn entry(&self, i: usize, arc: &Arc, twin: Twin) -> Entry {
@@ -119,21 +140,37 @@ impl Room<'_> {
                 let from_mm = other.delta_mm * (before.sweep_rad * arc.sweep_rad).signum();
                 let rise = twin.delta_mm - from_mm;
                 if rise.abs() < SAME_OFFSET_MM {
-                    return Entry { from_mm, length_mm: 0.0, shape: Transition::SMOOTH };
+                    return Entry {
+                        from_mm,
+                        length_mm: 0.0,
+                        shape: Transition::SMOOTH,
+                    };
                 }
                 let (length_mm, shape) = self.step(arc, rise);
-                Entry { from_mm, length_mm, shape }
+                Entry {
+                    from_mm,
+                    length_mm,
+                    shape,
+                }
             }
             Neighbour::Line(..) | Neighbour::OtherArc => {
                 let (length_mm, shape) = self.step(arc, twin.delta_mm);
-                Entry { from_mm: 0.0, length_mm, shape }
+                Entry {
+                    from_mm: 0.0,
+                    length_mm,
+                    shape,
+                }
             }
             Neighbour::Rest => {
                 let (f, a) = (arc.feed_mm_s, self.options.acceleration_mm_s2);
                 let least = START_RESPONSES * f * self.inverse.response_s() + f * f / (2.0 * a);
                 let shape = Transition::SMOOTH;
                 let gentle = f * (shape.curvature() * twin.delta_mm.abs() / a).sqrt();
-                Entry { from_mm: 0.0, length_mm: gentle.max(least), shape }
+                Entry {
+                    from_mm: 0.0,
+                    length_mm: gentle.max(least),
+                    shape,
+                }
             }
         }
     }
@@ -146,15 +183,19 @@ impl Room<'_> {
         let unit_mm = f * self.inverse.response_s();
         let (mut length, mut shape) = (response.length(), response.transition(response.length()));
         if unit_mm > 0.0 {
-            let gentle = |shape: Transition| f * (shape.curvature() * rise_mm.abs() / a).sqrt() / unit_mm;
+            let gentle =
+                |shape: Transition| f * (shape.curvature() * rise_mm.abs() / a).sqrt() / unit_mm;
             // A longer step is a flatter one; a few rounds find where both agree.
             for _ in 0..4 {
                 if gentle(shape) <= length {
                     break;
                 }
                 length = gentle(shape).min(LONGEST_RESPONSES);
-                shape =
-                    if length < LONGEST_RESPONSES { response.transition(length) } else { Transition::SMOOTH };
+                shape = if length < LONGEST_RESPONSES {
+                    response.transition(length)
+                } else {
+                    Transition::SMOOTH
+                };
             }
             length = length.max(gentle(shape));
         }
@@ -165,36 +206,54 @@ impl Room<'_> {
         let (f, a) = (arc.feed_mm_s, self.options.acceleration_mm_s2);
         let response_mm = f * self.inverse.response_s();
         let gentle = |curvature: f64| f * (curvature * twin.delta_mm.abs() / a).sqrt();
-        let inside = Exit::Inside { length_mm: gentle(INSIDE_CURVATURE).max(0.25 * response_mm) };
+        let inside = Exit::Inside {
+            length_mm: gentle(INSIDE_CURVATURE).max(0.25 * response_mm),
+        };
         match self.neighbour(i, arc, true) {
             Neighbour::Corrected(..) => Exit::Held,
             Neighbour::Line(line, along) => {
                 let (length_mm, shape) = self.step(arc, twin.delta_mm);
                 let [first, second, third] = arc.plane.axes();
-                let long = |s: f64, e: f64, t: f64, u: f64| (e - s).hypot(u - t) > length_mm + LINE_LEFT_MM;
-                let reaches = match (line.start[first], line.end[first], line.start[second], line.end[second])
-                {
+                let long = |s: f64, e: f64, t: f64, u: f64| {
+                    (e - s).hypot(u - t) > length_mm + LINE_LEFT_MM
+                };
+                let reaches = match (
+                    line.start[first],
+                    line.end[first],
+                    line.start[second],
+                    line.end[second],
+                ) {
                     (Some(s), Some(e), Some(t), Some(u)) => long(s, e, t, u),
                     _ => false,
                 };
                 let level = line.start[third] == line.end[third];
                 if line.absolute && arc.modes.absolute && level && reaches {
-                    Exit::RunOut { length_mm, shape, along }
+                    Exit::RunOut {
+                        length_mm,
+                        shape,
+                        along,
+                    }
                 } else {
                     inside
                 }
             }
             Neighbour::OtherArc => inside,
-            Neighbour::Rest => Exit::Inside { length_mm: inside.inside_mm().max(f * f / (2.0 * a)) },
+            Neighbour::Rest => Exit::Inside {
+                length_mm: inside.inside_mm().max(f * f / (2.0 * a)),
+            },
         }
     }
 
     /// The motion before or after arc `i`, as far as it is tangent and passed at speed.
     fn neighbour(&self, i: usize, arc: &Arc, after: bool) -> Neighbour<'_> {
-        let Some(other) = motion_beside(i, after, self.lines, self.actions) else { return Neighbour::Rest };
+        let Some(other) = motion_beside(i, after, self.lines, self.actions) else {
+            return Neighbour::Rest;
+        };
         let tangent = arc.tangent(after);
         match &self.actions[other] {
-            Action::Arc(next) if next.plane == arc.plane && parallel(tangent, next.tangent(!after)) => {
+            Action::Arc(next)
+                if next.plane == arc.plane && parallel(tangent, next.tangent(!after)) =>
+            {
                 match self.twins[other] {
                     Some(Ok(twin)) => Neighbour::Corrected(next, twin),
                     _ => Neighbour::OtherArc,
@@ -233,7 +292,10 @@ fn motion_beside(i: usize, after: bool, lines: &[Line<'_>], actions: &[Action]) 
             // M0, M1, M2, M30, M60 in a block act at its end.
             Action::Line(_) | Action::Arc(_) => {
                 let stops = |m: i64| matches!(m, 0 | 10 | 20 | 300 | 600);
-                let stopped = lines[at].words.iter().any(|w| w.letter == b'M' && stops(w.tenths()));
+                let stopped = lines[at]
+                    .words
+                    .iter()
+                    .any(|w| w.letter == b'M' && stops(w.tenths()));
                 return (!stopped).then_some(at);
             }
         }

@@ -11,15 +11,26 @@ pub(super) fn emit(
     actions: &[Action],
     plans: &[Option<Result<Plan, Left>>],
 ) -> Compensated {
-    let end = lines.iter().map(|l| l.end).find(|e| !e.is_empty()).unwrap_or(b"\n");
-    let mut out = Writer { program: Vec::new(), end, place: None, modal: None, feed: None };
+    let end = lines
+        .iter()
+        .map(|l| l.end)
+        .find(|e| !e.is_empty())
+        .unwrap_or(b"\n");
+    let mut out = Writer {
+        program: Vec::new(),
+        end,
+        place: None,
+        modal: None,
+        feed: None,
+    };
     let mut arcs = Vec::new();
     for (i, line) in lines.iter().enumerate() {
         let fate = match (&actions[i], plans[i]) {
             (Action::Arc(arc), Some(Ok(plan))) => {
                 let pieces = blend::pieces(arc, plan.twin.delta_mm, plan.entry, plan.exit);
                 out.arc(line, arc, &plan, &pieces);
-                let (radius_mm, feed_mm_s, delta_mm) = (arc.radius_mm, arc.feed_mm_s, plan.twin.delta_mm);
+                let (radius_mm, feed_mm_s, delta_mm) =
+                    (arc.radius_mm, arc.feed_mm_s, plan.twin.delta_mm);
                 Some(Fate::Corrected {
                     radius_mm,
                     feed_mm_s,
@@ -35,7 +46,10 @@ pub(super) fn emit(
         };
         arcs.extend(fate.map(|fate| Report { line: i + 1, fate }));
     }
-    Compensated { program: out.program, arcs }
+    Compensated {
+        program: out.program,
+        arcs,
+    }
 }
 
 struct Writer<'a> {
@@ -58,7 +72,8 @@ impl Writer<'_> {
         } else if *action != Action::Nothing
             && let Some(feed) = self.feed.take()
         {
-            self.program.extend_from_slice(format!("F{}", number(feed, 6)).as_bytes());
+            self.program
+                .extend_from_slice(format!("F{}", number(feed, 6)).as_bytes());
             self.program.extend_from_slice(self.end);
         }
         let motion = line.words.iter().find(|w| is_motion(w));
@@ -69,7 +84,11 @@ impl Writer<'_> {
             && let Some(modal) = self.modal.take()
         {
             // The arc relied on the direction of the one before, whose last block may have the other one.
-            let at = line.words.iter().find(|w| !b"N".contains(&w.letter)).map_or(0, |w| w.range.start);
+            let at = line
+                .words
+                .iter()
+                .find(|w| !b"N".contains(&w.letter))
+                .map_or(0, |w| w.range.start);
             text.splice(at..at, format!("{modal} ").into_bytes());
         }
         self.program.extend_from_slice(&text);
@@ -84,7 +103,10 @@ impl Writer<'_> {
         let round = |v: f64| (v / unit * scale).round() / scale;
         let axes = arc.plane.axes();
         let [a, b, c] = axes;
-        let mut place = self.place.take().unwrap_or_else(|| arc.start.map(|v| v / unit));
+        let mut place = self
+            .place
+            .take()
+            .unwrap_or_else(|| arc.start.map(|v| v / unit));
         let mut height = arc.lift.map_or(0.0, |[from, _]| from / unit);
         let factor = plan.twin.feed_factor;
         let total: f64 = pieces.iter().map(|p| p.length_mm).sum();
@@ -101,8 +123,12 @@ impl Writer<'_> {
             let mut words = String::new();
             // The end of the arc, if it is where it was, in the program's own digits.
             let kept = |letter: usize| {
-                let word = line.word(b"XYZ"[letter]).filter(|_| last && modes.absolute)?;
-                std::str::from_utf8(&line.text[word.range.start + 1..word.range.end]).ok().map(str::trim)
+                let word = line
+                    .word(b"XYZ"[letter])
+                    .filter(|_| last && modes.absolute)?;
+                std::str::from_utf8(&line.text[word.range.start + 1..word.range.end])
+                    .ok()
+                    .map(str::trim)
             };
             let at_programmed_end = piece.end == arc.end;
             let mut next = place;
@@ -113,18 +139,34 @@ impl Writer<'_> {
                     next[slot] = target;
                     let _ = write!(words, "{letter}{text} "); // writing to a String cannot fail
                 } else {
-                    next[slot] = if at_programmed_end && last { target } else { round(piece.end[slot]) };
-                    let value = if modes.absolute { next[slot] } else { next[slot] - place[slot] };
+                    next[slot] = if at_programmed_end && last {
+                        target
+                    } else {
+                        round(piece.end[slot])
+                    };
+                    let value = if modes.absolute {
+                        next[slot]
+                    } else {
+                        next[slot] - place[slot]
+                    };
                     let _ = write!(words, "{letter}{} ", number(value, decimals + 1));
                 }
             }
             if let Some([from, to]) = arc.lift {
                 let letter = char::from(b"XYZ"[c]);
-                let target = if last { to / unit } else { round(from + (to - from) * piece.share) };
+                let target = if last {
+                    to / unit
+                } else {
+                    round(from + (to - from) * piece.share)
+                };
                 match kept(c) {
                     Some(text) => _ = write!(words, "{letter}{text} "),
                     None => {
-                        let value = if modes.absolute { target } else { target - height };
+                        let value = if modes.absolute {
+                            target
+                        } else {
+                            target - height
+                        };
                         let _ = write!(words, "{letter}{} ", number(value, decimals + 1));
                     }
                 }
@@ -132,9 +174,17 @@ impl Writer<'_> {
             }
             if let Some(centre) = piece.centre {
                 for (slot, axis) in [a, b].into_iter().enumerate() {
-                    let from = if modes.absolute_centres { 0.0 } else { place[slot] };
+                    let from = if modes.absolute_centres {
+                        0.0
+                    } else {
+                        place[slot]
+                    };
                     let letter = char::from(b"IJK"[axis]);
-                    let _ = write!(words, "{letter}{} ", number(centre[slot] / unit - from, decimals + 1));
+                    let _ = write!(
+                        words,
+                        "{letter}{} ",
+                        number(centre[slot] / unit - from, decimals + 1)
+                    );
                 }
                 if piece.more_turns > 0 {
                     let _ = write!(words, "P{} ", piece.more_turns + 1);
@@ -143,7 +193,11 @@ impl Writer<'_> {
             let feed = match modes.feed_mode {
                 FeedMode::InverseTime => {
                     // The programmed time, longer by the radius where the feed is kept, shared out by length.
-                    let slower = if factor == 1.0 { 1.0 + plan.twin.delta_mm / arc.radius_mm } else { 1.0 };
+                    let slower = if factor == 1.0 {
+                        1.0 + plan.twin.delta_mm / arc.radius_mm
+                    } else {
+                        1.0
+                    };
                     Some(arc.feed_word / slower * total / piece.length_mm)
                 }
                 _ if factor != 1.0 && (k == 0) => Some(self.scaled_feed(arc, factor)),
@@ -156,9 +210,11 @@ impl Writer<'_> {
             if k == 0 {
                 self.first(line, code, words, &axes, feed.is_some());
             } else {
-                self.program.extend_from_slice(format!("{code} {words}").as_bytes());
+                self.program
+                    .extend_from_slice(format!("{code} {words}").as_bytes());
             }
-            self.program.extend_from_slice(if last { line.end } else { self.end });
+            self.program
+                .extend_from_slice(if last { line.end } else { self.end });
             place = next;
         }
         self.modal = (last_code != own).then_some(own);
@@ -178,9 +234,17 @@ impl Writer<'_> {
     }
 
     /// The original line with its geometry replaced and the rest in place.
-    fn first(&mut self, line: &Line<'_>, code: &str, words: &str, axes: &[usize; 3], new_feed: bool) {
+    fn first(
+        &mut self,
+        line: &Line<'_>,
+        code: &str,
+        words: &str,
+        axes: &[usize; 3],
+        new_feed: bool,
+    ) {
         let geometry = |w: &Word| {
-            axes.iter().any(|a| [b"XYZ"[*a], b"IJK"[*a]].contains(&w.letter))
+            axes.iter()
+                .any(|a| [b"XYZ"[*a], b"IJK"[*a]].contains(&w.letter))
                 || matches!(w.letter, b'R' | b'P')
                 || (w.letter == b'F' && new_feed)
         };

@@ -40,9 +40,17 @@ impl Inverse {
 
     fn cumulants(&self) -> Cumulants<f64> {
         match (self.servo, self.element()) {
-            (Servo::Beta { beta1_s2, beta2_s4, .. }, _) => {
+            (
+                Servo::Beta {
+                    beta1_s2, beta2_s4, ..
+                },
+                _,
+            ) => {
                 let kappa2_s2 = -2.0 * beta1_s2;
-                Cumulants { kappa2_s2, kappa4_s4: 24.0 * beta2_s4 - 3.0 * kappa2_s2 * kappa2_s2 }
+                Cumulants {
+                    kappa2_s2,
+                    kappa4_s4: 24.0 * beta2_s4 - 3.0 * kappa2_s2 * kappa2_s2,
+                }
             }
             (_, Some(element)) => element.cumulants(),
             (_, None) => Cumulants::default(),
@@ -62,7 +70,13 @@ impl Inverse {
     fn element(&self) -> Option<Element<f64>> {
         match self.servo {
             Servo::Lag { kv_per_s } => Some(Element::Lag { kv_per_s }),
-            Servo::SecondOrder { omega_n_rad_s, zeta } => Some(Element::SecondOrder { omega_n_rad_s, zeta }),
+            Servo::SecondOrder {
+                omega_n_rad_s,
+                zeta,
+            } => Some(Element::SecondOrder {
+                omega_n_rad_s,
+                zeta,
+            }),
             Servo::Beta { .. } => None,
         }
     }
@@ -72,7 +86,12 @@ impl Inverse {
         let omega = feed_mm_s / radius_mm;
         let (r, f) = (radius_mm * 1e-3, feed_mm_s * 1e-3);
         let solved = match (self.servo, self.element()) {
-            (Servo::Beta { beta1_s2, beta2_s4, .. }, _) => {
+            (
+                Servo::Beta {
+                    beta1_s2, beta2_s4, ..
+                },
+                _,
+            ) => {
                 let law = RadiusModel { beta1_s2, beta2_s4 };
                 let programmed = match self.keep {
                     Keep::Omega => law.inverse_keeping_omega(r, f),
@@ -86,10 +105,15 @@ impl Inverse {
             },
             (_, None) => None,
         };
-        let radius = solved.filter(|r| r.is_finite() && *r > 0.0).ok_or(Left::NoInverse)?;
+        let radius = solved
+            .filter(|r| r.is_finite() && *r > 0.0)
+            .ok_or(Left::NoInverse)?;
         let delta_mm = radius * 1e3 - radius_mm;
         if delta_mm == 0.0 {
-            return Ok(Twin { delta_mm, feed_factor: 1.0 });
+            return Ok(Twin {
+                delta_mm,
+                feed_factor: 1.0,
+            });
         }
         if omega > self.omega_max {
             return Err(Left::BeyondModel);
@@ -97,8 +121,15 @@ impl Inverse {
         if delta_mm.abs() > self.max_offset_mm.min(MAX_SHARE * radius_mm) {
             return Err(Left::OffsetTooLarge);
         }
-        let feed_factor = if self.keep == Keep::Omega { radius * 1e3 / radius_mm } else { 1.0 };
-        Ok(Twin { delta_mm, feed_factor })
+        let feed_factor = if self.keep == Keep::Omega {
+            radius * 1e3 / radius_mm
+        } else {
+            1.0
+        };
+        Ok(Twin {
+            delta_mm,
+            feed_factor,
+        })
     }
 }
 

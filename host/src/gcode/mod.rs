@@ -50,13 +50,21 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { keep: Keep::Feed, acceleration_mm_s2: 2000.0, max_offset_mm: 0.5, all_planes: false }
+        Self {
+            keep: Keep::Feed,
+            acceleration_mm_s2: 2000.0,
+            max_offset_mm: 0.5,
+            all_planes: false,
+        }
     }
 }
 
 /// Why an arc was left as it was.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, thiserror::Error)]
-#[allow(missing_docs, reason = "the message of each variant is its documentation")]
+#[allow(
+    missing_docs,
+    reason = "the message of each variant is its documentation"
+)]
 pub enum Left {
     #[error("the correction is below 0.5 µm")]
     Negligible,

@@ -117,8 +117,12 @@ const RADIUS_TOLERANCE_MM: f64 = 0.0127;
 
 impl State {
     pub(super) fn new() -> Self {
-        let modes =
-            Modes { inch: false, absolute: true, absolute_centres: false, feed_mode: FeedMode::PerMinute };
+        let modes = Modes {
+            inch: false,
+            absolute: true,
+            absolute_centres: false,
+            feed_mode: FeedMode::PerMinute,
+        };
         Self {
             modes,
             plane: Plane::Xy,
@@ -133,7 +137,10 @@ impl State {
 
     /// At a place, mm.
     pub(super) fn at(position_mm: [f64; 3]) -> Self {
-        Self { position: position_mm.map(Some), ..Self::new() }
+        Self {
+            position: position_mm.map(Some),
+            ..Self::new()
+        }
     }
 
     /// Where the lines so far lead, mm; `None` where they do not say.
@@ -172,7 +179,10 @@ impl State {
             Sort::Optional => {
                 let moves = line.words.iter().any(|w| b"XYZ".contains(&w.letter));
                 let arc = moves && self.moves_on_arc(line);
-                let changes = line.words.iter().any(|w| w.letter == b'G' && !(0..40).contains(&w.tenths()));
+                let changes = line
+                    .words
+                    .iter()
+                    .any(|w| w.letter == b'G' && !(0..40).contains(&w.tenths()));
                 if moves {
                     self.position = [None; 3];
                 }
@@ -182,7 +192,11 @@ impl State {
                 if changes {
                     self.blocked = Some(Left::OptionalBlock);
                 }
-                return if arc { Action::LostArc(Left::OptionalBlock) } else { Action::Other };
+                return if arc {
+                    Action::LostArc(Left::OptionalBlock)
+                } else {
+                    Action::Other
+                };
             }
         }
         let mut special = false;
@@ -204,7 +218,11 @@ impl State {
         self.position = end;
         match self.motion {
             Some(10) if line.words.iter().any(|w| b"ABCUVW".contains(&w.letter)) => Action::Other,
-            Some(10) => Action::Line(Straight { start, end, absolute: self.modes.absolute }),
+            Some(10) => Action::Line(Straight {
+                start,
+                end,
+                absolute: self.modes.absolute,
+            }),
             Some(direction @ (20 | 30)) => match self.arc(line, start, direction == 30) {
                 Ok(arc) => Action::Arc(arc),
                 Err(left) => Action::LostArc(left),
@@ -214,7 +232,10 @@ impl State {
     }
 
     fn moves_on_arc(&self, line: &Line<'_>) -> bool {
-        let own = line.words.iter().rfind(|w| w.letter == b'G' && (0..40).contains(&w.tenths()));
+        let own = line
+            .words
+            .iter()
+            .rfind(|w| w.letter == b'G' && (0..40).contains(&w.tenths()));
         matches!(own.map(Word::tenths).or(self.motion), Some(20 | 30))
     }
 
@@ -243,7 +264,9 @@ impl State {
             // Dwell, tool length, path control, spindle modes, return levels: no motion in the plane.
             40 | 430 | 431 | 490 | 610 | 611 | 640 | 500 | 690 | 960..=999 => {}
             // Coordinate systems, homing, probing: the position is another one or unknown.
-            100 | 280 | 281 | 300 | 301 | 520 | 530 | 540..=593 | 920..=923 | 382..=385 => return true,
+            100 | 280 | 281 | 300 | 301 | 520 | 530 | 540..=593 | 920..=923 | 382..=385 => {
+                return true;
+            }
             330 | 331 | 730 | 760 | 810..=890 => {
                 self.motion = Some(word.tenths());
                 return true;
@@ -330,7 +353,11 @@ impl State {
         let offset = |axis: usize| line.word(b"IJK"[axis]).map(|w| w.value * unit);
         // Centres in program coordinates need a place in program coordinates.
         let anchored = |axis: usize| !(self.modes.absolute_centres && self.floating[axis]);
-        let from = |axis: usize| start[axis].filter(|_| anchored(axis)).ok_or(Left::UnknownPosition);
+        let from = |axis: usize| {
+            start[axis]
+                .filter(|_| anchored(axis))
+                .ok_or(Left::UnknownPosition)
+        };
         let start_2 = [from(a)?, from(b)?];
         let to = |axis: usize, from: f64| match line.word(b"XYZ"[axis]) {
             None => from,
@@ -350,10 +377,14 @@ impl State {
             }
             Some(_) => return Err(Left::Geometry),
             None if offset(a).is_none() && offset(b).is_none() => return Err(Left::Geometry),
-            None if self.modes.absolute_centres => {
-                [offset(a).ok_or(Left::Geometry)?, offset(b).ok_or(Left::Geometry)?]
-            }
-            None => [start_2[0] + offset(a).unwrap_or(0.0), start_2[1] + offset(b).unwrap_or(0.0)],
+            None if self.modes.absolute_centres => [
+                offset(a).ok_or(Left::Geometry)?,
+                offset(b).ok_or(Left::Geometry)?,
+            ],
+            None => [
+                start_2[0] + offset(a).unwrap_or(0.0),
+                start_2[1] + offset(b).unwrap_or(0.0),
+            ],
         };
         let (from_centre, to_centre) = (sub(start_2, centre), sub(end_2, centre));
         let radius_mm = from_centre[0].hypot(from_centre[1]);
@@ -362,7 +393,11 @@ impl State {
             return Err(Left::Geometry);
         }
         let raw = to_centre[1].atan2(to_centre[0]) - from_centre[1].atan2(from_centre[0]);
-        let mut sweep = if ccw { raw.rem_euclid(TAU) } else { (-raw).rem_euclid(TAU) };
+        let mut sweep = if ccw {
+            raw.rem_euclid(TAU)
+        } else {
+            (-raw).rem_euclid(TAU)
+        };
         if same || sweep < 1e-12 {
             sweep = TAU;
         }
@@ -407,7 +442,10 @@ fn radius_centre(start: [f64; 2], end: [f64; 2], r: f64, ccw: bool) -> Option<[f
     }
     let height = square.max(0.0).sqrt() / chord;
     let side = if ccw == (r > 0.0) { height } else { -height };
-    Some([0.5 * (start[0] + end[0]) - side * dy, 0.5 * (start[1] + end[1]) + side * dx])
+    Some([
+        0.5 * (start[0] + end[0]) - side * dy,
+        0.5 * (start[1] + end[1]) + side * dx,
+    ])
 }
 
 pub(super) fn sub(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {

@@ -50,8 +50,15 @@ impl Response {
         let ratio = cumulants.ratio().clamp(-1.2, 6.0);
         // x = T²: 6x² − 1.2(1 − x)² = ratio.
         let x = ((2.4_f64.powi(2) + 4.0 * 4.8 * (1.2 + ratio)).sqrt() - 2.4) / (2.0 * 4.8);
-        let x = if x.is_finite() { x.clamp(0.0, 1.0) } else { 1.0 };
-        Self { lag: x.sqrt(), average: (12.0 * (1.0 - x)).sqrt() }
+        let x = if x.is_finite() {
+            x.clamp(0.0, 1.0)
+        } else {
+            1.0
+        };
+        Self {
+            lag: x.sqrt(),
+            average: (12.0 * (1.0 - x)).sqrt(),
+        }
     }
 
     /// Length over which a step with one free node answers best, σf.
@@ -74,8 +81,11 @@ impl Response {
                 let at = k as f64 - back;
                 let low = at.floor();
                 let i = low as usize;
-                let before =
-                    if at <= 0.0 { 0.0 } else { integral[i] + (at - low) * (integral[i + 1] - integral[i]) };
+                let before = if at <= 0.0 {
+                    0.0
+                } else {
+                    integral[i] + (at - low) * (integral[i + 1] - integral[i])
+                };
                 (integral[k] - before) / self.average
             })
             .collect();
@@ -99,19 +109,38 @@ impl Response {
         let curve: Vec<f64> = (0..samples).map(|k| 0.5 * time(k).powi(2)).collect();
         let wanted = |k: usize| 0.5 * (time(k) - delay).max(0.0).powi(2);
         // In units of the final offset, ½.
-        let shape = |t: Transition| -> Vec<f64> { (0..samples).map(|k| t.at(time(k) / length)).collect() };
+        let shape =
+            |t: Transition| -> Vec<f64> { (0..samples).map(|k| t.at(time(k) / length)).collect() };
         let parts = [
-            Transition { middle: 0.0, slope: 0.0, remaining: 0.0 },
-            Transition { middle: 1.0, slope: 0.0, remaining: 0.0 },
-            Transition { middle: 0.0, slope: 1.0, remaining: 0.0 },
+            Transition {
+                middle: 0.0,
+                slope: 0.0,
+                remaining: 0.0,
+            },
+            Transition {
+                middle: 1.0,
+                slope: 0.0,
+                remaining: 0.0,
+            },
+            Transition {
+                middle: 0.0,
+                slope: 1.0,
+                remaining: 0.0,
+            },
         ]
         .map(|t| self.apply(&shape(t)));
         let answer = self.apply(&curve);
-        let target: Vec<f64> = (0..samples).map(|k| 2.0 * (answer[k] - wanted(k)) - parts[0][k]).collect();
+        let target: Vec<f64> = (0..samples)
+            .map(|k| 2.0 * (answer[k] - wanted(k)) - parts[0][k])
+            .collect();
         // A part contains the end of the step as well, which is parts[0].
         let part = |i: usize, k: usize| parts[i][k] - parts[0][k];
         let mut weights = vec![1.0; samples];
-        let mut best = Transition { middle: 0.5, slope: 1.5, remaining: f64::INFINITY };
+        let mut best = Transition {
+            middle: 0.5,
+            slope: 1.5,
+            remaining: f64::INFINITY,
+        };
         for _ in 0..ROUNDS {
             let (mut a, mut b) = ([[0.0; 2]; 2], [0.0; 2]);
             for k in 0..samples {
@@ -124,14 +153,22 @@ impl Response {
             let det = a[0][0] * a[1][1] - a[0][1] * a[1][0];
             let middle = (b[0] * a[1][1] - b[1] * a[0][1]) / det;
             let slope = (b[1] * a[0][0] - b[0] * a[1][0]) / det;
-            let left: Vec<f64> =
-                (0..samples).map(|k| (target[k] - middle * part(1, k) - slope * part(2, k)).abs()).collect();
+            let left: Vec<f64> = (0..samples)
+                .map(|k| (target[k] - middle * part(1, k) - slope * part(2, k)).abs())
+                .collect();
             let remaining = left.iter().copied().fold(0.0, f64::max);
             if remaining < best.remaining {
-                best = Transition { middle, slope, remaining };
+                best = Transition {
+                    middle,
+                    slope,
+                    remaining,
+                };
             }
             let scale = remaining.max(f64::MIN_POSITIVE);
-            weights.iter_mut().zip(&left).for_each(|(w, e)| *w *= e / scale + 1e-3);
+            weights
+                .iter_mut()
+                .zip(&left)
+                .for_each(|(w, e)| *w *= e / scale + 1e-3);
             let sum: f64 = weights.iter().sum();
             weights.iter_mut().for_each(|w| *w /= sum);
         }
@@ -141,7 +178,11 @@ impl Response {
 
 impl Transition {
     /// The smooth step 3u² − 2u³.
-    pub(super) const SMOOTH: Self = Self { middle: 0.5, slope: 1.5, remaining: f64::INFINITY };
+    pub(super) const SMOOTH: Self = Self {
+        middle: 0.5,
+        slope: 1.5,
+        remaining: f64::INFINITY,
+    };
 
     /// The nodes behind the start: place, value and slope per length.
     pub(super) const fn nodes(self) -> [(f64, f64, f64); 2] {
@@ -155,7 +196,10 @@ impl Transition {
             [6.0 * m - 2.0 * s, -6.0 * m + 4.0 * s],
             [6.0 * (1.0 - m) - 4.0 * s, -6.0 * (1.0 - m) + 2.0 * s],
         ];
-        4.0 * halves.iter().flatten().fold(0.0, |most, c| f64::max(most, c.abs()))
+        4.0 * halves
+            .iter()
+            .flatten()
+            .fold(0.0, |most, c| f64::max(most, c.abs()))
     }
 
     /// Largest error that it leaves at the joint, as a share of the step; not finite where that is not known.
@@ -186,18 +230,27 @@ mod tests {
     use giotto_shared::model::Element;
 
     fn chain(elements: &[Element<f64>]) -> Cumulants<f64> {
-        elements.iter().map(Element::cumulants).fold(Cumulants::default(), |a, b| Cumulants {
-            kappa2_s2: a.kappa2_s2 + b.kappa2_s2,
-            kappa4_s4: a.kappa4_s4 + b.kappa4_s4,
-        })
+        elements
+            .iter()
+            .map(Element::cumulants)
+            .fold(Cumulants::default(), |a, b| Cumulants {
+                kappa2_s2: a.kappa2_s2 + b.kappa2_s2,
+                kappa4_s4: a.kappa4_s4 + b.kappa4_s4,
+            })
     }
 
     #[test]
     fn a_lag_and_an_average_are_found_from_their_cumulants() {
         for (kv_per_s, window_s) in [(50.0, 0.04), (43.3, 0.0), (200.0, 0.1)] {
-            let sum = chain(&[Element::Lag { kv_per_s }, Element::MovingAverage { window_s }]);
+            let sum = chain(&[
+                Element::Lag { kv_per_s },
+                Element::MovingAverage { window_s },
+            ]);
             let (found, sigma) = (Response::of(&sum), sum.kappa2_s2.sqrt());
-            assert!((found.lag * sigma * kv_per_s - 1.0).abs() < 1e-6, "{found:?}");
+            assert!(
+                (found.lag * sigma * kv_per_s - 1.0).abs() < 1e-6,
+                "{found:?}"
+            );
             assert!((found.average * sigma - window_s).abs() < 1e-5, "{found:?}");
         }
     }
@@ -207,15 +260,23 @@ mod tests {
     fn errors_are_those_of_the_table() {
         let average = [Element::MovingAverage { window_s: 0.04 }];
         let lag = [Element::Lag { kv_per_s: 50.0 }];
-        for (elements, most) in
-            [(lag.to_vec(), 0.004), ([lag, average].concat(), 0.035), (average.to_vec(), 0.123)]
-        {
+        for (elements, most) in [
+            (lag.to_vec(), 0.004),
+            ([lag, average].concat(), 0.035),
+            (average.to_vec(), 0.123),
+        ] {
             let response = Response::of(&chain(&elements));
             let t = response.transition(response.length());
-            assert!(t.remaining() <= most && t.remaining() > 0.5 * most, "{elements:?}: {t:?}");
+            assert!(
+                t.remaining() <= most && t.remaining() > 0.5 * most,
+                "{elements:?}: {t:?}"
+            );
             // No more acceleration (curvature over length squared) than 40 over the length of a shorter step.
             let short = 1.6 * response.lag + 0.6 * response.average;
-            assert!(t.curvature() / response.length().powi(2) < 40.0 / short.powi(2), "{t:?}");
+            assert!(
+                t.curvature() / response.length().powi(2) < 40.0 / short.powi(2),
+                "{t:?}"
+            );
         }
     }
 
@@ -229,7 +290,11 @@ mod tests {
             ((t.at(u + h) - 2.0 * t.at(u) + t.at(u - h)) / (h * h)).abs()
         });
         let most = most.fold(0.0, f64::max);
-        assert!((most / t.curvature() - 1.0).abs() < 0.01, "{most} {}", t.curvature());
+        assert!(
+            (most / t.curvature() - 1.0).abs() < 0.01,
+            "{most} {}",
+            t.curvature()
+        );
         assert_eq!((t.at(0.0), t.at(1.0)), (0.0, 1.0));
     }
 }

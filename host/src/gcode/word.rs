@@ -60,10 +60,17 @@ pub(super) fn lines(program: &[u8]) -> Vec<Line<'_>> {
 }
 
 fn line(raw: &[u8]) -> Line<'_> {
-    let text = raw.strip_suffix(b"\n").map_or(raw, |t| t.strip_suffix(b"\r").unwrap_or(t));
+    let text = raw
+        .strip_suffix(b"\n")
+        .map_or(raw, |t| t.strip_suffix(b"\r").unwrap_or(t));
     let end = &raw[text.len()..];
     let (words, sort) = words(text);
-    Line { text, end, words, sort }
+    Line {
+        text,
+        end,
+        words,
+        sort,
+    }
 }
 
 fn words(text: &[u8]) -> (Vec<Word>, Sort) {
@@ -93,16 +100,28 @@ fn words(text: &[u8]) -> (Vec<Word>, Sort) {
                 let letter = letter.to_ascii_uppercase();
                 let digits = skip_blanks(at + 1);
                 let length = number_length(&text[digits..]);
-                let number =
-                    std::str::from_utf8(&text[digits..digits + length]).ok().and_then(|n| n.parse().ok());
+                let number = std::str::from_utf8(&text[digits..digits + length])
+                    .ok()
+                    .and_then(|n| n.parse().ok());
                 // An O-word with nothing else is a program number; with a keyword it steers the program.
                 let Some(value) = number else {
-                    return (words, if letter == b'O' { Sort::Flow } else { Sort::Unread });
+                    return (
+                        words,
+                        if letter == b'O' {
+                            Sort::Flow
+                        } else {
+                            Sort::Unread
+                        },
+                    );
                 };
                 if letter == b'O' && text[digits + length..].iter().any(u8::is_ascii_alphabetic) {
                     return (words, Sort::Flow);
                 }
-                words.push(Word { letter, value, range: at..digits + length });
+                words.push(Word {
+                    letter,
+                    value,
+                    range: at..digits + length,
+                });
                 at = digits + length;
             }
             Some(_) => return (words, Sort::Unread),
@@ -114,7 +133,10 @@ fn words(text: &[u8]) -> (Vec<Word>, Sort) {
 /// Bytes of a decimal number: sign, digits, point.
 fn number_length(text: &[u8]) -> usize {
     let sign = usize::from(matches!(text.first(), Some(b'+' | b'-')));
-    let body = text[sign..].iter().take_while(|b| b.is_ascii_digit() || **b == b'.').count();
+    let body = text[sign..]
+        .iter()
+        .take_while(|b| b.is_ascii_digit() || **b == b'.')
+        .count();
     if body == 0 { 0 } else { sign + body }
 }
 
@@ -124,17 +146,37 @@ mod tests {
 
     fn read(text: &str) -> (Vec<(char, f64)>, Sort) {
         let l = line(text.as_bytes());
-        (l.words.iter().map(|w| (char::from(w.letter), w.value)).collect(), l.sort)
+        (
+            l.words
+                .iter()
+                .map(|w| (char::from(w.letter), w.value))
+                .collect(),
+            l.sort,
+        )
     }
 
     #[test]
     fn words_are_read_as_both_controllers_write_them() {
         assert_eq!(
             read("N10 g3X-1.5 Y+.25(a G1 inside)I5.J 0 ; X9"),
-            (vec![('N', 10.0), ('G', 3.0), ('X', -1.5), ('Y', 0.25), ('I', 5.0), ('J', 0.0)], Sort::Plain)
+            (
+                vec![
+                    ('N', 10.0),
+                    ('G', 3.0),
+                    ('X', -1.5),
+                    ('Y', 0.25),
+                    ('I', 5.0),
+                    ('J', 0.0)
+                ],
+                Sort::Plain
+            )
         );
         assert_eq!(read("%"), (vec![], Sort::Plain));
-        assert_eq!(read("O1234 (part)").1, Sort::Flow, "a comment may hide a keyword: taken as flow");
+        assert_eq!(
+            read("O1234 (part)").1,
+            Sort::Flow,
+            "a comment may hide a keyword: taken as flow"
+        );
         assert_eq!(read("O1234").1, Sort::Plain);
         assert_eq!(read("/G1 X1").1, Sort::Optional);
         assert_eq!(read("G1 X[1+2]").1, Sort::Unread);
@@ -149,7 +191,10 @@ mod tests {
     #[test]
     fn lines_go_round() {
         let program = b"%\r\nG1 X1\n\nG1 (caf\xe9) \xff\nlast".as_slice();
-        let back: Vec<u8> = lines(program).iter().flat_map(|l| [l.text, l.end].concat()).collect();
+        let back: Vec<u8> = lines(program)
+            .iter()
+            .flat_map(|l| [l.text, l.end].concat())
+            .collect();
         assert_eq!(back, program);
     }
 }

@@ -73,9 +73,13 @@ pub fn choose(
 ) -> Chosen {
     let problem = problem(campaign, diagnosis, question, circles);
     let pairs = pairs(&problem, diagnosis, question);
-    let total =
-        |picked: &[usize]| picked.iter().fold(problem.known.clone(), |sum, &i| sum + &problem.candidates[i]);
-    let may = |picked: &[usize], i: usize| picked.iter().filter(|p| **p == i).count() < MOST_REPEATS;
+    let total = |picked: &[usize]| {
+        picked.iter().fold(problem.known.clone(), |sum, &i| {
+            sum + &problem.candidates[i]
+        })
+    };
+    let may =
+        |picked: &[usize], i: usize| picked.iter().filter(|p| **p == i).count() < MOST_REPEATS;
     let best = |picked: &[usize]| {
         let base = total(picked);
         (0..circles.len())
@@ -89,7 +93,9 @@ pub fn choose(
     };
     let mut picked: Vec<usize> = Vec::new();
     while picked.len() < most && !(picked.len() >= FEWEST && enough(&picked)) {
-        let Some((_, next)) = best(&picked) else { break };
+        let Some((_, next)) = best(&picked) else {
+            break;
+        };
         picked.push(next);
     }
     // Exchange: each run in turn for the best one beside the others.
@@ -119,7 +125,10 @@ pub fn choose(
             test: pair.test.clone(),
         })
         .collect();
-    Chosen { circles: picked.iter().map(|&i| circles[i]).collect(), separations }
+    Chosen {
+        circles: picked.iter().map(|&i| circles[i]).collect(),
+        separations,
+    }
 }
 
 /// A pair: the column of what was found, its amplitude in scaled units (m), and the columns of the other.
@@ -133,30 +142,56 @@ struct Pair {
 
 fn columns_of(cause: Cause, views: &[RunView]) -> Vec<Column> {
     let model = cause.model();
-    let Some(shape) = model.shapes(views).into_iter().next() else { return Vec::new() };
+    let Some(shape) = model.shapes(views).into_iter().next() else {
+        return Vec::new();
+    };
     let mut out = Vec::new();
     for &axis in model.axes() {
         for at in 0..model.columns() {
-            out.push(Column { cause: Some(cause), axis, shape: shape.clone(), at, scale: 1.0 });
+            out.push(Column {
+                cause: Some(cause),
+                axis,
+                shape: shape.clone(),
+                at,
+                scale: 1.0,
+            });
         }
     }
     out
 }
 
-fn problem(campaign: &Campaign, diagnosis: &Diagnosis, question: &Question, circles: &[Circle]) -> Problem {
+fn problem(
+    campaign: &Campaign,
+    diagnosis: &Diagnosis,
+    question: &Question,
+    circles: &[Circle],
+) -> Problem {
     let response = Response::of(&diagnosis.model.servo);
     let seen: Vec<Circle> = campaign
         .runs
         .iter()
-        .map(|run| Circle { radius_m: run.radius_m, feed_m_s: run.feed_m_s, direction: run.direction })
+        .map(|run| Circle {
+            radius_m: run.radius_m,
+            feed_m_s: run.feed_m_s,
+            direction: run.direction,
+        })
         .collect();
     let last = (seen.len().max(2) - 1) as f64;
     let order: Vec<f64> = (0..seen.len()).map(|i| i as f64 / last).collect();
     let at_hand = information::views(&seen, &response, &order);
     let possible = information::views(circles, &response, &vec![0.5; circles.len()]);
-    let mut columns = vec![Column { cause: None, axis: None, shape: Vec::new(), at: 0, scale: 1.0 }];
+    let mut columns = vec![Column {
+        cause: None,
+        axis: None,
+        shape: Vec::new(),
+        at: 0,
+        scale: 1.0,
+    }];
     let found = diagnosis.findings.iter().map(|f| f.cause);
-    let members = question.classes.iter().flat_map(|class| class.members.iter().copied());
+    let members = question
+        .classes
+        .iter()
+        .flat_map(|class| class.members.iter().copied());
     for cause in found.chain(members) {
         if !columns.iter().any(|c| c.cause == Some(cause)) {
             columns.extend(columns_of(cause, &at_hand));
@@ -167,18 +202,34 @@ fn problem(campaign: &Campaign, diagnosis: &Diagnosis, question: &Question, circ
     let spread = information::spread(diagnosis);
     let known = information::products(&columns, &at_hand, &spread)
         .into_iter()
-        .fold(DMatrix::zeros(columns.len(), columns.len()), |sum, x| sum + x);
+        .fold(DMatrix::zeros(columns.len(), columns.len()), |sum, x| {
+            sum + x
+        });
     let candidates = information::products(&columns, &possible, &spread);
     let open = (0..columns.len())
-        .filter(|&i| question.classes.iter().any(|c| c.members.iter().any(|m| columns[i].cause == Some(*m))))
+        .filter(|&i| {
+            question
+                .classes
+                .iter()
+                .any(|c| c.members.iter().any(|m| columns[i].cause == Some(*m)))
+        })
         .collect();
-    Problem { columns, open, known, candidates }
+    Problem {
+        columns,
+        open,
+        known,
+        candidates,
+    }
 }
 
 fn pairs(problem: &Problem, diagnosis: &Diagnosis, question: &Question) -> Vec<Pair> {
     let mut out = Vec::new();
     for finding in &diagnosis.findings {
-        let Some(class) = question.classes.iter().find(|c| c.members.first() == Some(&finding.cause)) else {
+        let Some(class) = question
+            .classes
+            .iter()
+            .find(|c| c.members.first() == Some(&finding.cause))
+        else {
             continue;
         };
         let Some(own) = problem.columns.iter().position(|c| {
@@ -187,8 +238,9 @@ fn pairs(problem: &Problem, diagnosis: &Diagnosis, question: &Question) -> Vec<P
             continue;
         };
         for other in &class.members[1..] {
-            let others: Vec<usize> =
-                (0..problem.columns.len()).filter(|&i| problem.columns[i].cause == Some(*other)).collect();
+            let others: Vec<usize> = (0..problem.columns.len())
+                .filter(|&i| problem.columns[i].cause == Some(*other))
+                .collect();
             if !others.is_empty() {
                 out.push(Pair {
                     names: [finding.cause.id().to_string(), other.id().to_string()],
@@ -204,9 +256,9 @@ fn pairs(problem: &Problem, diagnosis: &Diagnosis, question: &Question) -> Vec<P
 }
 
 fn log_det(matrix: DMatrix<f64>) -> f64 {
-    matrix
-        .cholesky()
-        .map_or(f64::NEG_INFINITY, |c| 2.0 * c.l().diagonal().iter().map(|d| d.ln()).sum::<f64>())
+    matrix.cholesky().map_or(f64::NEG_INFINITY, |c| {
+        2.0 * c.l().diagonal().iter().map(|d| d.ln()).sum::<f64>()
+    })
 }
 
 fn part(matrix: &DMatrix<f64>, rows: &[usize]) -> DMatrix<f64> {
@@ -220,7 +272,9 @@ impl Problem {
         for i in 0..with_prior.nrows() {
             with_prior[(i, i)] += PRIOR_M.powi(-2);
         }
-        let rest: Vec<usize> = (0..self.columns.len()).filter(|i| !self.open.contains(i)).collect();
+        let rest: Vec<usize> = (0..self.columns.len())
+            .filter(|i| !self.open.contains(i))
+            .collect();
         let free = log_det(part(&with_prior, &rest));
         log_det(with_prior) - free
     }
@@ -228,9 +282,11 @@ impl Problem {
     /// Expected χ² of the first of a pair when the second, the simulation and the other findings may take what
     /// they can: a²·(1/(M⁻¹)₁₁).
     fn chi2(&self, information: &DMatrix<f64>, pair: &Pair) -> f64 {
-        let taken = |i: &usize| *i != pair.own && (pair.others.contains(i) || !self.open.contains(i));
-        let rows: Vec<usize> =
-            std::iter::once(pair.own).chain((0..self.columns.len()).filter(taken)).collect();
+        let taken =
+            |i: &usize| *i != pair.own && (pair.others.contains(i) || !self.open.contains(i));
+        let rows: Vec<usize> = std::iter::once(pair.own)
+            .chain((0..self.columns.len()).filter(taken))
+            .collect();
         let mut m = part(information, &rows);
         let largest = m.diagonal().max().max(f64::MIN_POSITIVE);
         for i in 0..rows.len() {

@@ -40,17 +40,25 @@ fn round(value: f64) -> f64 {
 /// Every circle within the limits.
 pub fn circles(campaign: &Campaign, limits: &Limits) -> Vec<Circle> {
     let runs = || campaign.runs.iter();
-    let feed = limits.highest_feed_m_s.unwrap_or_else(|| runs().map(|r| r.feed_m_s).fold(0.0, f64::max));
-    let acceleration = limits
-        .highest_acceleration_m_s2
-        .unwrap_or_else(|| runs().map(|r| r.feed_m_s.powi(2) / r.radius_m).fold(0.0, f64::max));
+    let feed = limits
+        .highest_feed_m_s
+        .unwrap_or_else(|| runs().map(|r| r.feed_m_s).fold(0.0, f64::max));
+    let acceleration = limits.highest_acceleration_m_s2.unwrap_or_else(|| {
+        runs()
+            .map(|r| r.feed_m_s.powi(2) / r.radius_m)
+            .fold(0.0, f64::max)
+    });
     let mut radii = limits.radii_m.clone();
     if radii.is_empty() {
         let seen: Vec<f64> = runs().map(|r| r.radius_m).collect();
         let low = seen.iter().copied().fold(f64::INFINITY, f64::min);
         let high = seen.iter().copied().fold(0.0, f64::max);
         radii = seen;
-        radii.extend(AROUND.iter().map(|k| round(k * if *k < 1.0 { low } else { high })));
+        radii.extend(
+            AROUND
+                .iter()
+                .map(|k| round(k * if *k < 1.0 { low } else { high })),
+        );
     }
     let mut feeds: Vec<f64> = SHARES.iter().map(|k| round(k * feed)).collect();
     feeds.extend(runs().map(|r| r.feed_m_s).filter(|f| *f <= feed));
@@ -64,7 +72,11 @@ pub fn circles(campaign: &Campaign, limits: &Limits) -> Vec<Circle> {
             let within = feed_m_s * feed_m_s / radius_m <= acceleration * (1.0 + 1e-9);
             if within && std::f64::consts::TAU * radius_m / feed_m_s <= LONGEST_TURN_S {
                 for direction in [Direction::Ccw, Direction::Cw] {
-                    out.push(Circle { radius_m, feed_m_s, direction });
+                    out.push(Circle {
+                        radius_m,
+                        feed_m_s,
+                        direction,
+                    });
                 }
             }
         }

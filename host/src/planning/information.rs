@@ -68,13 +68,20 @@ pub fn spread(diagnosis: &Diagnosis) -> Spread {
     let between = diagnosis.spread_um.max(0.1).powi(2) * 1e-12;
     let mut order_m2 = [between; ORDERS + 1];
     order_m2[1] = 0.0;
-    Spread { noise_m2: diagnosis.noise_um.max(0.1).powi(2) * 1e-12 * VIEW as f64 / TURN, order_m2 }
+    Spread {
+        noise_m2: diagnosis.noise_um.max(0.1).powi(2) * 1e-12 * VIEW as f64 / TURN,
+        order_m2,
+    }
 }
 
 fn samples(column: &Column, view: &RunView) -> Vec<f64> {
     let mut out = vec![0.0; VIEW];
     match column.cause {
-        Some(cause) => cause.model().signature(column.axis, &column.shape, column.at, view, &mut out),
+        Some(cause) => {
+            cause
+                .model()
+                .signature(column.axis, &column.shape, column.at, view, &mut out)
+        }
         None => out.fill(-0.5 * view.radius_m * view.omega_rad_s.powi(2) * view.gain.powi(3)),
     }
     out

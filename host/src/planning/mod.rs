@@ -69,12 +69,19 @@ pub fn propose(campaign: &Campaign, diagnosis: &Diagnosis, options: &Options) ->
         design::choose(campaign, diagnosis, &question, &circles, options.most_runs)
     };
     let mut line_tests = question.line_tests;
-    line_tests.extend(chosen.separations.iter().filter(|s| !s.told()).map(|s| LineTest {
-        pair: s.pair.clone(),
-        test: s.test.clone(),
-        why: "no circle within the limits of radius and feed tells them apart".into(),
-    }));
-    let (runs, warm_up_turns, duration_s) = sequence::sequence(campaign, &chosen.circles, options.seed);
+    line_tests.extend(
+        chosen
+            .separations
+            .iter()
+            .filter(|s| !s.told())
+            .map(|s| LineTest {
+                pair: s.pair.clone(),
+                test: s.test.clone(),
+                why: "no circle within the limits of radius and feed tells them apart".into(),
+            }),
+    );
+    let (runs, warm_up_turns, duration_s) =
+        sequence::sequence(campaign, &chosen.circles, options.seed);
     Plan {
         open: question.classes,
         line_tests,
@@ -91,7 +98,10 @@ impl Plan {
     /// put `model = "…"` or a `[machine]` there to simulate another.
     pub fn file(&self, campaign: &Campaign) -> PlanFile {
         PlanFile {
-            campaign: Names { name: format!("{}, next", campaign.name), machine: campaign.machine.clone() },
+            campaign: Names {
+                name: format!("{}, next", campaign.name),
+                machine: campaign.machine.clone(),
+            },
             runs: self
                 .runs
                 .iter()

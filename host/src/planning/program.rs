@@ -39,11 +39,19 @@ fn on(radius_mm: f64, quarter: f64) -> [f64; 2] {
 }
 
 fn sign(step: &Step) -> i32 {
-    if step.direction == Direction::Ccw { 1 } else { -1 }
+    if step.direction == Direction::Ccw {
+        1
+    } else {
+        -1
+    }
 }
 
 fn words(step: &Step) -> String {
-    let way = if step.direction == Direction::Ccw { "ccw" } else { "cw" };
+    let way = if step.direction == Direction::Ccw {
+        "ccw"
+    } else {
+        "cw"
+    };
     format!("R {} mm, {} mm/s, {way}", step.radius_mm, step.feed_mm_s)
 }
 
@@ -52,13 +60,20 @@ fn orders(plan: &Plan) -> Vec<Order> {
     let mut bar = None;
     let circle = |out: &mut Vec<Order>, step: &Step, turns: usize, before: &str, after: &str| {
         let (r, f, d) = (step.radius_mm, step.feed_mm_s, sign(step));
-        let lead = ((r + OUT_OF_RANGE_MM).powi(2) - r * r).sqrt().max(RUN_UP_S * f);
+        let lead = ((r + OUT_OF_RANGE_MM).powi(2) - r * r)
+            .sqrt()
+            .max(RUN_UP_S * f);
         let lead = (lead * 10.0).ceil() / 10.0;
         let side = f64::from(d);
         out.push(Order::Line([-lead, -side * r], POSITIONING_MM_S));
         out.push(Order::Wait(before.to_owned()));
         out.push(Order::Line([0.0, -side * r], f));
-        let arc = |from, quarters| Order::Arc { radius_mm: r, from, quarters, feed_mm_s: f };
+        let arc = |from, quarters| Order::Arc {
+            radius_mm: r,
+            from,
+            quarters,
+            feed_mm_s: f,
+        };
         out.push(arc(-d, d));
         out.extend((0..turns).map(|_| arc(0, 4 * d)));
         out.push(arc(0, d));
@@ -66,26 +81,62 @@ fn orders(plan: &Plan) -> Vec<Order> {
         out.push(Order::Wait(after.to_owned()));
     };
     if let Some(first) = plan.runs.first() {
-        out.push(Order::Say(format!("warm-up: {} turns of {}", plan.warm_up_turns, words(first))));
-        circle(&mut out, first, plan.warm_up_turns, "clear the path, no bar, then go on", "warm");
+        out.push(Order::Say(format!(
+            "warm-up: {} turns of {}",
+            plan.warm_up_turns,
+            words(first)
+        )));
+        circle(
+            &mut out,
+            first,
+            plan.warm_up_turns,
+            "clear the path, no bar, then go on",
+            "warm",
+        );
     }
     for (k, step) in plan.runs.iter().enumerate() {
-        let what = if step.purpose == Purpose::Reference { ", reference" } else { "" };
-        out.push(Order::Say(format!("run {} of {}: {}{what}", k + 1, plan.runs.len(), words(step))));
+        let what = if step.purpose == Purpose::Reference {
+            ", reference"
+        } else {
+            ""
+        };
+        out.push(Order::Say(format!(
+            "run {} of {}: {}{what}",
+            k + 1,
+            plan.runs.len(),
+            words(step)
+        )));
         let before = if bar == Some(step.radius_mm) {
             "start the recording, then go on".to_owned()
         } else {
-            format!("mount the bar of {} mm, start the recording, then go on", step.radius_mm)
+            format!(
+                "mount the bar of {} mm, start the recording, then go on",
+                step.radius_mm
+            )
         };
         bar = Some(step.radius_mm);
-        circle(&mut out, step, 1, &before, "stop the recording, take the bar off its ball, then go on");
+        circle(
+            &mut out,
+            step,
+            1,
+            &before,
+            "stop the recording, take the bar off its ball, then go on",
+        );
     }
     out
 }
 
 /// Letters, digits and marks that no controller takes for anything in a comment.
 fn plain(text: &str) -> String {
-    text.chars().map(|c| if c.is_ascii_alphanumeric() || " .,:/-+_=".contains(c) { c } else { '_' }).collect()
+    text.chars()
+        .map(|c| {
+            if c.is_ascii_alphanumeric() || " .,:/-+_=".contains(c) {
+                c
+            } else {
+                '_'
+            }
+        })
+        .collect()
 }
 
 fn head(plan: &Plan, campaign: &str) -> [String; 3] {
@@ -105,7 +156,11 @@ fn head(plan: &Plan, campaign: &str) -> [String; 3] {
 fn number(value: f64) -> String {
     let text = format!("{value:.4}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".into() } else { text.into() }
+    if text == "-0" {
+        "0".into()
+    } else {
+        text.into()
+    }
 }
 
 impl Plan {
@@ -113,21 +168,40 @@ impl Plan {
     pub fn gcode(&self, campaign: &str) -> String {
         let mut out = String::from("%\n");
         // Writing to a String cannot fail.
-        head(self, campaign).iter().for_each(|line| _ = writeln!(out, "({line})"));
+        head(self, campaign)
+            .iter()
+            .for_each(|line| _ = writeln!(out, "({line})"));
         out += "G17 G21 G40 G90 G94\n";
         for order in orders(self) {
             let _ = match order {
                 Order::Say(text) => writeln!(out, "({text})"),
                 Order::Wait(text) => writeln!(out, "M0 ({text})"),
                 Order::Line([x, y], feed) => {
-                    writeln!(out, "G1 X{} Y{} F{}", number(x), number(y), number(feed * 60.0))
+                    writeln!(
+                        out,
+                        "G1 X{} Y{} F{}",
+                        number(x),
+                        number(y),
+                        number(feed * 60.0)
+                    )
                 }
-                Order::Arc { radius_mm, from, quarters, feed_mm_s } => {
-                    let ([sx, sy], [x, y]) =
-                        (on(radius_mm, f64::from(from)), on(radius_mm, f64::from(from + quarters)));
+                Order::Arc {
+                    radius_mm,
+                    from,
+                    quarters,
+                    feed_mm_s,
+                } => {
+                    let ([sx, sy], [x, y]) = (
+                        on(radius_mm, f64::from(from)),
+                        on(radius_mm, f64::from(from + quarters)),
+                    );
                     let code = if quarters > 0 { "G3" } else { "G2" };
                     let [x, y, i, j] = [x, y, -sx, -sy].map(number);
-                    writeln!(out, "{code} X{x} Y{y} I{i} J{j} F{}", number(feed_mm_s * 60.0))
+                    writeln!(
+                        out,
+                        "{code} X{x} Y{y} I{i} J{j} F{}",
+                        number(feed_mm_s * 60.0)
+                    )
                 }
             };
         }
@@ -138,32 +212,58 @@ impl Plan {
     /// object, orientation and configuration stand at its top, to be set by whoever knows the robot.
     pub fn rapid(&self, campaign: &str) -> String {
         let mut out = String::from("MODULE giotto_plan\n");
-        head(self, campaign).iter().for_each(|line| _ = writeln!(out, "    ! {line}"));
+        head(self, campaign)
+            .iter()
+            .for_each(|line| _ = writeln!(out, "    ! {line}"));
         out += "    ! Set these to the robot at hand; the orientation and configuration of every target below are those of a\n    \
                 ! tool that points down: replace [0,0,1,0],[0,0,0,0] throughout if yours are others.\n    \
                 PERS tooldata giotto_tool := [TRUE,[[0,0,0],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];\n    \
                 PERS wobjdata giotto_frame := [FALSE,TRUE,\"\",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n    \
                 PROC main()\n        ConfL \\Off;\n";
         let target = |[x, y]: [f64; 2]| {
-            format!("[[{},{},0],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]", number(x), number(y))
+            format!(
+                "[[{},{},0],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]",
+                number(x),
+                number(y)
+            )
         };
         let speed = |feed: f64| format!("[{},500,5000,1000]", number(feed));
         let with = "giotto_tool\\WObj:=giotto_frame";
         let list = orders(self);
         for (k, order) in list.iter().enumerate() {
             // Before standing still the path ends; elsewhere it is passed at speed.
-            let zone = if matches!(list.get(k + 1), Some(Order::Wait(_)) | None) { "fine" } else { "z0" };
+            let zone = if matches!(list.get(k + 1), Some(Order::Wait(_)) | None) {
+                "fine"
+            } else {
+                "z0"
+            };
             let _ = match order {
                 Order::Say(text) => writeln!(out, "        ! {text}"),
-                Order::Wait(text) => writeln!(out, "        TPWrite \"{text}\";\n        Stop \\NoRegain;"),
-                Order::Line(to, feed) => {
-                    writeln!(out, "        MoveL {},{},{zone},{with};", target(*to), speed(*feed))
+                Order::Wait(text) => {
+                    writeln!(out, "        TPWrite \"{text}\";\n        Stop \\NoRegain;")
                 }
-                Order::Arc { radius_mm, from, quarters, feed_mm_s } => {
+                Order::Line(to, feed) => {
+                    writeln!(
+                        out,
+                        "        MoveL {},{},{zone},{with};",
+                        target(*to),
+                        speed(*feed)
+                    )
+                }
+                Order::Arc {
+                    radius_mm,
+                    from,
+                    quarters,
+                    feed_mm_s,
+                } => {
                     // Half a turn at most in one instruction.
                     let parts = (quarters.abs() + 1) / 2;
-                    let at =
-                        |share: f64| target(on(*radius_mm, f64::from(*from) + share * f64::from(*quarters)));
+                    let at = |share: f64| {
+                        target(on(
+                            *radius_mm,
+                            f64::from(*from) + share * f64::from(*quarters),
+                        ))
+                    };
                     for part in 0..parts {
                         let share = |s: f64| (f64::from(part) + s) / f64::from(parts);
                         let (via, to, speed) = (at(share(0.5)), at(share(1.0)), speed(*feed_mm_s));

@@ -5,7 +5,12 @@ use crate::model_file::{FORMAT, ModelFile, Servo, Valid};
 use giotto_shared::Direction;
 
 fn plan() -> Plan {
-    let step = |radius_mm, feed_mm_s, direction, purpose| Step { radius_mm, feed_mm_s, direction, purpose };
+    let step = |radius_mm, feed_mm_s, direction, purpose| Step {
+        radius_mm,
+        feed_mm_s,
+        direction,
+        purpose,
+    };
     let runs = vec![
         step(100.0, 150.0, Direction::Ccw, Purpose::Reference),
         step(62.5, 200.0, Direction::Cw, Purpose::Test),
@@ -29,23 +34,35 @@ fn model() -> ModelFile {
         campaign: "c".into(),
         machine: "m".into(),
         servo: Servo::Lag { kv_per_s: 40.0 },
-        valid: Valid { radius_mm: [50.0, 300.0], feed_mm_s: [20.0, 700.0] },
+        valid: Valid {
+            radius_mm: [50.0, 300.0],
+            feed_mm_s: [20.0, 700.0],
+        },
         effects: Vec::new(),
     }
 }
 
 /// Radius and feed of every arc, in order: quarter, turns, quarter for the warm-up and each run.
 fn expected(plan: &Plan, blocks_a_turn: usize) -> Vec<(f64, f64)> {
-    let circle = |s: &Step, turns: usize| vec![(s.radius_mm, s.feed_mm_s); 2 + turns * blocks_a_turn];
+    let circle =
+        |s: &Step, turns: usize| vec![(s.radius_mm, s.feed_mm_s); 2 + turns * blocks_a_turn];
     let runs = plan.runs.iter().flat_map(|s| circle(s, 1));
-    circle(&plan.runs[0], plan.warm_up_turns).into_iter().chain(runs).collect()
+    circle(&plan.runs[0], plan.warm_up_turns)
+        .into_iter()
+        .chain(runs)
+        .collect()
 }
 
 fn seen(arcs: &[gcode::Report]) -> Vec<(f64, f64)> {
     let of = |report: &gcode::Report| match report.fate {
-        Fate::Corrected { radius_mm, feed_mm_s, .. } => {
-            ((radius_mm * 1e3).round() / 1e3, (feed_mm_s * 1e3).round() / 1e3)
-        }
+        Fate::Corrected {
+            radius_mm,
+            feed_mm_s,
+            ..
+        } => (
+            (radius_mm * 1e3).round() / 1e3,
+            (feed_mm_s * 1e3).round() / 1e3,
+        ),
         Fate::Left(left) => panic!("line {}: {left}", report.line),
     };
     arcs.iter().map(of).collect()
@@ -54,7 +71,10 @@ fn seen(arcs: &[gcode::Report]) -> Vec<(f64, f64)> {
 #[test]
 fn our_own_readers_see_the_circles_of_the_plan() {
     let plan = plan();
-    let options = Options { max_offset_mm: 5.0, ..Options::default() };
+    let options = Options {
+        max_offset_mm: 5.0,
+        ..Options::default()
+    };
     let nc = gcode::compensate(plan.gcode("lab").as_bytes(), &model(), &options);
     assert_eq!(seen(&nc.arcs), expected(&plan, 1));
     let module = plan.rapid("lab");
@@ -81,17 +101,28 @@ fn the_gcode_crate_sees_them_too() {
             _ => continue,
         };
         let get = |letter: char| {
-            g.args.iter().find(|a| a.letter == letter).map(|a| match a.value {
-                Value::Literal(v) => v,
-                _ => panic!("not a number"),
-            })
+            g.args
+                .iter()
+                .find(|a| a.letter == letter)
+                .map(|a| match a.value {
+                    Value::Literal(v) => v,
+                    _ => panic!("not a number"),
+                })
         };
-        let (Some(x), Some(y)) = (get('X'), get('Y')) else { continue };
+        let (Some(x), Some(y)) = (get('X'), get('Y')) else {
+            continue;
+        };
         if let (Some(i), Some(j)) = (get('I'), get('J')) {
             let centre = [place[0] + i, place[1] + j];
-            assert!(centre[0].abs() < 1e-4 && centre[1].abs() < 1e-4, "{centre:?}");
+            assert!(
+                centre[0].abs() < 1e-4 && centre[1].abs() < 1e-4,
+                "{centre:?}"
+            );
             if (place[0] - x).hypot(place[1] - y) < 1e-4 {
-                assert!(y.abs() < 1e-4, "the measured turn begins at angle 0: {x} {y}");
+                assert!(
+                    y.abs() < 1e-4,
+                    "the measured turn begins at angle 0: {x} {y}"
+                );
                 turns.push((g.number.major(), x, get('F').unwrap() / 60.0));
             }
         }
@@ -103,9 +134,16 @@ fn the_gcode_crate_sees_them_too() {
     let wanted: Vec<_> = warm.chain(plan.runs.iter().map(of)).collect();
     assert_eq!(turns.len(), wanted.len());
     for (a, b) in turns.iter().zip(&wanted) {
-        assert!(a.0 == b.0 && (a.1 - b.1).abs() < 1e-3 && (a.2 - b.2).abs() < 1e-3, "{a:?} {b:?}");
+        assert!(
+            a.0 == b.0 && (a.1 - b.1).abs() < 1e-3 && (a.2 - b.2).abs() < 1e-3,
+            "{a:?} {b:?}"
+        );
     }
-    assert_eq!(waits, 2 * (plan.runs.len() + 1), "a stop before and after each");
+    assert_eq!(
+        waits,
+        2 * (plan.runs.len() + 1),
+        "a stop before and after each"
+    );
 }
 
 /// A bar of ±1 mm sees the run come and go: both ends of the tangents lie outside its range.
@@ -118,7 +156,9 @@ fn tangents_begin_beyond_the_bar() {
         word[1..].parse().unwrap()
     };
     let lines: Vec<&str> = text.lines().collect();
-    let waits: Vec<usize> = (0..lines.len()).filter(|k| lines[*k].starts_with("M0")).collect();
+    let waits: Vec<usize> = (0..lines.len())
+        .filter(|k| lines[*k].starts_with("M0"))
+        .collect();
     for (n, at) in waits.iter().enumerate() {
         let place = lines[..*at].iter().rfind(|l| l.starts_with("G1")).unwrap();
         let step = &plan.runs[(n / 2).saturating_sub(1)];
@@ -130,14 +170,36 @@ fn tangents_begin_beyond_the_bar() {
 /// LinuxCNC's own interpreter, where `GIOTTO_RS274` names it: every arc of the plan, no complaint.
 #[test]
 fn linuxcnc_reads_the_plan() {
-    let Some(rs274) = std::env::var_os("GIOTTO_RS274") else { return };
+    let Some(rs274) = std::env::var_os("GIOTTO_RS274") else {
+        return;
+    };
     let dir = tempfile::tempdir().unwrap();
-    let (file, table, out) = (dir.path().join("p.ngc"), dir.path().join("tool.tbl"), dir.path().join("out"));
+    let (file, table, out) = (
+        dir.path().join("p.ngc"),
+        dir.path().join("tool.tbl"),
+        dir.path().join("out"),
+    );
     std::fs::write(&file, plan().gcode("lab")).unwrap();
     std::fs::write(&table, "T1 P1 D6\n").unwrap();
-    let arguments = [std::ffi::OsStr::new("-g"), "-t".as_ref(), table.as_ref(), file.as_ref(), out.as_ref()];
-    let run = std::process::Command::new(rs274).args(arguments).output().unwrap();
+    let arguments = [
+        std::ffi::OsStr::new("-g"),
+        "-t".as_ref(),
+        table.as_ref(),
+        file.as_ref(),
+        out.as_ref(),
+    ];
+    let run = std::process::Command::new(rs274)
+        .args(arguments)
+        .output()
+        .unwrap();
     let canon = std::fs::read_to_string(&out).unwrap();
-    assert!(run.status.success() && canon.contains("PROGRAM_END"), "{canon}{run:?}");
-    assert_eq!(canon.matches("ARC_FEED(").count(), expected(&plan(), 1).len(), "{canon}");
+    assert!(
+        run.status.success() && canon.contains("PROGRAM_END"),
+        "{canon}{run:?}"
+    );
+    assert_eq!(
+        canon.matches("ARC_FEED(").count(),
+        expected(&plan(), 1).len(),
+        "{canon}"
+    );
 }

@@ -40,7 +40,10 @@ fn seen_in_circles(cause: Cause) -> bool {
 
 /// The question that a diagnosis leaves.
 pub fn of(diagnosis: &Diagnosis) -> Question {
-    let mut question = Question { classes: Vec::new(), line_tests: Vec::new() };
+    let mut question = Question {
+        classes: Vec::new(),
+        line_tests: Vec::new(),
+    };
     for finding in &diagnosis.findings {
         let words = finding.cause.model().words();
         let mut members = vec![finding.cause];
@@ -62,17 +65,26 @@ pub fn of(diagnosis: &Diagnosis) -> Question {
         }
         if members.len() > 1 {
             let why = "these runs show the same of each".to_string();
-            question.classes.push(Class { members, why, next: words.next.to_string() });
+            question.classes.push(Class {
+                members,
+                why,
+                next: words.next.to_string(),
+            });
         }
     }
     let nothing_proven = diagnosis.findings.is_empty() && diagnosis.gain.is_none();
     if question.classes.is_empty() && (nothing_proven || diagnosis.unexplained.present) {
         let why = if diagnosis.unexplained.present {
-            "something matches no cause: more radii, feeds and places narrow its law down".to_string()
+            "something matches no cause: more radii, feeds and places narrow its law down"
+                .to_string()
         } else {
             diagnosis.cannot_tell.join("; ")
         };
-        let members = ALL.iter().map(|model| model.cause()).filter(|cause| seen_in_circles(*cause)).collect();
+        let members = ALL
+            .iter()
+            .map(|model| model.cause())
+            .filter(|cause| seen_in_circles(*cause))
+            .collect();
         let next = "a spread of radii, feeds and both directions, in random order".into();
         question.classes.push(Class { members, why, next });
     }

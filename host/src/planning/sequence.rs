@@ -57,8 +57,11 @@ pub fn sequence(campaign: &Campaign, circles: &[Circle], seed: u64) -> (Vec<Step
     let (Some(reference), false) = (order.get(order.len() / 2), circles.is_empty()) else {
         return (Vec::new(), 0, 0.0);
     };
-    let reference =
-        Circle { radius_m: reference.radius_m, feed_m_s: reference.feed_m_s, direction: reference.direction };
+    let reference = Circle {
+        radius_m: reference.radius_m,
+        feed_m_s: reference.feed_m_s,
+        direction: reference.direction,
+    };
     let mut tests = circles.to_vec();
     tests.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
     let (early, late) = tests.split_at(tests.len() / 2);
@@ -69,6 +72,9 @@ pub fn sequence(campaign: &Campaign, circles: &[Circle], seed: u64) -> (Vec<Step
     steps.push(step(&reference, Purpose::Reference));
     let turn_s = TAU * reference.radius_m / reference.feed_m_s;
     let warm_up = (WARM_UP_S / turn_s).ceil().clamp(1.0, 500.0) as usize;
-    let runs_s: f64 = steps.iter().map(|s| TURNS_PER_RUN * TAU * s.radius_mm / s.feed_mm_s + PAUSE_S).sum();
+    let runs_s: f64 = steps
+        .iter()
+        .map(|s| TURNS_PER_RUN * TAU * s.radius_mm / s.feed_mm_s + PAUSE_S)
+        .sum();
     (steps, warm_up, warm_up as f64 * turn_s + runs_s)
 }

@@ -45,28 +45,46 @@ pub fn ticks(low: f64, high: f64, count: f64) -> Vec<f64> {
     }
     let rough = span / count;
     let power = 10f64.powf(rough.log10().floor());
-    let step = power * [1.0, 2.0, 5.0, 10.0].into_iter().find(|m| m * power >= rough).unwrap_or(10.0);
+    let step = power
+        * [1.0, 2.0, 5.0, 10.0]
+            .into_iter()
+            .find(|m| m * power >= rough)
+            .unwrap_or(10.0);
     let first = (low / step).ceil() as i64;
-    (first..).map(|k| k as f64 * step).take_while(|v| *v <= high + 1e-9 * span).take(50).collect()
+    (first..)
+        .map(|k| k as f64 * step)
+        .take_while(|v| *v <= high + 1e-9 * span)
+        .take(50)
+        .collect()
 }
 
 /// Smallest and largest, with a margin; never empty.
 fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let [low, high] = values
         .filter(|v| v.is_finite())
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| {
+            [l.min(v), h.max(v)]
+        });
     if low > high {
         return [0.0, 1.0];
     }
-    let margin = if high > low { 0.05 * (high - low) } else { 0.5 * low.abs().max(1e-6) };
+    let margin = if high > low {
+        0.05 * (high - low)
+    } else {
+        0.5 * low.abs().max(1e-6)
+    };
     [low - margin, high + margin]
 }
 
 impl Chart {
     /// The plot as one `<svg>` element.
     pub fn svg(&self) -> String {
-        let all =
-            || self.points.iter().map(|p| p.at).chain(self.curves.iter().flat_map(|c| c.1.iter().copied()));
+        let all = || {
+            self.points
+                .iter()
+                .map(|p| p.at)
+                .chain(self.curves.iter().flat_map(|c| c.1.iter().copied()))
+        };
         let x = range(all().map(|p| p[0]));
         // Zero belongs to every vertical axis here.
         let y = range(all().map(|p| p[1]).chain([0.0]));
@@ -111,7 +129,13 @@ impl Chart {
         for (class, curve) in &self.curves {
             let _ = write!(out, "<path class=\"curve {class}\" d=\"");
             for (i, p) in curve.iter().enumerate() {
-                let _ = write!(out, "{}{:.1} {:.1}", if i == 0 { 'M' } else { 'L' }, px(p[0]), py(p[1]));
+                let _ = write!(
+                    out,
+                    "{}{:.1} {:.1}",
+                    if i == 0 { 'M' } else { 'L' },
+                    px(p[0]),
+                    py(p[1])
+                );
             }
             out.push_str("\"/>");
         }
@@ -132,7 +156,11 @@ impl Chart {
 }
 
 fn tick(value: f64) -> String {
-    let text = if value != 0.0 && value.abs() < 1e-3 { format!("{value:.0e}") } else { plain(value) };
+    let text = if value != 0.0 && value.abs() < 1e-3 {
+        format!("{value:.0e}")
+    } else {
+        plain(value)
+    };
     text.replace('-', "−")
 }
 
@@ -153,16 +181,29 @@ mod tests {
 
     #[test]
     fn ticks_are_round_and_inside() {
-        assert_eq!(ticks(0.0, 1.0, 5.0), vec![0.0, 0.2, 0.4, 0.6000000000000001, 0.8, 1.0]);
+        assert_eq!(
+            ticks(0.0, 1.0, 5.0),
+            vec![0.0, 0.2, 0.4, 0.6000000000000001, 0.8, 1.0]
+        );
         assert_eq!(ticks(-3.0, 7.0, 2.0), vec![0.0, 5.0]);
         assert_eq!(ticks(2.0, 2.0, 5.0), vec![2.0]);
     }
 
     #[test]
     fn a_chart_without_points_and_one_with_a_single_point_have_finite_coordinates() {
-        let point = Point { at: [3.0, -2.0], shape: 7, class: "a", label: "<run>".into() };
+        let point = Point {
+            at: [3.0, -2.0],
+            shape: 7,
+            class: "a",
+            label: "<run>".into(),
+        };
         for points in [vec![], vec![point]] {
-            let svg = Chart { id: "c", points, ..Chart::default() }.svg();
+            let svg = Chart {
+                id: "c",
+                points,
+                ..Chart::default()
+            }
+            .svg();
             assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
             assert!(!svg.contains("<run>"));
         }

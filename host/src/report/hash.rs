@@ -19,15 +19,26 @@ pub fn of(campaign: &Campaign) -> String {
         hash.update([u8::from(run.direction == Direction::Ccw)]);
         let empty = Vec::new();
         let samples = &run.samples;
-        let head = [run.radius_m, run.feed_m_s, run.start_angle_rad, run.started_s.unwrap_or(f64::NAN)];
+        let head = [
+            run.radius_m,
+            run.feed_m_s,
+            run.start_angle_rad,
+            run.started_s.unwrap_or(f64::NAN),
+        ];
         bytes.clear();
-        for values in
-            [&head[..], &samples.angle_rad, &samples.deviation_m, samples.time_s.as_ref().unwrap_or(&empty)]
-        {
+        for values in [
+            &head[..],
+            &samples.angle_rad,
+            &samples.deviation_m,
+            samples.time_s.as_ref().unwrap_or(&empty),
+        ] {
             bytes.extend((values.len() as u64).to_le_bytes());
             bytes.extend(values.iter().flat_map(|v| v.to_le_bytes()));
         }
         hash.update(&bytes);
     }
-    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+    hash.finalize()
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect()
 }

@@ -54,30 +54,47 @@ impl Groups {
             words.push(if chunk.len() == 1 {
                 super::number::plain(first)
             } else {
-                format!("{}–{}", super::number::plain(first), super::number::plain(last))
+                format!(
+                    "{}–{}",
+                    super::number::plain(first),
+                    super::number::plain(last)
+                )
             });
         }
         Self { upper, words }
     }
 
     fn at(&self, value: f64) -> usize {
-        self.upper.partition_point(|upper| *upper < value).min(self.upper.len().saturating_sub(1))
+        self.upper
+            .partition_point(|upper| *upper < value)
+            .min(self.upper.len().saturating_sub(1))
     }
 }
 
 /// The map of a campaign.
 pub fn map(campaign: &Campaign, picture: &[RunPicture]) -> Map {
     let runs = || picture.iter().map(|p| &campaign.runs[p.index]);
-    let (radii, feeds) = (Groups::of(runs().map(|r| r.radius_m)), Groups::of(runs().map(|r| r.feed_m_s)));
+    let (radii, feeds) = (
+        Groups::of(runs().map(|r| r.radius_m)),
+        Groups::of(runs().map(|r| r.feed_m_s)),
+    );
     let mut sums = vec![vec![[0.0, 0.0, 0.0]; feeds.words.len()]; radii.words.len()];
     for (run, p) in runs().zip(picture) {
         let sum = &mut sums[radii.at(run.radius_m)][feeds.at(run.feed_m_s)];
-        for (sum, value) in sum.iter_mut().zip([p.rms_m[0].powi(2), p.rms_m[1].powi(2), 1.0]) {
+        for (sum, value) in sum
+            .iter_mut()
+            .zip([p.rms_m[0].powi(2), p.rms_m[1].powi(2), 1.0])
+        {
             *sum += value;
         }
     }
     let rms = |sum: &[f64; 3], k: usize| (sum[2] > 0.0).then(|| (sum[k] / sum[2]).sqrt() * 1e6);
-    let darkest = sums.iter().flatten().flat_map(|s| [rms(s, 0), rms(s, 1)]).flatten().fold(0.0, f64::max);
+    let darkest = sums
+        .iter()
+        .flatten()
+        .flat_map(|s| [rms(s, 0), rms(s, 1)])
+        .flatten()
+        .fold(0.0, f64::max);
     let cell = |um: f64| Cell {
         um: super::number::fixed(um, if darkest < 100.0 { 1 } else { 0 }),
         shade: (100.0 * um / darkest.max(f64::MIN_POSITIVE)).round() as u32,
@@ -90,7 +107,11 @@ pub fn map(campaign: &Campaign, picture: &[RunPicture]) -> Map {
             cells: [0, 1].map(|k| row.iter().map(|sum| rms(sum, k).map(cell)).collect()),
         })
         .collect();
-    Map { feeds: feeds.words, rows, darkest_um: darkest }
+    Map {
+        feeds: feeds.words,
+        rows,
+        darkest_um: darkest,
+    }
 }
 
 #[cfg(test)]
@@ -103,6 +124,14 @@ mod tests {
         let groups = Groups::of(values.iter().copied());
         assert!(groups.words.len() <= MOST);
         assert_eq!(groups.words[0], "1–4");
-        assert_eq!((groups.at(1e-3), groups.at(4e-3), groups.at(5e-3), groups.at(50e-3)), (0, 0, 1, 12));
+        assert_eq!(
+            (
+                groups.at(1e-3),
+                groups.at(4e-3),
+                groups.at(5e-3),
+                groups.at(50e-3)
+            ),
+            (0, 0, 1, 12)
+        );
     }
 }

@@ -33,14 +33,26 @@ pub fn json(campaign: &Campaign, picture: &[RunPicture]) -> String {
         let run = &campaign.runs[p.index];
         let [measured, before, after] = p.profile_m.each_ref().map(|profile| {
             // Tenths of a micrometre: the resolution of the best ballbars.
-            profile.iter().map(|v| v.map(|v| (v * 1e7).round() / 10.0)).collect()
+            profile
+                .iter()
+                .map(|v| v.map(|v| (v * 1e7).round() / 10.0))
+                .collect()
         });
         let direction = match run.direction {
             Direction::Ccw => "CCW",
             Direction::Cw => "CW",
         };
-        let profiles = Profiles { file: run.file.clone(), direction, measured, before, after };
-        match circles.iter_mut().find(|c| c.0 == run.radius_m && c.1 == run.feed_m_s) {
+        let profiles = Profiles {
+            file: run.file.clone(),
+            direction,
+            measured,
+            before,
+            after,
+        };
+        match circles
+            .iter_mut()
+            .find(|c| c.0 == run.radius_m && c.1 == run.feed_m_s)
+        {
             Some((_, _, circle)) => circle.runs.push(profiles),
             None => circles.push((
                 run.radius_m,
@@ -61,5 +73,7 @@ pub fn json(campaign: &Campaign, picture: &[RunPicture]) -> String {
     circles.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let circles: Vec<Circle> = circles.into_iter().map(|c| c.2).collect();
     // Numbers and strings always serialise; `<` would let a name end the script.
-    serde_json::to_string(&circles).unwrap_or_else(|_| "[]".into()).replace('<', "\\u003c")
+    serde_json::to_string(&circles)
+        .unwrap_or_else(|_| "[]".into())
+        .replace('<', "\\u003c")
 }

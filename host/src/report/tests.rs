@@ -7,24 +7,34 @@ use crate::simulation::{CircleTest, Instrument, Machine, Plan, PlannedTest, camp
 use giotto_shared::Direction;
 use quick_xml::events::Event;
 
-const HOSTILE: &str = "</script><script>alert('x')</script>\"&<img src=x onerror=alert(1)>{{ name }}";
+const HOSTILE: &str =
+    "</script><script>alert('x')</script>\"&<img src=x onerror=alert(1)>{{ name }}";
 
 fn measured(radii_m: &[f64], feeds_m_s: &[f64], samples: usize) -> (Campaign, Diagnosis) {
     let mut tests = Vec::new();
     for &radius_m in radii_m {
         for &feed_m_s in feeds_m_s {
             for direction in [Direction::Ccw, Direction::Cw] {
-                let test =
-                    CircleTest { samples: Some(samples), ..CircleTest::new(radius_m, feed_m_s, direction) };
+                let test = CircleTest {
+                    samples: Some(samples),
+                    ..CircleTest::new(radius_m, feed_m_s, direction)
+                };
                 tests.push(PlannedTest { test, timed: false });
             }
         }
     }
-    let servo = PositionLoop { kv_per_s: 40.0, feed_forward: 0.0 };
+    let servo = PositionLoop {
+        kv_per_s: 40.0,
+        feed_forward: 0.0,
+    };
     let plan = Plan {
         name: HOSTILE.into(),
         machine_name: HOSTILE.into(),
-        machine: Machine { servo: [servo; 2], squareness_rad: 60e-6, ..Machine::default() },
+        machine: Machine {
+            servo: [servo; 2],
+            squareness_rad: 60e-6,
+            ..Machine::default()
+        },
         instrument: Instrument::ballbar(),
         tests,
         shuffle: true,
@@ -39,8 +49,16 @@ fn measured(radii_m: &[f64], feeds_m_s: &[f64], samples: usize) -> (Campaign, Di
 fn elements(page: &str) -> Vec<(String, Vec<(String, String)>)> {
     let mut text = String::new();
     let mut rest = page;
-    while let Some(at) = ["<script", "<style"].iter().filter_map(|tag| rest.find(tag)).min() {
-        let end = if rest[at..].starts_with("<script") { "</script>" } else { "</style>" };
+    while let Some(at) = ["<script", "<style"]
+        .iter()
+        .filter_map(|tag| rest.find(tag))
+        .min()
+    {
+        let end = if rest[at..].starts_with("<script") {
+            "</script>"
+        } else {
+            "</style>"
+        };
         let open = at + rest[at..].find('>').unwrap() + 1;
         let close = open + rest[open..].find(end).unwrap();
         text.push_str(&rest[..open]);
@@ -83,21 +101,35 @@ fn element(e: &quick_xml::events::BytesStart<'_>) -> (String, Vec<(String, Strin
 fn the_page_is_well_formed_names_cannot_break_out_and_nothing_is_fetched() {
     let (campaign, diagnosis) = measured(&[0.1, 0.2], &[0.02, 0.1, 0.2], 400);
     let page = html(&campaign, &diagnosis).unwrap();
-    for scheme in ["http:", "https:", "//cdn", "url(", "@import", "fetch(", "XMLHttp"] {
+    for scheme in [
+        "http:", "https:", "//cdn", "url(", "@import", "fetch(", "XMLHttp",
+    ] {
         assert!(!page.contains(scheme), "{scheme}");
     }
-    assert_eq!(page.matches("<script").count(), 2, "the data and the plot, no more");
+    assert_eq!(
+        page.matches("<script").count(),
+        2,
+        "the data and the plot, no more"
+    );
     assert!(!page.contains("<img"));
-    assert!(page.contains("&lt;img src=x"), "the name is shown as it is written");
+    assert!(
+        page.contains("&lt;img src=x"),
+        "the name is shown as it is written"
+    );
     let elements = elements(&page);
     for (name, attributes) in &elements {
         for (key, value) in attributes {
             assert!(!key.starts_with("on"), "{name} {key}={value}");
             assert!(key != "src", "{name} {key}={value}");
-            assert!(key != "href" || value.starts_with('#'), "{name} {key}={value}");
+            assert!(
+                key != "href" || value.starts_with('#'),
+                "{name} {key}={value}"
+            );
         }
     }
-    let get = |e: &[(String, String)], key: &str| e.iter().find(|(k, _)| k == key).map(|(_, v)| v.clone());
+    let get = |e: &[(String, String)], key: &str| {
+        e.iter().find(|(k, _)| k == key).map(|(_, v)| v.clone())
+    };
     let ids: Vec<String> = elements.iter().filter_map(|(_, a)| get(a, "id")).collect();
     let mut once = ids.clone();
     once.sort();
@@ -112,7 +144,11 @@ fn the_page_is_well_formed_names_cannot_break_out_and_nothing_is_fetched() {
         }
     }
     let count = |tag: &str| elements.iter().filter(|(name, _)| name == tag).count();
-    assert_eq!(count("table"), count("caption"), "every table has a caption");
+    assert_eq!(
+        count("table"),
+        count("caption"),
+        "every table has a caption"
+    );
     assert_eq!(count("h1"), 1);
 }
 

@@ -31,7 +31,10 @@ fn misfit(d: &Diagnosis, runs: usize) -> String {
 
 fn cause(d: &Diagnosis) -> String {
     let rest = if d.unexplained.present {
-        format!("; {} µm rms match no cause in the list", fixed(d.unexplained.rms_um, 2))
+        format!(
+            "; {} µm rms match no cause in the list",
+            fixed(d.unexplained.rms_um, 2)
+        )
     } else {
         String::new()
     };
@@ -47,7 +50,14 @@ fn cause(d: &Diagnosis) -> String {
     let others: Vec<String> = d.findings[1..]
         .iter()
         .take(3)
-        .map(|f| format!("{}{} ({} %)", f.cause.model().words().name, axis(f), fixed(f.share_percent, 0)))
+        .map(|f| {
+            format!(
+                "{}{} ({} %)",
+                f.cause.model().words().name,
+                axis(f),
+                fixed(f.share_percent, 0)
+            )
+        })
         .collect();
     let more = match others.len() {
         0 => String::new(),
@@ -92,15 +102,22 @@ fn action(d: &Diagnosis) -> String {
     };
     let text = format!("{gain}{what}.");
     let mut letters = text.chars();
-    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+    letters.next().map_or(String::new(), |first| {
+        first.to_uppercase().chain(letters).collect()
+    })
 }
 
 /// Units with their proper letters.
 pub fn unit(unit: &str) -> String {
-    unit.replace("um", "µm").replace("^2", "²").replace("^4", "⁴")
+    unit.replace("um", "µm")
+        .replace("^2", "²")
+        .replace("^4", "⁴")
 }
 
 /// Names of look-alikes for a person; what is no cause of the list stays as it is written.
 pub fn look_alike(id: &str) -> String {
-    Cause::from_id(id).map_or_else(|| id.replace('_', " "), |cause| cause.model().words().name.to_string())
+    Cause::from_id(id).map_or_else(
+        || id.replace('_', " "),
+        |cause| cause.model().words().name.to_string(),
+    )
 }

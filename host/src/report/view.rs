@@ -89,7 +89,9 @@ impl View {
     /// Of a campaign and its diagnosis.
     pub fn of(campaign: &Campaign, d: &Diagnosis) -> Self {
         let radii = radii(campaign);
-        let iso = analysis::of_campaign(campaign).map(|report| report.iso230_4).unwrap_or_default();
+        let iso = analysis::of_campaign(campaign)
+            .map(|report| report.iso230_4)
+            .unwrap_or_default();
         Self {
             name: campaign.name.clone(),
             machine: campaign.machine.clone(),
@@ -109,7 +111,10 @@ impl View {
             radii: radii
                 .iter()
                 .enumerate()
-                .map(|(i, r)| Legend { shape: shape(i), radius: plain(r * 1e3) })
+                .map(|(i, r)| Legend {
+                    shape: shape(i),
+                    radius: plain(r * 1e3),
+                })
                 .collect(),
             iso: iso.iter().map(iso_row).collect(),
             runs: runs(campaign, d),
@@ -138,9 +143,16 @@ fn ways(direction: Direction) -> &'static str {
 
 fn grid(campaign: &Campaign, radii: &[f64]) -> String {
     let feeds = || campaign.runs.iter().map(|r| r.feed_m_s * 1e3);
-    let (low, high) = (feeds().fold(f64::INFINITY, f64::min), feeds().fold(0.0, f64::max));
+    let (low, high) = (
+        feeds().fold(f64::INFINITY, f64::min),
+        feeds().fold(0.0, f64::max),
+    );
     let shown: Vec<String> = radii.iter().take(8).map(|r| plain(r * 1e3)).collect();
-    let more = if radii.len() > 8 { format!(" and {} more", radii.len() - 8) } else { String::new() };
+    let more = if radii.len() > 8 {
+        format!(" and {} more", radii.len() - 8)
+    } else {
+        String::new()
+    };
     let of = |d| campaign.runs.iter().filter(|r| r.direction == d).count();
     format!(
         "{} runs ({} CCW, {} CW); radius {}{more} mm; feed {} to {} mm/s",
@@ -165,11 +177,19 @@ fn cause(f: &Finding) -> CauseView {
         share_number: f.share_percent,
         probability: fixed(f.probability, 3),
         rms: fixed(f.rms_um, 2),
-        params: f.params.iter().map(|(k, v)| [k.replace('_', " "), number(*v)]).collect(),
+        params: f
+            .params
+            .iter()
+            .map(|(k, v)| [k.replace('_', " "), number(*v)])
+            .collect(),
         what: words.what,
         usual: words.usual,
         adjust: words.adjust,
-        look_alikes: f.indistinguishable_from.iter().map(|id| look_alike(id)).collect(),
+        look_alikes: f
+            .indistinguishable_from
+            .iter()
+            .map(|id| look_alike(id))
+            .collect(),
         next: f.next_measurement.clone(),
         compensable: f.compensable,
         why_not: words.not_compensable,
@@ -202,7 +222,10 @@ fn gain(d: &Diagnosis) -> Option<GainView> {
         ("β1 and β2 of the paper", g.beta_rms_um),
         ("the simulation as it stood", g.baseline_rms_um),
         ("the extended simulation", g.extended_rms_um),
-        ("noise and scatter between runs: a perfect model", g.floor_rms_um),
+        (
+            "noise and scatter between runs: a perfect model",
+            g.floor_rms_um,
+        ),
     ]
     .map(|(name, um)| [name.to_string(), fixed(um, 2)]);
     Some(GainView {
@@ -266,7 +289,11 @@ fn collapse(campaign: &Campaign, d: &Diagnosis, radii: &[f64]) -> String {
             Point {
                 at,
                 shape: shape_of(radii, run.radius_m),
-                class: if run.direction == Direction::Ccw { "ccw" } else { "cw" },
+                class: if run.direction == Direction::Ccw {
+                    "ccw"
+                } else {
+                    "cw"
+                },
                 label: format!(
                     "{}: R {} mm, {} mm/s, {}: ω² {} rad²/s², ln(Rm/R) {} · 10⁻³",
                     run.file,
@@ -285,7 +312,10 @@ fn collapse(campaign: &Campaign, d: &Diagnosis, radii: &[f64]) -> String {
         .iter()
         .map(|p| {
             let radius = campaign.runs[p.index].radius_m;
-            [p.omega_rad_s.powi(2), ratio(p.size_m[0] - p.size_m[1], radius)]
+            [
+                p.omega_rad_s.powi(2),
+                ratio(p.size_m[0] - p.size_m[1], radius),
+            ]
         })
         .collect();
     before.sort_by(|a, b| a[0].total_cmp(&b[0]));
@@ -310,9 +340,11 @@ fn collapse(campaign: &Campaign, d: &Diagnosis, radii: &[f64]) -> String {
 
 fn residuals(campaign: &Campaign, d: &Diagnosis, radii: &[f64]) -> String {
     let mut points = Vec::new();
-    for (k, class, words) in
-        [(0, "measured", "measured"), (1, "before", "left before"), (2, "after", "left after")]
-    {
+    for (k, class, words) in [
+        (0, "measured", "measured"),
+        (1, "before", "left before"),
+        (2, "after", "left after"),
+    ] {
         points.extend(d.picture.iter().map(|p| {
             let run = &campaign.runs[p.index];
             let at = [run.feed_m_s.powi(2) / run.radius_m, p.size_m[k] * 1e6];

@@ -28,7 +28,12 @@ pub(super) struct AxisPoint {
 impl AxisPoint {
     pub(super) fn new([drive_m, velocity_m_s]: [f64; 2], memory: Option<&Memory>) -> Self {
         let error_m = memory.map_or(0.0, |m| m.error_m(drive_m, velocity_m_s));
-        Self { drive_m, velocity_m_s, error_m, sign: memory.map_or(0.0, |m| m.sign) }
+        Self {
+            drive_m,
+            velocity_m_s,
+            error_m,
+            sign: memory.map_or(0.0, |m| m.sign),
+        }
     }
 }
 

@@ -27,7 +27,14 @@ impl Chain {
     /// command, as is the dead time (linear, time-invariant elements may change places).
     pub(super) fn new(machine: &Machine, axis: usize) -> Self {
         let zero = State::zeros();
-        let mut chain = Self { a: SMatrix::zeros(), b: zero, c: zero, d: 1.0, rest: zero, used: 0 };
+        let mut chain = Self {
+            a: SMatrix::zeros(),
+            b: zero,
+            c: zero,
+            d: 1.0,
+            rest: zero,
+            used: 0,
+        };
         if let AccDec::Exponential(t) = machine.acc_dec {
             chain.first_order(1.0 / t, 0.0);
         }
@@ -93,8 +100,12 @@ impl Discrete {
     pub(super) fn new(chain: Chain, h: f64) -> Self {
         // Exponential of the chain driven by a cubic: u and its three derivatives (in steps) are states too.
         let mut augmented = SMatrix::<f64, 8, 8>::zeros();
-        augmented.fixed_view_mut::<N, N>(0, 0).copy_from(&(chain.a * h));
-        augmented.fixed_view_mut::<N, 1>(0, N).copy_from(&(chain.b * h));
+        augmented
+            .fixed_view_mut::<N, N>(0, 0)
+            .copy_from(&(chain.a * h));
+        augmented
+            .fixed_view_mut::<N, 1>(0, N)
+            .copy_from(&(chain.b * h));
         for k in N..7 {
             augmented[(k, k + 1)] = 1.0;
         }
@@ -105,9 +116,17 @@ impl Discrete {
         let g: [State; 4] = std::array::from_fn(|k| e.fixed_view::<N, 1>(0, N + k).into_owned());
         // Cubic in s: p0 + m0·s + (3Δ − 2m0 − m1)s² + (m0 + m1 − 2Δ)s³, derivatives at s = 0 by factorials.
         let (g2, g3) = (g[2] * 2.0, g[3] * 6.0);
-        let gamma =
-            [g[0] - g2 * 3.0 + g3 * 2.0, (g[1] - g2 * 2.0 + g3) * h, g2 * 3.0 - g3 * 2.0, (g3 - g2) * h];
-        Self { phi: e.fixed_view::<N, N>(0, 0).into_owned(), gamma, chain }
+        let gamma = [
+            g[0] - g2 * 3.0 + g3 * 2.0,
+            (g[1] - g2 * 2.0 + g3) * h,
+            g2 * 3.0 - g3 * 2.0,
+            (g3 - g2) * h,
+        ];
+        Self {
+            phi: e.fixed_view::<N, N>(0, 0).into_owned(),
+            gamma,
+            chain,
+        }
     }
 
     /// The chain.
@@ -119,7 +138,12 @@ impl Discrete {
     pub(super) fn at_rest<const S: usize>(&self, position_m: f64) -> Stepper<S, 4> {
         let (ca, cb) = self.slope();
         let look = [[self.chain.d, 0.0], [cb, self.chain.d]];
-        self.stepper(self.gamma, [self.chain.c, ca], look, self.chain.rest * position_m)
+        self.stepper(
+            self.gamma,
+            [self.chain.c, ca],
+            look,
+            self.chain.rest * position_m,
+        )
     }
 
     /// In the steady state under the command Re(`phasor`·e^{iψ}), which turns by `step_rad` a step and by `omega_rad_s`
@@ -140,19 +164,37 @@ impl Discrete {
             .gamma
             .iter()
             .zip(weights)
-            .fold(SVector::zeros(), |sum: SVector<_, N>, (g, w)| sum + g.map(|g| Complex::from(g) * w));
+            .fold(SVector::zeros(), |sum: SVector<_, N>, (g, w)| {
+                sum + g.map(|g| Complex::from(g) * w)
+            });
         // z·turn = Φz + force, which a chain that settles always has an answer to.
-        let steps = SMatrix::<Complex<f64>, N, N>::from_diagonal_element(turn) - self.phi.map(Complex::from);
-        let steady = steps.lu().solve(&force).unwrap_or_else(|| SVector::repeat(Complex::from(f64::NAN)));
+        let steps = SMatrix::<Complex<f64>, N, N>::from_diagonal_element(turn)
+            - self.phi.map(Complex::from);
+        let steady = steps
+            .lu()
+            .solve(&force)
+            .unwrap_or_else(|| SVector::repeat(Complex::from(f64::NAN)));
         let (ca, cb) = self.slope();
-        let look = [phasor * self.chain.d, phasor * cb + here_slope * self.chain.d].map(parts);
+        let look = [
+            phasor * self.chain.d,
+            phasor * cb + here_slope * self.chain.d,
+        ]
+        .map(parts);
         let state = steady.map(|z| z.re * start[0] - z.im * start[1]);
-        self.stepper([force.map(|w| w.re), force.map(|w| -w.im)], [self.chain.c, ca], look, state)
+        self.stepper(
+            [force.map(|w| w.re), force.map(|w| -w.im)],
+            [self.chain.c, ca],
+            look,
+            state,
+        )
     }
 
     /// ẏ = ca·x + cb·u + d·u̇: `(ca, cb)`.
     fn slope(&self) -> (State, f64) {
-        (self.chain.a.transpose() * self.chain.c, self.chain.c.dot(&self.chain.b))
+        (
+            self.chain.a.transpose() * self.chain.c,
+            self.chain.c.dot(&self.chain.b),
+        )
     }
 
     fn stepper<const S: usize, const U: usize>(
@@ -164,7 +206,13 @@ impl Discrete {
     ) -> Stepper<S, U> {
         let short = |v: State| std::array::from_fn(|i| v[i]);
         let phi = std::array::from_fn(|j| short(self.phi.column(j).into_owned()));
-        Stepper { phi, force: force.map(short), see: see.map(short), look, x: short(x) }
+        Stepper {
+            phi,
+            force: force.map(short),
+            see: see.map(short),
+            look,
+            x: short(x),
+        }
     }
 }
 
@@ -192,7 +240,9 @@ impl<const S: usize, const U: usize> Stepper<S, U> {
         let mut next = [0.0; S];
         let columns = self.force.iter().zip(u).chain(self.phi.iter().zip(self.x));
         for (column, by) in columns {
-            next.iter_mut().zip(column).for_each(|(to, weight)| *to += weight * by);
+            next.iter_mut()
+                .zip(column)
+                .for_each(|(to, weight)| *to += weight * by);
         }
         self.x = next;
     }
@@ -202,7 +252,10 @@ impl<const S: usize, const U: usize> Stepper<S, U> {
     pub(super) fn look(&self, u: [f64; 2]) -> [f64; 2] {
         std::array::from_fn(|k| {
             let command = self.look[k][0] * u[0] + self.look[k][1] * u[1];
-            self.x.iter().zip(&self.see[k]).fold(command, |sum, (x, weight)| sum + x * weight)
+            self.x
+                .iter()
+                .zip(&self.see[k])
+                .fold(command, |sum, (x, weight)| sum + x * weight)
         })
     }
 }
@@ -215,8 +268,14 @@ mod tests {
     fn full() -> Machine {
         Machine {
             acc_dec: AccDec::Exponential(0.03),
-            servo: [PositionLoop { kv_per_s: 40.0, feed_forward: 0.3 }; 2],
-            mechanics: [Some(SecondOrder { omega_n_rad_s: 60.0, zeta: 0.4 }); 2],
+            servo: [PositionLoop {
+                kv_per_s: 40.0,
+                feed_forward: 0.3,
+            }; 2],
+            mechanics: [Some(SecondOrder {
+                omega_n_rad_s: 60.0,
+                zeta: 0.4,
+            }); 2],
             ..Machine::default()
         }
     }
@@ -250,7 +309,12 @@ mod tests {
         let rate = |t: f64, z: [f64; 4]| {
             let [v, _] = command(t);
             let out = 0.3 * z[0] + 0.7 * z[1];
-            [(v - z[0]) / 0.03, 40.0 * (z[0] - z[1]), z[3], 3600.0 * (out - z[2]) - 48.0 * z[3]]
+            [
+                (v - z[0]) / 0.03,
+                40.0 * (z[0] - z[1]),
+                z[3],
+                3600.0 * (out - z[2]) - 48.0 * z[3],
+            ]
         };
         let add = |z: [f64; 4], k: [f64; 4], s: f64| std::array::from_fn(|i| z[i] + s * k[i]);
         let (mut z, n) = ([0.1, 0.1, 0.1, 0.0], 4000);
@@ -261,9 +325,14 @@ mod tests {
             let k2 = rate(t + dt / 2.0, add(z, k1, dt / 2.0));
             let k3 = rate(t + dt / 2.0, add(z, k2, dt / 2.0));
             let k4 = rate(t + dt, add(z, k3, dt));
-            z = std::array::from_fn(|i| z[i] + dt / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]));
+            z = std::array::from_fn(|i| {
+                z[i] + dt / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
+            });
         }
-        assert!((y[0] - z[2]).abs() < 1e-12 && (y[1] - z[3]).abs() < 1e-10, "{y:?} {z:?}");
+        assert!(
+            (y[0] - z[2]).abs() < 1e-12 && (y[1] - z[3]).abs() < 1e-10,
+            "{y:?} {z:?}"
+        );
     }
 
     /// Oracle: the same steps from rest until nothing is left of the start.
@@ -299,8 +368,14 @@ mod tests {
             worst
         }
         let machine = full();
-        let no_mechanics = Machine { mechanics: [None; 2], ..full() };
-        let no_filter = Machine { acc_dec: AccDec::None, ..full() };
+        let no_mechanics = Machine {
+            mechanics: [None; 2],
+            ..full()
+        };
+        let no_filter = Machine {
+            acc_dec: AccDec::None,
+            ..full()
+        };
         let ideal = Machine::default();
         let all = [
             departure::<4>(&machine),

@@ -50,7 +50,15 @@ impl CircleTest {
     /// A circle about the origin from angle 0 at campaign time 0.
     pub fn new(radius_m: f64, feed_m_s: f64, direction: Direction) -> Self {
         let (start_angle_rad, started_s) = (0.0, 0.0);
-        Self { radius_m, feed_m_s, direction, start_angle_rad, started_s, centre_m: [0.0; 2], samples: None }
+        Self {
+            radius_m,
+            feed_m_s,
+            direction,
+            start_angle_rad,
+            started_s,
+            centre_m: [0.0; 2],
+            samples: None,
+        }
     }
 
     /// The test that a run records, sample for sample.
@@ -90,9 +98,14 @@ impl Trace {
         Self {
             radius_m: test.radius_m,
             turn_s,
-            angle_rad: (0..position_m.len()).map(|i| test.start_angle_rad + step * i as f64).collect(),
+            angle_rad: (0..position_m.len())
+                .map(|i| test.start_angle_rad + step * i as f64)
+                .collect(),
             // Lengths of machines neither overflow nor vanish when squared: no need of hypot.
-            deviation_m: position_m.iter().map(|[x, y]| (x * x + y * y).sqrt() - test.radius_m).collect(),
+            deviation_m: position_m
+                .iter()
+                .map(|[x, y]| (x * x + y * y).sqrt() - test.radius_m)
+                .collect(),
             position_m,
         }
     }
@@ -103,7 +116,11 @@ impl Trace {
         Samples {
             angle_rad: self.angle_rad.clone(),
             deviation_m: self.deviation_m.clone(),
-            time_s: Some((0..self.deviation_m.len()).map(|i| step * i as f64).collect()),
+            time_s: Some(
+                (0..self.deviation_m.len())
+                    .map(|i| step * i as f64)
+                    .collect(),
+            ),
             angle_inferred: true,
         }
     }
@@ -125,16 +142,29 @@ pub fn circle(machine: &Machine, test: &CircleTest) -> Trace {
         None => test.feed_m_s,
     };
     let turn_s = TAU * test.radius_m / feed;
-    let samples = test.samples.unwrap_or_else(|| ballbar_samples(turn_s)).max(1);
+    let samples = test
+        .samples
+        .unwrap_or_else(|| ballbar_samples(turn_s))
+        .max(1);
     if !(turn_s.is_finite() && turn_s > 0.0 && test.radius_m > 0.0 && machine.check().is_ok()) {
         return Trace::new(test, turn_s, vec![[f64::NAN; 2]; samples]);
     }
     let omega = f64::from(test.direction.sign()) * feed / test.radius_m;
-    let lap = Lap { machine, test, omega_rad_s: omega, turn_s, samples };
+    let lap = Lap {
+        machine,
+        test,
+        omega_rad_s: omega,
+        turn_s,
+        samples,
+    };
     let chord_s = machine
         .interpolation_s
         .filter(|dt| (feed * dt).powi(2) / (8.0 * test.radius_m) > NEGLIGIBLE_SAGITTA_M);
-    Trace::new(test, turn_s, chord_s.map_or_else(|| lap.along_arc(), |dt| lap.along_chords(dt)))
+    Trace::new(
+        test,
+        turn_s,
+        chord_s.map_or_else(|| lap.along_arc(), |dt| lap.along_chords(dt)),
+    )
 }
 
 /// One turn of the tool.
@@ -152,8 +182,15 @@ impl Lap<'_> {
     }
 
     fn tool(&self, sample: usize, axes: [AxisPoint; 2]) -> [f64; 2] {
-        let place = Place { centre_m: self.test.centre_m };
-        geometry::tool(self.machine, place, self.test.started_s + self.seconds(sample), axes)
+        let place = Place {
+            centre_m: self.test.centre_m,
+        };
+        geometry::tool(
+            self.machine,
+            place,
+            self.test.started_s + self.seconds(sample),
+            axes,
+        )
     }
 
     /// Steps from sample to sample.
@@ -167,15 +204,26 @@ impl Lap<'_> {
 
     /// The controller commands the arc itself. Both axes go piece by piece, so that what lies between is never far.
     fn along_arc(&self) -> Vec<[f64; 2]> {
-        let (machine, samples, every, step_s) = (self.machine, self.samples, self.every(), self.step_s());
+        let (machine, samples, every, step_s) =
+            (self.machine, self.samples, self.every(), self.step_s());
         let step_rad = TAU.copysign(self.omega_rad_s) / (samples * every) as f64;
         let turns = Turns::new(self.test.start_angle_rad, step_rad);
         let (radius_m, omega_rad_s) = (self.test.radius_m, self.omega_rad_s);
-        let round = Round { machine, turns: &turns, radius_m, omega_rad_s, step_s };
+        let round = Round {
+            machine,
+            turns: &turns,
+            radius_m,
+            omega_rad_s,
+            step_s,
+        };
         let [x, y] = [0, 1].map(|axis| Chain::new(machine, axis));
         let same = x == y;
         let x = Discrete::new(x, step_s);
-        let y = if same { x.clone() } else { Discrete::new(y, step_s) };
+        let y = if same {
+            x.clone()
+        } else {
+            Discrete::new(y, step_s)
+        };
         let mut axes = [orbit::axis(round, 0, &x), orbit::axis(round, 1, &y)];
         let piece = samples.min((PIECE / every).max(1));
         let mut waves = vec![[0.0; 2]; piece * every];
@@ -200,24 +248,49 @@ impl Lap<'_> {
         let axes = [0, 1].map(|axis| {
             let grid = self.grid(axis, step_s);
             let knots = self.chords(axis, dt, grid);
-            axis::motion(self.machine, axis, &knots, grid, (0..self.samples).map(|i| self.seconds(i)))
+            axis::motion(
+                self.machine,
+                axis,
+                &knots,
+                grid,
+                (0..self.samples).map(|i| self.seconds(i)),
+            )
         });
-        axes[0].iter().zip(&axes[1]).enumerate().map(|(i, (x, y))| self.tool(i, [*x, *y])).collect()
+        axes[0]
+            .iter()
+            .zip(&axes[1])
+            .enumerate()
+            .map(|(i, (x, y))| self.tool(i, [*x, *y]))
+            .collect()
     }
 
     /// Steps from rest, until nothing is left of the start and what remembers reversals has seen one, then the lap.
     fn grid(&self, axis: usize, step_s: f64) -> Grid {
         let machine = self.machine;
-        let reversal_s = if Memory::needed(machine, axis) { ONE_REVERSAL_TURNS * self.turn_s } else { 0.0 };
+        let reversal_s = if Memory::needed(machine, axis) {
+            ONE_REVERSAL_TURNS * self.turn_s
+        } else {
+            0.0
+        };
         let settling_s = RUN_IN_TIME_CONSTANTS * machine.settling_s(axis);
-        let before = ((machine.dead_time_s[axis] + settling_s + reversal_s) / step_s).min(MAX_STEPS).ceil();
+        let before = ((machine.dead_time_s[axis] + settling_s + reversal_s) / step_s)
+            .min(MAX_STEPS)
+            .ceil();
         let lap = (self.turn_s / step_s).min(MAX_STEPS).ceil();
-        Grid { start_s: -before * step_s, step_s, steps: before as usize + lap as usize }
+        Grid {
+            start_s: -before * step_s,
+            step_s,
+            steps: before as usize + lap as usize,
+        }
     }
 
     /// Set-points of the interpolator, one of them at t = 0, joined by chords.
     fn chords(&self, axis: usize, dt: f64, grid: Grid) -> Knots {
-        let window = if let AccDec::MovingAverage(t) = self.machine.acc_dec { t } else { 0.0 };
+        let window = if let AccDec::MovingAverage(t) = self.machine.acc_dec {
+            t
+        } else {
+            0.0
+        };
         let before = ((window - grid.start_s) / dt).ceil() + 1.0;
         let after = ((grid.start_s + grid.step_s * grid.steps as f64) / dt).ceil() + 1.0;
         let turns = Turns::new(self.test.start_angle_rad, self.omega_rad_s * dt);

@@ -12,12 +12,20 @@ fn run(machine: &Machine, radius: f64, feed: f64, direction: Direction) -> Trace
 }
 
 fn loops(kv_per_s: f64, feed_forward: f64) -> Machine {
-    Machine { servo: [PositionLoop { kv_per_s, feed_forward }; 2], ..Machine::default() }
+    Machine {
+        servo: [PositionLoop {
+            kv_per_s,
+            feed_forward,
+        }; 2],
+        ..Machine::default()
+    }
 }
 
 fn grid() -> impl Iterator<Item = (f64, f64)> {
     let feeds = [0.02, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.7];
-    [0.1, 0.15, 0.3].into_iter().flat_map(move |r| feeds.into_iter().map(move |f| (r, f)))
+    [0.1, 0.15, 0.3]
+        .into_iter()
+        .flat_map(move |r| feeds.into_iter().map(move |f| (r, f)))
 }
 
 /// Largest departure of every sample of every circle from `law(R, f)`.
@@ -54,13 +62,19 @@ fn gain(machine: &Machine, omega: f64) -> f64 {
 fn linear_chain_is_its_transfer_function() {
     let m = Machine {
         acc_dec: AccDec::MovingAverage(0.04),
-        mechanics: [Some(SecondOrder { omega_n_rad_s: 38.0, zeta: 0.72 }); 2],
+        mechanics: [Some(SecondOrder {
+            omega_n_rad_s: 38.0,
+            zeta: 0.72,
+        }); 2],
         dead_time_s: [0.012; 2],
         ..loops(50.0, 0.4)
     };
     let error = worst(&m, |r, f| r * (gain(&m, f / r) - 1.0));
     assert!(error < 1e-9, "{error:e}");
-    let m = Machine { acc_dec: AccDec::Exponential(0.03), ..loops(50.0, 0.0) };
+    let m = Machine {
+        acc_dec: AccDec::Exponential(0.03),
+        ..loops(50.0, 0.0)
+    };
     let error = worst(&m, |r, f| r * (gain(&m, f / r) - 1.0));
     assert!(error < 1e-9, "{error:e}");
 }
@@ -69,7 +83,10 @@ fn linear_chain_is_its_transfer_function() {
 #[test]
 fn eq_12_and_13() {
     let (kv, t) = (300.0, 0.004);
-    let both = Machine { acc_dec: AccDec::Exponential(t), ..loops(kv, 0.0) };
+    let both = Machine {
+        acc_dec: AccDec::Exponential(t),
+        ..loops(kv, 0.0)
+    };
     let error = worst(&both, |r, f| -0.5 * (t * t + 1.0 / (kv * kv)) * f * f / r);
     assert!(error < TENTH_UM, "{error:e}");
     let cumulants = worst(&both, |r, f| {
@@ -78,7 +95,9 @@ fn eq_12_and_13() {
     });
     assert!(cumulants < TENTH_UM, "{cumulants:e}");
     for a in [0.0, 0.5, 0.9] {
-        let error = worst(&loops(kv, a), |r, f| -0.5 * (1.0 - a * a) / (kv * kv) * f * f / r);
+        let error = worst(&loops(kv, a), |r, f| {
+            -0.5 * (1.0 - a * a) / (kv * kv) * f * f / r
+        });
         assert!(error < TENTH_UM, "{a}: {error:e}");
     }
 }
@@ -91,25 +110,45 @@ fn cumulants_of_every_element() {
     let rows = [
         (loops(kv, 0.0), kv.powi(-2), 6.0 * kv.powi(-4)),
         (
-            Machine { acc_dec: AccDec::Exponential(1.0 / kv), ..Machine::default() },
+            Machine {
+                acc_dec: AccDec::Exponential(1.0 / kv),
+                ..Machine::default()
+            },
             kv.powi(-2),
             6.0 * kv.powi(-4),
         ),
-        (loops(kv, a), (1.0 - a * a) * kv.powi(-2), 6.0 * (1.0 - a.powi(4)) * kv.powi(-4)),
         (
-            Machine { acc_dec: AccDec::MovingAverage(t), ..Machine::default() },
+            loops(kv, a),
+            (1.0 - a * a) * kv.powi(-2),
+            6.0 * (1.0 - a.powi(4)) * kv.powi(-4),
+        ),
+        (
+            Machine {
+                acc_dec: AccDec::MovingAverage(t),
+                ..Machine::default()
+            },
             t * t / 12.0,
             -t.powi(4) / 120.0,
         ),
         (
             Machine {
-                mechanics: [Some(SecondOrder { omega_n_rad_s: wn, zeta: z }); 2],
+                mechanics: [Some(SecondOrder {
+                    omega_n_rad_s: wn,
+                    zeta: z,
+                }); 2],
                 ..Machine::default()
             },
             -2.0 * (1.0 - 2.0 * z * z) / (wn * wn),
             12.0 * (8.0 * z.powi(4) - 8.0 * z * z + 1.0) / wn.powi(4),
         ),
-        (Machine { dead_time_s: [0.05; 2], ..Machine::default() }, 0.0, 0.0),
+        (
+            Machine {
+                dead_time_s: [0.05; 2],
+                ..Machine::default()
+            },
+            0.0,
+            0.0,
+        ),
     ];
     for (machine, k2, k4) in rows {
         let error = worst(&machine, |r, f| {
@@ -124,18 +163,30 @@ fn cumulants_of_every_element() {
 #[test]
 fn chords_lie_inside() {
     let dt = 0.012;
-    let machine = Machine { interpolation_s: Some(dt), ..Machine::default() };
+    let machine = Machine {
+        interpolation_s: Some(dt),
+        ..Machine::default()
+    };
     for (r, f) in grid().filter(|(_, f)| *f >= 0.1) {
         let trace = run(&machine, r, f, Ccw);
         let step = (f * dt).powi(2) / r;
         let deepest = trace.deviation_m.iter().copied().fold(0.0, f64::min);
         assert!((trace.mean_deviation_m() + step / 12.0).abs() < 0.01 * step / 12.0 + 1e-9);
-        assert!(deepest >= -step / 8.0 * 1.001 && deepest < -step / 8.0 * 0.98, "{deepest:e} {step:e}");
+        assert!(
+            deepest >= -step / 8.0 * 1.001 && deepest < -step / 8.0 * 0.98,
+            "{deepest:e} {step:e}"
+        );
         assert!(trace.deviation_m.iter().all(|d| *d < 1e-12));
     }
     // A loop behind the interpolator smooths the scallops and keeps their mean.
-    let smooth = Machine { interpolation_s: Some(dt), ..loops(60.0, 0.0) };
-    let (with, without) = (run(&smooth, 0.1, 0.7, Ccw), run(&loops(60.0, 0.0), 0.1, 0.7, Ccw));
+    let smooth = Machine {
+        interpolation_s: Some(dt),
+        ..loops(60.0, 0.0)
+    };
+    let (with, without) = (
+        run(&smooth, 0.1, 0.7, Ccw),
+        run(&loops(60.0, 0.0), 0.1, 0.7, Ccw),
+    );
     let mean = with.mean_deviation_m() - without.mean_deviation_m();
     let inside = (0.7 * dt).powi(2) / 1.2 * gain(&loops(60.0, 0.0), 7.0);
     assert!((mean + inside).abs() < TENTH_UM, "{mean:e} {inside:e}");
@@ -144,7 +195,10 @@ fn chords_lie_inside() {
 #[test]
 fn feed_clamp_saturates_the_radius_and_stretches_the_turn() {
     let (kv, limit) = (60.0_f64, 1.0);
-    let machine = Machine { centripetal_limit_m_s2: Some(limit), ..loops(kv, 0.0) };
+    let machine = Machine {
+        centripetal_limit_m_s2: Some(limit),
+        ..loops(kv, 0.0)
+    };
     let trace = run(&machine, 0.1, 0.7, Ccw);
     let omega = (limit / 0.1_f64).sqrt();
     assert!((trace.turn_s - TAU / omega).abs() < 1e-12);
@@ -168,18 +222,37 @@ fn departure(machine: &Machine, radius: f64, feed: f64, law: impl Fn(f64, f64) -
 #[test]
 fn geometry_has_its_profiles() {
     let r = 0.15;
-    let square = Machine { squareness_rad: 80e-6, ..Machine::default() };
+    let square = Machine {
+        squareness_rad: 80e-6,
+        ..Machine::default()
+    };
     assert!(departure(&square, r, 0.1, |th, _| 0.5 * 80e-6 * r * (2.0 * th).sin()) < 1e-9);
-    let scale = Machine { scale: [60e-6, -40e-6], ..Machine::default() };
+    let scale = Machine {
+        scale: [60e-6, -40e-6],
+        ..Machine::default()
+    };
     let law = |th: f64, _: f64| 0.5 * r * 20e-6 + 0.5 * r * 100e-6 * (2.0 * th).cos();
     assert!(departure(&scale, r, 0.1, law) < 1e-9);
-    let bow = Machine { straightness_per_m: [1e-3, 0.0], ..Machine::default() };
+    let bow = Machine {
+        straightness_per_m: [1e-3, 0.0],
+        ..Machine::default()
+    };
     let law = |th: f64, _: f64| 1e-3 * r * r / 4.0 * (th.sin() + (3.0 * th).sin());
     assert!(departure(&bow, r, 0.1, law) < 5e-9);
-    let offset = Machine { radius_offset_m: -12e-6, ..Machine::default() };
+    let offset = Machine {
+        radius_offset_m: -12e-6,
+        ..Machine::default()
+    };
     assert!(departure(&offset, r, 0.1, |_, _| -12e-6) < 1e-12);
-    let cyclic = Cyclic { amplitude_m: 3e-6, pitch_m: 0.02, phase_rad: 0.7 };
-    let cyclic = Machine { cyclic: [None, Some(cyclic)], ..Machine::default() };
+    let cyclic = Cyclic {
+        amplitude_m: 3e-6,
+        pitch_m: 0.02,
+        phase_rad: 0.7,
+    };
+    let cyclic = Machine {
+        cyclic: [None, Some(cyclic)],
+        ..Machine::default()
+    };
     let law = |th: f64, _: f64| 3e-6 * th.sin() * (TAU * r * th.sin() / 0.02 + 0.7).sin();
     assert!(departure(&cyclic, r, 0.1, law) < 1e-9);
 }
@@ -190,20 +263,37 @@ fn unequal_axes_have_their_profiles() {
     // Feed-forward errors of first order only: τ = (1 − a)/kv per axis with κ2 nearly equal is not needed,
     // the second order is 0.4 % of the first here.
     let (kx, ky) = (500.0, 1000.0);
-    let servo = [kx, ky].map(|kv_per_s| PositionLoop { kv_per_s, feed_forward: 0.0 });
-    let lag = Machine { servo, ..Machine::default() };
+    let servo = [kx, ky].map(|kv_per_s| PositionLoop {
+        kv_per_s,
+        feed_forward: 0.0,
+    });
+    let lag = Machine {
+        servo,
+        ..Machine::default()
+    };
     let delta = 1.0 / kx - 1.0 / ky;
     let law = |th: f64, d: f64| d * 0.5 * f * delta * (2.0 * th).sin();
     let error = departure(&lag, r, f, law);
     assert!(error < 2.0 * f * f / r / (kx * kx), "{error:e}");
     // The same with dead time instead: no κ2, so the profile is closer still.
-    let dead = Machine { dead_time_s: [0.0010, 0.0], ..Machine::default() };
+    let dead = Machine {
+        dead_time_s: [0.0010, 0.0],
+        ..Machine::default()
+    };
     let law = |th: f64, d: f64| d * 0.5 * f * 0.0010 * (2.0 * th).sin();
     assert!(departure(&dead, r, f, law) < f * f / r * 0.001 * 0.001);
     // Equal delay, unequal κ2: second-order elements of equal 2ζ/ωn.
     let lag_s = 0.02;
-    let mechanics = [60.0, 90.0].map(|wn| Some(SecondOrder { omega_n_rad_s: wn, zeta: 0.5 * lag_s * wn }));
-    let unequal = Machine { mechanics, ..Machine::default() };
+    let mechanics = [60.0, 90.0].map(|wn| {
+        Some(SecondOrder {
+            omega_n_rad_s: wn,
+            zeta: 0.5 * lag_s * wn,
+        })
+    });
+    let unequal = Machine {
+        mechanics,
+        ..Machine::default()
+    };
     let k2 = |wn: f64| -2.0 / (wn * wn) + lag_s * lag_s;
     let (delta, mean) = (k2(60.0) - k2(90.0), 0.5 * (k2(60.0) + k2(90.0)));
     let shift = lag_s * f / r;
@@ -232,7 +322,10 @@ fn backlash_steps_outward_both_ways() {
                 };
                 // The load stands while the drive crosses the gap: R(1 − cosΔθ) = B.
                 if since > (2.0 * 20e-6_f64 / r).sqrt() + 1e-3 {
-                    assert!((deviation - law).abs() < 1e-9, "axis {axis} {direction:?} {theta}");
+                    assert!(
+                        (deviation - law).abs() < 1e-9,
+                        "axis {axis} {direction:?} {theta}"
+                    );
                 }
             }
             let mean = trace.mean_deviation_m();
@@ -240,7 +333,18 @@ fn backlash_steps_outward_both_ways() {
         }
     }
     // Overcompensated: the mirror image.
-    let step = |b| run(&Machine { backlash_m: [b, 0.0], ..Machine::default() }, r, f, Ccw).deviation_m;
+    let step = |b| {
+        run(
+            &Machine {
+                backlash_m: [b, 0.0],
+                ..Machine::default()
+            },
+            r,
+            f,
+            Ccw,
+        )
+        .deviation_m
+    };
     for (plus, minus) in step(20e-6).iter().zip(step(-20e-6)) {
         assert!((plus + minus).abs() < 1e-8);
     }
@@ -249,8 +353,14 @@ fn backlash_steps_outward_both_ways() {
 #[test]
 fn lateral_play_moves_the_mean() {
     let l = 10e-6;
-    let first = Machine { lateral_play_m: [l, 0.0], ..Machine::default() };
-    let second = Machine { lateral_play_m: [0.0, l], ..Machine::default() };
+    let first = Machine {
+        lateral_play_m: [l, 0.0],
+        ..Machine::default()
+    };
+    let second = Machine {
+        lateral_play_m: [0.0, l],
+        ..Machine::default()
+    };
     assert!(departure(&first, 0.1, 0.1, |th, d| -d * l / 2.0 * th.sin().abs()) < 0.02 * l);
     assert!(departure(&second, 0.1, 0.1, |th, d| -d * l / 2.0 * th.cos().abs()) < 0.02 * l);
     let mean = run(&first, 0.1, 0.1, Cw).mean_deviation_m();
@@ -261,7 +371,11 @@ fn lateral_play_moves_the_mean() {
 #[test]
 fn friction_leaves_a_decaying_spike() {
     let (r, f, peak, decay) = (0.15, 0.15, 10e-6, 0.05);
-    let friction = Friction { peak_m: peak, decay_s: decay, ..Friction::default() };
+    let friction = Friction {
+        peak_m: peak,
+        decay_s: decay,
+        ..Friction::default()
+    };
     for axis in 0..2 {
         let mut machine = Machine::default();
         machine.friction[axis] = Some(friction);
@@ -269,7 +383,11 @@ fn friction_leaves_a_decaying_spike() {
         let law = |th: f64, d: f64| {
             let reversal = if axis == 0 { 0.0 } else { quarter };
             let since = (d * (th - reversal)).rem_euclid(PI);
-            let across = if axis == 0 { th.cos().abs() } else { th.sin().abs() };
+            let across = if axis == 0 {
+                th.cos().abs()
+            } else {
+                th.sin().abs()
+            };
             peak * (-since * r / f / decay).exp() * across
         };
         for direction in [Ccw, Cw] {
@@ -280,7 +398,10 @@ fn friction_leaves_a_decaying_spike() {
             for (theta, deviation) in trace.angle_rad.iter().zip(&trace.deviation_m) {
                 let phase = (d * (theta - if axis == 0 { 0.0 } else { quarter })).rem_euclid(PI);
                 if phase > 0.01 && phase < 0.45 * PI {
-                    assert!((deviation - law(*theta, d)).abs() < 2e-9, "axis {axis} {direction:?} {theta}");
+                    assert!(
+                        (deviation - law(*theta, d)).abs() < 2e-9,
+                        "axis {axis} {direction:?} {theta}"
+                    );
                 }
             }
         }
@@ -290,16 +411,31 @@ fn friction_leaves_a_decaying_spike() {
     late.friction[1] = Some(friction);
     let trace = run(&late, r, 0.45, Ccw);
     let mean = trace.mean_deviation_m();
-    let at = trace.deviation_m.iter().position(|d| *d > mean + 0.5 * peak).unwrap();
+    let at = trace
+        .deviation_m
+        .iter()
+        .position(|d| *d > mean + 0.5 * peak)
+        .unwrap();
     let expected = PI / 2.0 + (3.0_f64 / 20.0).atan();
-    assert!((trace.angle_rad[at] - expected).abs() < 0.02, "{} {expected}", trace.angle_rad[at]);
+    assert!(
+        (trace.angle_rad[at] - expected).abs() < 0.02,
+        "{} {expected}",
+        trace.angle_rad[at]
+    );
 }
 
 #[test]
 fn stick_slip_shows_only_near_reversals() {
-    let friction =
-        Friction { stick_slip_m: 8e-6, stick_travel_m: 400e-6, stick_speed_m_s: 8e-3, ..Friction::default() };
-    let machine = Machine { friction: [Some(friction), None], ..Machine::default() };
+    let friction = Friction {
+        stick_slip_m: 8e-6,
+        stick_travel_m: 400e-6,
+        stick_speed_m_s: 8e-3,
+        ..Friction::default()
+    };
+    let machine = Machine {
+        friction: [Some(friction), None],
+        ..Machine::default()
+    };
     let trace = run(&machine, 0.1, 0.02, Ccw);
     for (theta, deviation) in trace.angle_rad.iter().zip(&trace.deviation_m) {
         let envelope = 8e-6 * (-(0.02 * theta.sin() / 8e-3_f64).powi(2)).exp();
@@ -312,8 +448,15 @@ fn stick_slip_shows_only_near_reversals() {
 
 #[test]
 fn time_is_kept() {
-    let vibration = Vibration { frequency_hz: 12.5, amplitude_m: 4e-6, phase_rad: 0.3 };
-    let machine = Machine { vibration: Some(vibration), ..Machine::default() };
+    let vibration = Vibration {
+        frequency_hz: 12.5,
+        amplitude_m: 4e-6,
+        phase_rad: 0.3,
+    };
+    let machine = Machine {
+        vibration: Some(vibration),
+        ..Machine::default()
+    };
     let mut test = CircleTest::new(0.1, 0.3, Ccw);
     test.started_s = 777.3;
     let trace = circle(&machine, &test);
@@ -322,9 +465,15 @@ fn time_is_kept() {
         let t = 777.3 + step * i as f64;
         assert!((deviation - 4e-6 * (TAU * 12.5 * t + 0.3).sin()).abs() < 1e-9);
     }
-    let growth = Machine { thermal_per_s: 1e-8, ..Machine::default() };
+    let growth = Machine {
+        thermal_per_s: 1e-8,
+        ..Machine::default()
+    };
     let mean = circle(&growth, &test).mean_deviation_m();
-    assert!((mean - 0.1 * 1e-8 * (777.3 + trace.turn_s / 2.0)).abs() < 1e-10, "{mean:e}");
+    assert!(
+        (mean - 0.1 * 1e-8 * (777.3 + trace.turn_s / 2.0)).abs() < 1e-10,
+        "{mean:e}"
+    );
 }
 
 /// The tool is behind the command by the lag: a machine seen from the start angle of the command.
@@ -335,7 +484,10 @@ fn first_sample_is_when_the_command_passes() {
     let trace = circle(&loops(25.0, 0.0), &test);
     let [x, y] = trace.position_m[0];
     let lag = (5.0_f64 / 25.0).atan();
-    assert!((y.atan2(x) - (0.8 + lag)).abs() < 1e-6, "clockwise: behind means a larger angle");
+    assert!(
+        (y.atan2(x) - (0.8 + lag)).abs() < 1e-6,
+        "clockwise: behind means a larger angle"
+    );
     assert_eq!(trace.angle_rad[0], 0.8);
     assert!(trace.angle_rad[1] < 0.8);
 }
@@ -344,9 +496,18 @@ fn first_sample_is_when_the_command_passes() {
 fn nonsense_comes_back_as_nan() {
     let trace = circle(&loops(f64::NAN, 0.0), &CircleTest::new(0.1, 0.5, Ccw));
     assert!(trace.deviation_m.iter().all(|d| d.is_nan()));
-    for (radius, feed) in [(0.0, 0.1), (0.1, 0.0), (-0.1, 0.1), (f64::NAN, 0.1), (0.1, f64::INFINITY)] {
+    for (radius, feed) in [
+        (0.0, 0.1),
+        (0.1, 0.0),
+        (-0.1, 0.1),
+        (f64::NAN, 0.1),
+        (0.1, f64::INFINITY),
+    ] {
         let trace = run(&Machine::default(), radius, feed, Ccw);
-        assert!(trace.deviation_m.iter().all(|d| d.is_nan()), "{radius} {feed}");
+        assert!(
+            trace.deviation_m.iter().all(|d| d.is_nan()),
+            "{radius} {feed}"
+        );
     }
 }
 
@@ -354,16 +515,34 @@ fn nonsense_comes_back_as_nan() {
 #[test]
 fn friction_does_not_depend_on_the_steps() {
     for presliding_m in [0.0, 2e-6, 30e-6] {
-        let friction =
-            Friction { peak_m: 10e-6, decay_s: 0.03, rise_s: 0.002, presliding_m, ..Friction::default() };
-        let machine = Machine { friction: [Some(friction); 2], ..loops(40.0, 0.0) };
+        let friction = Friction {
+            peak_m: 10e-6,
+            decay_s: 0.03,
+            rise_s: 0.002,
+            presliding_m,
+            ..Friction::default()
+        };
+        let machine = Machine {
+            friction: [Some(friction); 2],
+            ..loops(40.0, 0.0)
+        };
         let lap = |samples| {
-            let test = CircleTest { samples: Some(samples), ..CircleTest::new(0.3, 0.02, Ccw) };
+            let test = CircleTest {
+                samples: Some(samples),
+                ..CircleTest::new(0.3, 0.02, Ccw)
+            };
             circle(&machine, &test).deviation_m
         };
         let (coarse, fine) = (lap(1000), lap(32_000));
-        let off = coarse.iter().zip(fine.iter().step_by(32)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let off = coarse
+            .iter()
+            .zip(fine.iter().step_by(32))
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max);
         assert!(off < 0.05 * 10e-6, "{presliding_m}: {off:e}");
-        assert!(fine.iter().copied().fold(0.0, f64::max) > 0.5e-6, "{presliding_m}: there is a pulse");
+        assert!(
+            fine.iter().copied().fold(0.0, f64::max) > 0.5e-6,
+            "{presliding_m}: there is a pulse"
+        );
     }
 }

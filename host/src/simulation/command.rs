@@ -17,7 +17,10 @@ pub(super) struct Knots {
 impl Knots {
     /// Joined by straight chords.
     pub(super) fn chords(start_s: f64, dt_s: f64, position_m: Vec<f64>) -> Self {
-        let velocity = position_m.windows(2).map(|p| [(p[1] - p[0]) / dt_s; 2]).collect();
+        let velocity = position_m
+            .windows(2)
+            .map(|p| [(p[1] - p[0]) / dt_s; 2])
+            .collect();
         Self::new(start_s, dt_s, position_m, velocity)
     }
 
@@ -44,7 +47,13 @@ impl Knots {
             sum += dt_s * (0.5 * (p[0] + p[1]) + dt_s / 12.0 * (v[0] - v[1]));
             integral.push(sum);
         }
-        Self { start_s, dt_s, position_m, velocity_m_s, integral }
+        Self {
+            start_s,
+            dt_s,
+            position_m,
+            velocity_m_s,
+            integral,
+        }
     }
 
     /// Piece that holds `inside`, or the end beyond which it lies.
@@ -65,7 +74,11 @@ impl Knots {
             Ok(k) => {
                 let s = (t - self.start_s) / self.dt_s - k as f64;
                 let [v0, v1] = self.velocity_m_s[k];
-                hermite([self.position_m[k], v0, self.position_m[k + 1], v1], self.dt_s, s)
+                hermite(
+                    [self.position_m[k], v0, self.position_m[k + 1], v1],
+                    self.dt_s,
+                    s,
+                )
             }
         }
     }
@@ -73,7 +86,10 @@ impl Knots {
     /// Position and velocity of the mean over the last `window_s`.
     pub(super) fn mean_at(&self, t: f64, window_s: f64) -> [f64; 2] {
         let (now, then) = (self.at(t, t)[0], self.at(t - window_s, t - window_s)[0]);
-        [(self.integral(t) - self.integral(t - window_s)) / window_s, (now - then) / window_s]
+        [
+            (self.integral(t) - self.integral(t - window_s)) / window_s,
+            (now - then) / window_s,
+        ]
     }
 
     /// Antiderivative of the position at `t`, up to a constant.
@@ -81,7 +97,8 @@ impl Knots {
         match self.piece(t) {
             Err(0) => self.position_m[0] * (t - self.start_s),
             Err(end) => {
-                self.integral[end] + self.position_m[end] * (t - self.start_s - self.dt_s * end as f64)
+                self.integral[end]
+                    + self.position_m[end] * (t - self.start_s - self.dt_s * end as f64)
             }
             Ok(k) => {
                 let s = (t - self.start_s) / self.dt_s - k as f64;
@@ -99,7 +116,10 @@ impl Knots {
 pub(super) fn hermite([p0, v0, p1, v1]: [f64; 4], h: f64, s: f64) -> [f64; 2] {
     let (m0, m1) = (v0 * h, v1 * h);
     let (a, b) = (3.0 * (p1 - p0) - 2.0 * m0 - m1, 2.0 * (p0 - p1) + m0 + m1);
-    [p0 + s * (m0 + s * (a + s * b)), (m0 + s * (2.0 * a + s * 3.0 * b)) / h]
+    [
+        p0 + s * (m0 + s * (a + s * b)),
+        (m0 + s * (2.0 * a + s * 3.0 * b)) / h,
+    ]
 }
 
 #[cfg(test)]
@@ -107,7 +127,9 @@ mod tests {
     use super::*;
 
     fn sine(dt: f64) -> Vec<f64> {
-        (0..2001).map(|k| 0.1 * (7.0 * dt * k as f64).sin()).collect()
+        (0..2001)
+            .map(|k| 0.1 * (7.0 * dt * k as f64).sin())
+            .collect()
     }
 
     #[test]
@@ -120,22 +142,30 @@ mod tests {
             let t = 0.05 + f64::from(k) * 1.9e-3;
             worst = worst.max((knots.at(t, t)[0] - 0.1 * (omega * t).sin()).abs());
         }
-        assert!(worst <= bound && worst > bound / 20.0, "worst {worst:e}, stated {bound:e}");
+        assert!(
+            worst <= bound && worst > bound / 20.0,
+            "worst {worst:e}, stated {bound:e}"
+        );
     }
 
     #[test]
     fn moving_average_of_knots_is_the_integral() {
         let dt = 0.01;
-        for knots in [Knots::smooth(0.0, dt, sine(dt)), Knots::chords(0.0, dt, sine(dt))] {
+        for knots in [
+            Knots::smooth(0.0, dt, sine(dt)),
+            Knots::chords(0.0, dt, sine(dt)),
+        ] {
             let (t, window, n) = (7.3123, 0.0417, 20_000);
             let step = window / f64::from(n);
-            let sum: f64 =
-                (0..n).map(|i| t - window + (f64::from(i) + 0.5) * step).map(|x| knots.at(x, x)[0]).sum();
+            let sum: f64 = (0..n)
+                .map(|i| t - window + (f64::from(i) + 0.5) * step)
+                .map(|x| knots.at(x, x)[0])
+                .sum();
             let [mean, slope] = knots.mean_at(t, window);
             assert!((mean - sum / f64::from(n)).abs() < 1e-11);
             let eps = 1e-6;
-            let numeric =
-                (knots.mean_at(t + eps, window)[0] - knots.mean_at(t - eps, window)[0]) / (2.0 * eps);
+            let numeric = (knots.mean_at(t + eps, window)[0] - knots.mean_at(t - eps, window)[0])
+                / (2.0 * eps);
             assert!((slope - numeric).abs() < 1e-7, "{slope} {numeric}");
         }
     }

@@ -49,38 +49,61 @@ pub struct Path {
 pub fn drive(machine: &Machine, set_points: &SetPoints<'_>) -> Path {
     let (dt_s, n) = (set_points.dt_s, set_points.position_m.len());
     if n == 0 {
-        return Path { dt_s, position_m: Vec::new() };
+        return Path {
+            dt_s,
+            position_m: Vec::new(),
+        };
     }
     if !(dt_s > 0.0 && dt_s.is_finite() && machine.check().is_ok()) {
-        return Path { dt_s, position_m: vec![[f64::NAN; 2]; n] };
+        return Path {
+            dt_s,
+            position_m: vec![[f64::NAN; 2]; n],
+        };
     }
     let axes: [Vec<_>; 2] = std::array::from_fn(|axis| {
         let centre = set_points.centre_m[axis];
-        let positions: Vec<f64> = set_points.position_m.iter().map(|p| p[axis] - centre).collect();
+        let positions: Vec<f64> = set_points
+            .position_m
+            .iter()
+            .map(|p| p[axis] - centre)
+            .collect();
         let (knots, step_s) = knots(machine, set_points.hold, dt_s, positions);
         let before = (machine.dead_time_s[axis] / step_s).ceil();
         let steps = before as usize + (dt_s * n as f64 / step_s).ceil() as usize;
-        let grid = Grid { start_s: -before * step_s, step_s, steps };
+        let grid = Grid {
+            start_s: -before * step_s,
+            step_s,
+            steps,
+        };
         axis::motion(machine, axis, &knots, grid, (0..n).map(|i| dt_s * i as f64))
     });
-    let place = Place { centre_m: set_points.centre_m };
+    let place = Place {
+        centre_m: set_points.centre_m,
+    };
     let tool = |i: usize| {
         let t = set_points.started_s + dt_s * i as f64;
         let [x, y] = geometry::tool(machine, place, t, [axes[0][i], axes[1][i]]);
         [x + set_points.centre_m[0], y + set_points.centre_m[1]]
     };
-    Path { dt_s, position_m: (0..n).map(tool).collect() }
+    Path {
+        dt_s,
+        position_m: (0..n).map(tool).collect(),
+    }
 }
 
 /// Command of one axis and the step that meets its corners.
 fn knots(machine: &Machine, hold: Hold, dt_s: f64, positions: Vec<f64>) -> (Knots, f64) {
-    let own = machine.interpolation_s.filter(|own| *own > dt_s * (1.0 + 1e-9));
+    let own = machine
+        .interpolation_s
+        .filter(|own| *own > dt_s * (1.0 + 1e-9));
     match (own, hold) {
         (Some(own), _) => {
             let end_s = dt_s * positions.len() as f64;
             let fine = Knots::smooth(0.0, dt_s, positions);
             let count = (end_s / own).ceil() as usize + 1;
-            let vertices = (0..=count).map(|k| fine.at(k as f64 * own, k as f64 * own)[0]).collect();
+            let vertices = (0..=count)
+                .map(|k| fine.at(k as f64 * own, k as f64 * own)[0])
+                .collect();
             (Knots::chords(0.0, own, vertices), own / (own / dt_s).ceil())
         }
         (None, Hold::Cubic) => (Knots::smooth(0.0, dt_s, positions), dt_s),
@@ -93,12 +116,19 @@ impl Path {
     /// `turn_s`, about the centre of `test`. Positions between set-points come from a cubic; beyond the
     /// path the tool stands.
     pub fn lap(&self, test: &CircleTest, start_s: f64, turn_s: f64) -> Trace {
-        let n = test.samples.unwrap_or_else(|| super::circle::ballbar_samples(turn_s)).max(1);
+        let n = test
+            .samples
+            .unwrap_or_else(|| super::circle::ballbar_samples(turn_s))
+            .max(1);
         if self.position_m.is_empty() {
             return Trace::new(test, turn_s, vec![[f64::NAN; 2]; n]);
         }
         let axes: [Knots; 2] = std::array::from_fn(|axis| {
-            let positions = self.position_m.iter().map(|p| p[axis] - test.centre_m[axis]).collect();
+            let positions = self
+                .position_m
+                .iter()
+                .map(|p| p[axis] - test.centre_m[axis])
+                .collect();
             Knots::smooth(0.0, self.dt_s, positions)
         });
         let at = |i: usize| {
@@ -127,7 +157,10 @@ mod tests {
         let n = (3.0 * Path::turn_s(test) / dt) as usize;
         let point = |i: usize| {
             let (sin, cos) = (test.start_angle_rad + omega * dt * i as f64).sin_cos();
-            [test.centre_m[0] + test.radius_m * cos, test.centre_m[1] + test.radius_m * sin]
+            [
+                test.centre_m[0] + test.radius_m * cos,
+                test.centre_m[1] + test.radius_m * sin,
+            ]
         };
         (0..n).map(point).collect()
     }
@@ -136,8 +169,14 @@ mod tests {
     fn set_points_of_a_circle_give_the_circle() {
         let mut machine = Machine {
             acc_dec: AccDec::MovingAverage(0.03),
-            servo: [PositionLoop { kv_per_s: 30.0, feed_forward: 0.2 }; 2],
-            mechanics: [Some(SecondOrder { omega_n_rad_s: 70.0, zeta: 0.6 }); 2],
+            servo: [PositionLoop {
+                kv_per_s: 30.0,
+                feed_forward: 0.2,
+            }; 2],
+            mechanics: [Some(SecondOrder {
+                omega_n_rad_s: 70.0,
+                zeta: 0.6,
+            }); 2],
             dead_time_s: [0.0033, 0.0041],
             squareness_rad: 50e-6,
             scale: [1e-5, -2e-5],
@@ -163,11 +202,18 @@ mod tests {
             let mut shifted = test;
             shifted.start_angle_rad += f64::from(direction.sign()) * std::f64::consts::PI;
             let direct = circle(&machine, &shifted);
-            let off: Vec<f64> =
-                lap.deviation_m.iter().zip(&direct.deviation_m).map(|(a, b)| (a - b).abs()).collect();
+            let off: Vec<f64> = lap
+                .deviation_m
+                .iter()
+                .zip(&direct.deviation_m)
+                .map(|(a, b)| (a - b).abs())
+                .collect();
             // Only where an axis crosses its gap: there the load starts with a corner that 1 ms rounds off.
             assert!(off.iter().all(|o| *o < 1.5e-6), "{direction:?}");
-            assert!(off.iter().filter(|o| **o > 1e-8).count() < 40, "{direction:?}");
+            assert!(
+                off.iter().filter(|o| **o > 1e-8).count() < 40,
+                "{direction:?}"
+            );
         }
     }
 
@@ -179,13 +225,24 @@ mod tests {
         let turn = Path::turn_s(&test);
         let mean = |hold, interpolation_s| {
             let machine = Machine {
-                servo: [PositionLoop { kv_per_s: 100.0, feed_forward: 0.0 }; 2],
+                servo: [PositionLoop {
+                    kv_per_s: 100.0,
+                    feed_forward: 0.0,
+                }; 2],
                 interpolation_s,
                 ..Machine::default()
             };
             let centre_m = [0.0; 2];
-            let set_points = SetPoints { dt_s: 1e-3, position_m: &positions, centre_m, started_s: 0.0, hold };
-            drive(&machine, &set_points).lap(&test, turn, turn).mean_deviation_m()
+            let set_points = SetPoints {
+                dt_s: 1e-3,
+                position_m: &positions,
+                centre_m,
+                started_s: 0.0,
+                hold,
+            };
+            drive(&machine, &set_points)
+                .lap(&test, turn, turn)
+                .mean_deviation_m()
         };
         let smooth = mean(Hold::Cubic, None);
         let ideal = 0.1 * ((1.0 + 0.07_f64.powi(2)).powf(-0.5) - 1.0);
@@ -198,7 +255,10 @@ mod tests {
     #[test]
     fn rests_where_it_is_told() {
         let machine = Machine {
-            servo: [PositionLoop { kv_per_s: 30.0, feed_forward: 0.0 }; 2],
+            servo: [PositionLoop {
+                kv_per_s: 30.0,
+                feed_forward: 0.0,
+            }; 2],
             dead_time_s: [0.0105; 2],
             ..Machine::default()
         };
@@ -210,7 +270,11 @@ mod tests {
             hold: Hold::Cubic,
         };
         let path = drive(&machine, &set_points(&[[0.25, -0.5]; 50]));
-        assert!(path.position_m.iter().all(|p| (p[0] - 0.25).abs() < 1e-12 && (p[1] + 0.5).abs() < 1e-12));
+        assert!(
+            path.position_m
+                .iter()
+                .all(|p| (p[0] - 0.25).abs() < 1e-12 && (p[1] + 0.5).abs() < 1e-12)
+        );
         assert!(drive(&machine, &set_points(&[])).position_m.is_empty());
         let one = drive(&machine, &set_points(&[[0.25, -0.5]]));
         assert!((one.position_m[0][0] - 0.25).abs() < 1e-12);

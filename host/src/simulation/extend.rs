@@ -13,14 +13,19 @@ impl Machine {
                 let omega_n2 = b.powf(-0.5);
                 // a = (4ζ² − 2)/ωn²
                 let zeta = (0.5 + 0.25 * a * omega_n2).max(1e-4).sqrt();
-                self.mechanics[axis] = Some(SecondOrder { omega_n_rad_s: omega_n2.sqrt(), zeta });
+                self.mechanics[axis] = Some(SecondOrder {
+                    omega_n_rad_s: omega_n2.sqrt(),
+                    zeta,
+                });
                 self.servo[axis] = PositionLoop::default();
             } else if b < 0.0 && a > 0.0 {
                 // (1 + ω²/k²)/(1 + c²ω²) = 1 + aω² + bω⁴ + …, c = feed-forward time
                 let c2 = -b / a;
                 let lag2 = a + c2;
-                self.servo[axis] =
-                    PositionLoop { kv_per_s: lag2.powf(-0.5), feed_forward: (c2 / lag2).sqrt() };
+                self.servo[axis] = PositionLoop {
+                    kv_per_s: lag2.powf(-0.5),
+                    feed_forward: (c2 / lag2).sqrt(),
+                };
             }
         }
     }
@@ -49,13 +54,20 @@ impl Machine {
     /// mechanics take the one, dead time makes up for the other.
     pub fn split_bandwidth(&mut self, delta_kappa2_s2: f64) {
         let mut delay = [0.0; 2];
-        for (axis, share) in [0.5 * delta_kappa2_s2, -0.5 * delta_kappa2_s2].into_iter().enumerate() {
+        for (axis, share) in [0.5 * delta_kappa2_s2, -0.5 * delta_kappa2_s2]
+            .into_iter()
+            .enumerate()
+        {
             let lag = 1.0 / self.servo[axis].kv_per_s;
             let square = lag * lag + share;
-            if let (true, Some(mechanics)) = (square <= 0.0 || lag == 0.0, &mut self.mechanics[axis]) {
+            if let (true, Some(mechanics)) =
+                (square <= 0.0 || lag == 0.0, &mut self.mechanics[axis])
+            {
                 // κ2 = (4ζ² − 2)/ωn², delay 2ζ/ωn
                 let omega_n = mechanics.omega_n_rad_s;
-                let zeta = (mechanics.zeta.powi(2) + 0.25 * share * omega_n * omega_n).max(1e-4).sqrt();
+                let zeta = (mechanics.zeta.powi(2) + 0.25 * share * omega_n * omega_n)
+                    .max(1e-4)
+                    .sqrt();
                 delay[axis] = 2.0 * (zeta - mechanics.zeta) / omega_n;
                 mechanics.zeta = zeta;
             } else if square > 0.0 {
@@ -77,14 +89,24 @@ mod tests {
     fn oval(machine: &Machine, radius_m: f64, feed_m_s: f64, direction: Direction) -> [f64; 2] {
         let trace = circle(machine, &CircleTest::new(radius_m, feed_m_s, direction));
         let n = trace.deviation_m.len() as f64;
-        trace.position_m.iter().zip(&trace.deviation_m).fold([0.0; 2], |[c, s], (p, r)| {
-            let psi = 2.0 * p[1].atan2(p[0]);
-            [c + 2.0 / n * r * psi.cos(), s + 2.0 / n * r * psi.sin()]
-        })
+        trace
+            .position_m
+            .iter()
+            .zip(&trace.deviation_m)
+            .fold([0.0; 2], |[c, s], (p, r)| {
+                let psi = 2.0 * p[1].atan2(p[0]);
+                [c + 2.0 / n * r * psi.cos(), s + 2.0 / n * r * psi.sin()]
+            })
     }
 
     fn lag(kv_per_s: f64) -> Machine {
-        Machine { servo: [PositionLoop { kv_per_s, feed_forward: 0.0 }; 2], ..Machine::default() }
+        Machine {
+            servo: [PositionLoop {
+                kv_per_s,
+                feed_forward: 0.0,
+            }; 2],
+            ..Machine::default()
+        }
     }
 
     #[test]
@@ -95,7 +117,10 @@ mod tests {
             // Slow enough that the delays' own third order, ½f·ω²·Δτ³/3, stays below the bound.
             let [cos, sin] = oval(&machine, 0.1, 0.15, direction);
             let expected = -0.25 * 2e-6 * 0.15 * 0.15 / 0.1;
-            assert!((cos - expected).abs() < 0.02 * expected.abs(), "{cos} {expected}");
+            assert!(
+                (cos - expected).abs() < 0.02 * expected.abs(),
+                "{cos} {expected}"
+            );
             assert!(sin.abs() < 0.02 * expected.abs(), "{sin}");
         }
     }
@@ -107,7 +132,10 @@ mod tests {
             machine.split_lag(4e-5);
             let [_, sin] = oval(&machine, 0.3, 0.2, direction);
             let expected = sign * 0.5 * 0.2 * 4e-5;
-            assert!((sin - expected).abs() < 0.02 * expected.abs(), "{sin} {expected}");
+            assert!(
+                (sin - expected).abs() < 0.02 * expected.abs(),
+                "{sin} {expected}"
+            );
         }
     }
 
@@ -118,10 +146,13 @@ mod tests {
             machine.add_beta2(beta2);
             let (radius, feed) = (0.1, 0.2);
             let test = CircleTest::new(radius, feed, Direction::Ccw);
-            let more =
-                circle(&machine, &test).mean_deviation_m() - circle(&lag(100.0), &test).mean_deviation_m();
+            let more = circle(&machine, &test).mean_deviation_m()
+                - circle(&lag(100.0), &test).mean_deviation_m();
             let expected = beta2 * feed.powi(4) / radius.powi(3);
-            assert!((more - expected).abs() < 0.02 * expected.abs(), "{more} {expected}");
+            assert!(
+                (more - expected).abs() < 0.02 * expected.abs(),
+                "{more} {expected}"
+            );
         }
     }
 }

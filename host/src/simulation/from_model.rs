@@ -41,14 +41,31 @@ impl Machine {
     pub fn from_servo(servo: &Servo) -> Result<Self, MachineError> {
         let mut machine = Self::default();
         match *servo {
-            Servo::Lag { kv_per_s } => machine.servo = [PositionLoop { kv_per_s, feed_forward: 0.0 }; 2],
-            Servo::SecondOrder { omega_n_rad_s, zeta } => {
-                machine.mechanics = [Some(SecondOrder { omega_n_rad_s, zeta }); 2];
+            Servo::Lag { kv_per_s } => {
+                machine.servo = [PositionLoop {
+                    kv_per_s,
+                    feed_forward: 0.0,
+                }; 2]
             }
-            Servo::Beta { beta1_s2, beta2_s4, .. } => {
+            Servo::SecondOrder {
+                omega_n_rad_s,
+                zeta,
+            } => {
+                machine.mechanics = [Some(SecondOrder {
+                    omega_n_rad_s,
+                    zeta,
+                }); 2];
+            }
+            Servo::Beta {
+                beta1_s2, beta2_s4, ..
+            } => {
                 for (name, value) in [("beta1_s2", beta1_s2), ("beta2_s4", beta2_s4)] {
                     if !value.is_finite() {
-                        return Err(MachineError { name, value, allowed: "finite numbers" });
+                        return Err(MachineError {
+                            name,
+                            value,
+                            allowed: "finite numbers",
+                        });
                     }
                 }
                 machine.set_beta(beta1_s2, beta2_s4);
@@ -65,18 +82,31 @@ impl Machine {
             return;
         }
         let ratio = k4 / (k2 * k2);
-        let second_order = if k2 < 0.0 { k4 < 3.0 * k2 * k2 } else { k4 < 6.0 * k2 * k2 };
+        let second_order = if k2 < 0.0 {
+            k4 < 3.0 * k2 * k2
+        } else {
+            k4 < 6.0 * k2 * k2
+        };
         if k2 > 0.0 && (ratio - 6.0).abs() < LAG_RATIO_TOLERANCE {
-            self.servo = [PositionLoop { kv_per_s: k2.powf(-0.5), feed_forward: 0.0 }; 2];
+            self.servo = [PositionLoop {
+                kv_per_s: k2.powf(-0.5),
+                feed_forward: 0.0,
+            }; 2];
         } else if second_order {
             self.mechanics = [Some(second_order_of(k2, k4)); 2];
         } else if k2 > 0.0 && ratio <= FEED_FORWARD_MAX_RATIO {
             let a2 = (ratio - 6.0) / (ratio + 6.0);
-            self.servo = [PositionLoop { kv_per_s: ((1.0 - a2) / k2).sqrt(), feed_forward: a2.sqrt() }; 2];
+            self.servo = [PositionLoop {
+                kv_per_s: ((1.0 - a2) / k2).sqrt(),
+                feed_forward: a2.sqrt(),
+            }; 2];
         } else {
             // With p from 3(κ2 − p)² + 6p² = 2κ4 the rest has ζ² > 0 with room to spare.
             let p = (k2 + (2.0 * k4 - 2.0 * k2 * k2).sqrt()) / 3.0;
-            self.servo = [PositionLoop { kv_per_s: p.powf(-0.5), feed_forward: 0.0 }; 2];
+            self.servo = [PositionLoop {
+                kv_per_s: p.powf(-0.5),
+                feed_forward: 0.0,
+            }; 2];
             self.mechanics = [Some(second_order_of(k2 - p, k4 - 6.0 * p * p)); 2];
         }
     }
@@ -87,7 +117,10 @@ fn second_order_of(k2: f64, k4: f64) -> SecondOrder {
     let omega_n_squared = (12.0 / (6.0 * k2 * k2 - k4)).sqrt();
     // 1 − 2ζ² = −κ2ωn²/2
     let zeta = (0.5 * (1.0 + 0.5 * k2 * omega_n_squared)).sqrt();
-    SecondOrder { omega_n_rad_s: omega_n_squared.sqrt(), zeta }
+    SecondOrder {
+        omega_n_rad_s: omega_n_squared.sqrt(),
+        zeta,
+    }
 }
 
 #[cfg(test)]
@@ -97,7 +130,11 @@ mod tests {
     use giotto_shared::Direction;
 
     fn beta(beta1_s2: f64, beta2_s4: f64) -> Result<Machine, MachineError> {
-        Machine::from_servo(&Servo::Beta { beta1_s2, beta2_s4, half_width95: [0.0; 2] })
+        Machine::from_servo(&Servo::Beta {
+            beta1_s2,
+            beta2_s4,
+            half_width95: [0.0; 2],
+        })
     }
 
     /// κ2 and κ4 of a chain from the table of elements, not from the formulas under test.
@@ -131,7 +168,10 @@ mod tests {
             let machine = beta(b1, b2).unwrap();
             let [k2, k4] = cumulants(&machine);
             assert!((-k2 / 2.0 - b1).abs() < 1e-12, "{b1} {b2}: {machine:?}");
-            assert!((k2 * k2 / 8.0 + k4 / 24.0 - b2).abs() < 1e-14, "{b1} {b2}: {machine:?}");
+            assert!(
+                (k2 * k2 / 8.0 + k4 / 24.0 - b2).abs() < 1e-14,
+                "{b1} {b2}: {machine:?}"
+            );
         }
         assert_eq!(beta(0.0, 0.0).unwrap(), Machine::default());
         assert_eq!(beta(f64::NAN, 0.0).unwrap_err().name, "beta1_s2");
@@ -144,7 +184,10 @@ mod tests {
         // Eq. 14 with its own fourth-order term: κ2²/8 + κ4/24 = 3/(8kv⁴).
         let machine = beta(-0.5 / (kv * kv), 0.375 / kv.powi(4)).unwrap();
         assert_eq!(machine.mechanics, [None; 2]);
-        assert!((machine.servo[0].kv_per_s - kv).abs() < 1e-9 * kv && machine.servo[0].feed_forward < 1e-4);
+        assert!(
+            (machine.servo[0].kv_per_s - kv).abs() < 1e-9 * kv
+                && machine.servo[0].feed_forward < 1e-4
+        );
     }
 
     /// The paper's robot: second order with ωn near 38 rad/s and ζ near 0.72, and the radius errors of Eq. 15
@@ -154,7 +197,10 @@ mod tests {
         let (b1, b2) = (-23.29e-6, -0.23e-6);
         let machine = beta(b1, b2).unwrap();
         let m = machine.mechanics[0].unwrap();
-        assert!((m.omega_n_rad_s - 38.0).abs() < 0.5 && (m.zeta - 0.72).abs() < 0.005, "{m:?}");
+        assert!(
+            (m.omega_n_rad_s - 38.0).abs() < 0.5 && (m.zeta - 0.72).abs() < 0.005,
+            "{m:?}"
+        );
         let mut worst: f64 = 0.0;
         for radius in [0.1, 0.15, 0.3] {
             for feed in [0.02, 0.2, 0.45, 0.7] {

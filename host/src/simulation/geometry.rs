@@ -43,7 +43,9 @@ pub(super) fn tool(machine: &Machine, place: Place, t: f64, axes: [AxisPoint; 2]
         }
     }
     let radial = machine.radius_offset_m
-        + machine.vibration.map_or(0.0, |v| v.amplitude_m * (TAU * v.frequency_hz * t + v.phase_rad).sin());
+        + machine.vibration.map_or(0.0, |v| {
+            v.amplitude_m * (TAU * v.frequency_hz * t + v.phase_rad).sin()
+        });
     if radial != 0.0 {
         let length = tool[0].hypot(tool[1]);
         if length > 0.0 {

@@ -26,7 +26,12 @@ pub struct Instrument {
 impl Instrument {
     /// A good ballbar: 1 µm noise, 0.5 µm from run to run, 0.1 µm steps.
     pub fn ballbar() -> Self {
-        Self { noise_m: 1e-6, spread_m: 0.5e-6, resolution_m: 1e-7, ..Self::default() }
+        Self {
+            noise_m: 1e-6,
+            spread_m: 0.5e-6,
+            resolution_m: 1e-7,
+            ..Self::default()
+        }
     }
 
     /// Reads one turn. Draws come in a fixed order, so that a seed gives the same readings again.
@@ -36,11 +41,18 @@ impl Instrument {
         let centre = self.setup_m.map(|c| c + self.setup_spread_m * normal());
         let mut samples = trace.samples();
         let step_s = trace.turn_s / samples.deviation_m.len() as f64;
-        for (i, (deviation, p)) in samples.deviation_m.iter_mut().zip(&trace.position_m).enumerate() {
+        for (i, (deviation, p)) in samples
+            .deviation_m
+            .iter_mut()
+            .zip(&trace.position_m)
+            .enumerate()
+        {
             let along = (p[0] - centre[0]).hypot(p[1] - centre[1]);
             let drift = self.drift_m_s * (test.started_s + step_s * i as f64);
-            let reading =
-                along.hypot(self.out_of_plane_m) - trace.radius_m + spread + drift + self.noise_m * normal();
+            let reading = along.hypot(self.out_of_plane_m) - trace.radius_m
+                + spread
+                + drift
+                + self.noise_m * normal();
             *deviation = match self.resolution_m > 0.0 {
                 true => (reading / self.resolution_m).round() * self.resolution_m,
                 false => reading,
@@ -59,7 +71,10 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     fn record(instrument: Instrument, seed: u64) -> (Trace, Samples) {
-        let test = CircleTest { started_s: 100.0, ..CircleTest::new(0.1, 0.2, Direction::Ccw) };
+        let test = CircleTest {
+            started_s: 100.0,
+            ..CircleTest::new(0.1, 0.2, Direction::Ccw)
+        };
         let trace = circle(&Machine::default(), &test);
         let samples = instrument.record(&test, &trace, &mut ChaCha8Rng::seed_from_u64(seed));
         (trace, samples)
@@ -72,7 +87,13 @@ mod tests {
     #[test]
     fn perfect_instrument_reads_the_truth() {
         let (trace, samples) = record(Instrument::default(), 1);
-        assert!(samples.deviation_m.iter().zip(&trace.deviation_m).all(|(a, b)| (a - b).abs() < 1e-15));
+        assert!(
+            samples
+                .deviation_m
+                .iter()
+                .zip(&trace.deviation_m)
+                .all(|(a, b)| (a - b).abs() < 1e-15)
+        );
         assert_eq!(samples.angle_rad, trace.angle_rad);
         assert!(samples.angle_inferred);
     }
@@ -81,28 +102,60 @@ mod tests {
     #[test]
     fn set_up_has_its_closed_form() {
         let (e, h) = (200e-6, 1e-3);
-        let centred = Instrument { setup_m: [e, 0.0], ..Instrument::default() };
+        let centred = Instrument {
+            setup_m: [e, 0.0],
+            ..Instrument::default()
+        };
         let (_, samples) = record(centred, 1);
         assert!((mean(&samples.deviation_m) - e * e / 0.4).abs() < 1e-10);
-        assert!((samples.deviation_m[0] + e).abs() < 1e-9, "towards the offset the bar is short");
-        let (_, samples) = record(Instrument { out_of_plane_m: h, ..Instrument::default() }, 1);
+        assert!(
+            (samples.deviation_m[0] + e).abs() < 1e-9,
+            "towards the offset the bar is short"
+        );
+        let (_, samples) = record(
+            Instrument {
+                out_of_plane_m: h,
+                ..Instrument::default()
+            },
+            1,
+        );
         assert!((mean(&samples.deviation_m) - h * h / 0.2).abs() < 1e-9);
     }
 
     #[test]
     fn noise_spread_and_steps_are_as_stated() {
-        let ballbar = Instrument { spread_m: 5e-6, ..Instrument::ballbar() };
-        let means: Vec<f64> = (0..400).map(|seed| mean(&record(ballbar, seed).1.deviation_m)).collect();
+        let ballbar = Instrument {
+            spread_m: 5e-6,
+            ..Instrument::ballbar()
+        };
+        let means: Vec<f64> = (0..400)
+            .map(|seed| mean(&record(ballbar, seed).1.deviation_m))
+            .collect();
         let spread = (means.iter().map(|m| m * m).sum::<f64>() / 400.0).sqrt();
         assert!((spread - 5e-6).abs() < 0.6e-6, "{spread:e}");
         let (_, samples) = record(ballbar, 7);
         let centre = mean(&samples.deviation_m);
-        let noise = samples.deviation_m.iter().map(|d| (d - centre).powi(2)).sum::<f64>();
+        let noise = samples
+            .deviation_m
+            .iter()
+            .map(|d| (d - centre).powi(2))
+            .sum::<f64>();
         assert!(((noise / 1000.0).sqrt() - 1e-6).abs() < 0.1e-6);
-        assert!(samples.deviation_m.iter().all(|d| (d / 1e-7 - (d / 1e-7).round()).abs() < 1e-6));
+        assert!(
+            samples
+                .deviation_m
+                .iter()
+                .all(|d| (d / 1e-7 - (d / 1e-7).round()).abs() < 1e-6)
+        );
         assert_eq!(record(ballbar, 7), record(ballbar, 7));
         assert_ne!(record(ballbar, 7).1, record(ballbar, 8).1);
-        let (_, drifted) = record(Instrument { drift_m_s: 1e-8, ..Instrument::default() }, 1);
+        let (_, drifted) = record(
+            Instrument {
+                drift_m_s: 1e-8,
+                ..Instrument::default()
+            },
+            1,
+        );
         assert!((drifted.deviation_m[0] - 1e-6).abs() < 1e-12);
     }
 }

@@ -64,7 +64,10 @@ pub struct PositionLoop {
 
 impl Default for PositionLoop {
     fn default() -> Self {
-        Self { kv_per_s: f64::INFINITY, feed_forward: 0.0 }
+        Self {
+            kv_per_s: f64::INFINITY,
+            feed_forward: 0.0,
+        }
     }
 }
 
@@ -167,7 +170,13 @@ impl Machine {
     /// # Errors
     /// The first field that is not finite or out of its range.
     pub fn check(&self) -> Result<(), MachineError> {
-        let fail = |name, value, allowed| Err(MachineError { name, value, allowed });
+        let fail = |name, value, allowed| {
+            Err(MachineError {
+                name,
+                value,
+                allowed,
+            })
+        };
         let positive = |name, value: f64| match value > 0.0 && value.is_finite() {
             true => Ok(()),
             false => fail(name, value, "positive, finite numbers"),
@@ -250,5 +259,9 @@ impl Machine {
 fn slowest_s(m: SecondOrder) -> f64 {
     let root = (m.zeta * m.zeta - 1.0).max(0.0).sqrt();
     // ζ − √(ζ²−1) loses its digits for large ζ; its reciprocal ζ + √(ζ²−1) does not.
-    if root > 0.0 { (m.zeta + root) / m.omega_n_rad_s } else { 1.0 / (m.zeta * m.omega_n_rad_s) }
+    if root > 0.0 {
+        (m.zeta + root) / m.omega_n_rad_s
+    } else {
+        1.0 / (m.zeta * m.omega_n_rad_s)
+    }
 }

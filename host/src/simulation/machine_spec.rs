@@ -49,7 +49,10 @@ pub struct VibrationSpec {
 /// One axis.
 #[derive(Clone, Copy, Debug, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-#[allow(missing_docs, reason = "the fields are those of Machine and its elements")]
+#[allow(
+    missing_docs,
+    reason = "the fields are those of Machine and its elements"
+)]
 pub struct AxisSpec {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kv_per_s: Option<f64>,
@@ -97,7 +100,11 @@ impl MachineSpec {
     /// # Errors
     /// Elements that lack a part, contradict each other or fail [`Machine::check`]; `name` is the key.
     pub fn machine(&self) -> Result<Machine, MachineError> {
-        let missing = |name, allowed| MachineError { name, value: f64::NAN, allowed };
+        let missing = |name, allowed| MachineError {
+            name,
+            value: f64::NAN,
+            allowed,
+        };
         let mut machine = Machine {
             interpolation_s: self.interpolation_s,
             centripetal_limit_m_s2: self.centripetal_limit_mm_s2.map(|a| a * 1e-3),
@@ -113,7 +120,10 @@ impl MachineSpec {
         };
         machine.acc_dec = match (self.exponential_s, self.moving_average_s) {
             (Some(_), Some(_)) => {
-                return Err(missing("moving_average_s", "one filter: exponential_s or moving_average_s"));
+                return Err(missing(
+                    "moving_average_s",
+                    "one filter: exponential_s or moving_average_s",
+                ));
             }
             (Some(t), None) => AccDec::Exponential(t),
             (None, Some(t)) => AccDec::MovingAverage(t),
@@ -126,7 +136,10 @@ impl MachineSpec {
             }
             machine.servo[axis].feed_forward = get(|a| a.feed_forward).unwrap_or(0.0);
             machine.mechanics[axis] = match (get(|a| a.omega_n_rad_s), get(|a| a.zeta)) {
-                (Some(omega_n_rad_s), Some(zeta)) => Some(SecondOrder { omega_n_rad_s, zeta }),
+                (Some(omega_n_rad_s), Some(zeta)) => Some(SecondOrder {
+                    omega_n_rad_s,
+                    zeta,
+                }),
                 (None, None) => None,
                 (None, Some(_)) => return Err(missing("omega_n_rad_s", "a number beside zeta")),
                 (Some(_), None) => return Err(missing("zeta", "a number beside omega_n_rad_s")),
@@ -146,7 +159,8 @@ impl MachineSpec {
                     presliding_m: get(|a| a.friction_presliding_um)
                         .map_or(standard.presliding_m, |v| v * 1e-6),
                     stick_slip_m: stick.unwrap_or(0.0) * 1e-6,
-                    stick_travel_m: get(|a| a.stick_travel_um).map_or(standard.stick_travel_m, |v| v * 1e-6),
+                    stick_travel_m: get(|a| a.stick_travel_um)
+                        .map_or(standard.stick_travel_m, |v| v * 1e-6),
                     stick_speed_m_s: get(|a| a.stick_speed_mm_s)
                         .map_or(standard.stick_speed_m_s, |v| v * 1e-3),
                 });

@@ -22,7 +22,9 @@ pub(super) fn turning_point([p0, v0, p1, v1]: [f64; 4], h: f64) -> Option<f64> {
     let (a, b) = (3.0 * (p1 - p0) - 2.0 * m0 - m1, 2.0 * (p0 - p1) + m0 + m1);
     let root = (a * a - 3.0 * b * m0).max(0.0).sqrt();
     let q = -(a + root.copysign(a));
-    [m0 / q, q / (3.0 * b)].into_iter().find(|s| (0.0..=1.0).contains(s))
+    [m0 / q, q / (3.0 * b)]
+        .into_iter()
+        .find(|s| (0.0..=1.0).contains(s))
 }
 
 /// What an axis remembers of its way.
@@ -65,7 +67,11 @@ impl Memory {
         step_s: f64,
     ) -> Option<Self> {
         let half_backlash_m = 0.5 * machine.backlash_m[axis];
-        let sign = if velocity_m_s == 0.0 { 0.0 } else { velocity_m_s.signum() };
+        let sign = if velocity_m_s == 0.0 {
+            0.0
+        } else {
+            velocity_m_s.signum()
+        };
         let friction = machine.friction[axis];
         Self::needed(machine, axis).then(|| Self {
             half_backlash_m,
@@ -110,7 +116,11 @@ impl Memory {
     }
 
     fn visit(&mut self, y: [f64; 4], from: f64, to: f64) {
-        let x = if to < 1.0 { hermite(y, self.step_s, to)[0] } else { y[2] };
+        let x = if to < 1.0 {
+            hermite(y, self.step_s, to)[0]
+        } else {
+            y[2]
+        };
         self.notice(self.step_s * (to - from), x);
     }
 
@@ -141,21 +151,37 @@ impl Memory {
     fn rub(&mut self, friction: Friction, since_s: f64, x: f64) {
         let way = x - self.last_m;
         self.last_m = x;
-        let keeps = if since_s == self.step_s { self.step_keeps } else { keeps(friction, since_s) };
+        let keeps = if since_s == self.step_s {
+            self.step_keeps
+        } else {
+            keeps(friction, since_s)
+        };
         let before = self.slide;
-        let turned = if way.abs() <= ROUNDING_M { before } else { way.signum() };
+        let turned = if way.abs() <= ROUNDING_M {
+            before
+        } else {
+            way.signum()
+        };
         if turned == before {
             self.answers = std::array::from_fn(|i| keeps[i] * self.answers[i]);
             return;
         }
         let at_once = friction.presliding_m <= 0.0;
-        let stay = if at_once { 0.0 } else { (-way.abs() / friction.presliding_m).exp() };
+        let stay = if at_once {
+            0.0
+        } else {
+            (-way.abs() / friction.presliding_m).exp()
+        };
         self.slide = turned + (before - turned) * stay;
         let taus = [friction.decay_s, friction.rise_s];
         for ((answer, keep), tau) in self.answers.iter_mut().zip(keeps).zip(taus) {
             let ratio = since_s / tau;
             // A change spread evenly over the step, or with it all at its beginning.
-            let take = if ratio > 1e-9 && !at_once { (1.0 - keep) / ratio } else { keep };
+            let take = if ratio > 1e-9 && !at_once {
+                (1.0 - keep) / ratio
+            } else {
+                keep
+            };
             *answer = keep * *answer + take * (self.slide - before);
         }
     }
@@ -163,21 +189,35 @@ impl Memory {
     /// Offset of the load from the drive.
     pub(super) fn error_m(&self, x: f64, velocity: f64) -> f64 {
         // A negative step is an overcompensated play: the mirror image.
-        let play = (self.load_m - x) * if self.half_backlash_m < 0.0 { -1.0 } else { 1.0 };
-        let Some((friction, turn_m)) = self.friction.zip(self.reversal_m) else { return play };
+        let play = (self.load_m - x)
+            * if self.half_backlash_m < 0.0 {
+                -1.0
+            } else {
+                1.0
+            };
+        let Some((friction, turn_m)) = self.friction.zip(self.reversal_m) else {
+            return play;
+        };
         let pulse = self.pulse_m * (self.answers[0] - self.answers[1]);
         if friction.stick_slip_m == 0.0 {
             return play - pulse;
         }
         let slow = (-(velocity / friction.stick_speed_m_s).powi(2)).exp();
-        let tooth = friction.stick_slip_m * slow * ((x - turn_m).abs() / friction.stick_travel_m).fract();
+        let tooth =
+            friction.stick_slip_m * slow * ((x - turn_m).abs() / friction.stick_travel_m).fract();
         play - pulse - self.sign * tooth
     }
 }
 
 /// What is left of the two answers after `since_s`; a rise of zero answers nothing.
 fn keeps(friction: Friction, since_s: f64) -> [f64; 2] {
-    [friction.decay_s, friction.rise_s].map(|tau| if tau > 0.0 { (-since_s / tau).exp() } else { 0.0 })
+    [friction.decay_s, friction.rise_s].map(|tau| {
+        if tau > 0.0 {
+            (-since_s / tau).exp()
+        } else {
+            0.0
+        }
+    })
 }
 
 #[cfg(test)]
@@ -186,9 +226,12 @@ mod tests {
 
     #[test]
     fn turning_point_is_where_the_velocity_is_zero() {
-        for y in
-            [[0.0, 1.0, 0.1, -2.0], [0.0, -1e-9, 0.1, 3.0], [1.0, 2.0, 1.0, -2.0], [0.0, 1.0, 0.4, -1e-7]]
-        {
+        for y in [
+            [0.0, 1.0, 0.1, -2.0],
+            [0.0, -1e-9, 0.1, 3.0],
+            [1.0, 2.0, 1.0, -2.0],
+            [0.0, 1.0, 0.4, -1e-7],
+        ] {
             let s = turning_point(y, 0.3).unwrap();
             assert!((hermite(y, 0.3, s)[1]).abs() < 1e-12, "{y:?}: {s}");
         }
@@ -198,12 +241,18 @@ mod tests {
 
     #[test]
     fn play_lags_on_both_sides() {
-        let machine = Machine { backlash_m: [2e-5, 0.0], ..Machine::default() };
+        let machine = Machine {
+            backlash_m: [2e-5, 0.0],
+            ..Machine::default()
+        };
         let mut memory = Memory::new(&machine, 0, [0.0, 1.0], 1.0).unwrap();
         memory.notice(1.0, 1e-3);
         assert!((memory.error_m(1e-3, 1.0) + 1e-5).abs() < 1e-15);
         memory.notice(1.0, 1e-3 - 5e-6);
-        assert!((memory.error_m(1e-3 - 5e-6, -1.0) + 5e-6).abs() < 1e-15, "inside the gap the load stands");
+        assert!(
+            (memory.error_m(1e-3 - 5e-6, -1.0) + 5e-6).abs() < 1e-15,
+            "inside the gap the load stands"
+        );
         memory.notice(1.0, 0.0);
         assert!((memory.error_m(0.0, -1.0) - 1e-5).abs() < 1e-15);
     }
@@ -211,8 +260,14 @@ mod tests {
     /// Two samples at nearly the same time: rounding may put the later one behind the earlier.
     #[test]
     fn rounding_is_no_reversal() {
-        let friction = Friction { peak_m: 1e-5, ..Friction::default() };
-        let machine = Machine { friction: [Some(friction), None], ..Machine::default() };
+        let friction = Friction {
+            peak_m: 1e-5,
+            ..Friction::default()
+        };
+        let machine = Machine {
+            friction: [Some(friction), None],
+            ..Machine::default()
+        };
         let mut memory = Memory::new(&machine, 0, [0.0, 1.0], 1.0).unwrap();
         memory.notice(1.0, 0.1);
         memory.notice(1.0, 0.0);
@@ -220,6 +275,9 @@ mod tests {
         memory.notice(1.0, 0.2);
         let before = memory.error_m(0.2, 1.0);
         memory.notice(1e-16, 0.2 - 2.0 * f64::EPSILON);
-        assert!((memory.error_m(0.2, 1.0) - before).abs() < 1e-12, "{memory:?}");
+        assert!(
+            (memory.error_m(0.2, 1.0) - before).abs() < 1e-12,
+            "{memory:?}"
+        );
     }
 }

@@ -51,13 +51,23 @@ struct Track {
 
 impl<const S: usize> Axis<S> {
     fn new(round: Round<'_>, axis: usize, chain: &Discrete) -> Self {
-        let Round { machine, turns, omega_rad_s, step_s, .. } = round;
+        let Round {
+            machine,
+            turns,
+            omega_rad_s,
+            step_s,
+            ..
+        } = round;
         let before = run_in_s(round, axis).map_or(0.0, |s| (s / step_s).min(MAX_STEPS).ceil());
         let phasor = phasor(machine, axis, round.radius_m, omega_rad_s);
         let start = turns.at(-before);
         let chain = chain.in_orbit(phasor, omega_rad_s, turns.step_rad(), start);
         let last = chain.look(start);
-        let track = Memory::new(machine, axis, last, step_s).map(|memory| Track { memory, step_s, last });
+        let track = Memory::new(machine, axis, last, step_s).map(|memory| Track {
+            memory,
+            step_s,
+            last,
+        });
         let mut axis = Self { chain, track };
         let mut waves = [[0.0; 2]; PIECE];
         let (mut k, mut unseen) = (before, Vec::with_capacity(1));
@@ -121,23 +131,50 @@ mod tests {
     /// What comes after the run-in is what comes a turn and two turns later: nothing of the start is left.
     #[test]
     fn the_first_lap_is_that_of_all() {
-        let sharp = Friction { peak_m: 8e-6, decay_s: 0.03, ..Friction::default() };
-        let soft = Friction { rise_s: 0.004, presliding_m: 2e-5, ..sharp };
+        let sharp = Friction {
+            peak_m: 8e-6,
+            decay_s: 0.03,
+            ..Friction::default()
+        };
+        let soft = Friction {
+            rise_s: 0.004,
+            presliding_m: 2e-5,
+            ..sharp
+        };
         let lagging = || Machine {
-            servo: [PositionLoop { kv_per_s: 30.0, feed_forward: 0.0 }; 2],
+            servo: [PositionLoop {
+                kv_per_s: 30.0,
+                feed_forward: 0.0,
+            }; 2],
             ..Machine::default()
         };
         let machines = [
-            Machine { backlash_m: [2e-5; 2], ..lagging() },
-            Machine { friction: [Some(sharp); 2], ..lagging() },
-            Machine { friction: [Some(soft); 2], backlash_m: [1e-5; 2], ..lagging() },
+            Machine {
+                backlash_m: [2e-5; 2],
+                ..lagging()
+            },
+            Machine {
+                friction: [Some(sharp); 2],
+                ..lagging()
+            },
+            Machine {
+                friction: [Some(soft); 2],
+                backlash_m: [1e-5; 2],
+                ..lagging()
+            },
         ];
         const STEPS: usize = 720;
         for machine in &machines {
             for (omega_rad_s, start_rad) in [(2.0, 0.3), (-7.0, -1.9)] {
                 let step_rad = std::f64::consts::TAU.copysign(omega_rad_s) / STEPS as f64;
                 let (turns, step_s) = (Turns::new(start_rad, step_rad), step_rad / omega_rad_s);
-                let round = Round { machine, turns: &turns, radius_m: 0.1, omega_rad_s, step_s };
+                let round = Round {
+                    machine,
+                    turns: &turns,
+                    radius_m: 0.1,
+                    omega_rad_s,
+                    step_s,
+                };
                 let chain = Discrete::new(Chain::new(machine, 0), step_s);
                 let mut axis = axis(round, 0, &chain);
                 let mut waves = [[0.0; 2]; STEPS];
@@ -145,13 +182,23 @@ mod tests {
                     let mut points = Vec::new();
                     turns.fill((first * STEPS) as f64, &mut waves);
                     axis.follow(&waves, 1, &mut points);
-                    points.iter().map(|p| p.drive_m + p.error_m).collect::<Vec<_>>()
+                    points
+                        .iter()
+                        .map(|p| p.drive_m + p.error_m)
+                        .collect::<Vec<_>>()
                 };
                 let (one, two, three) = (lap(0), lap(1), lap(2));
-                let apart =
-                    |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                let apart = |a: &[f64], b: &[f64]| {
+                    a.iter()
+                        .zip(b)
+                        .map(|(a, b)| (a - b).abs())
+                        .fold(0.0, f64::max)
+                };
                 let worst = apart(&one, &three).max(apart(&two, &three));
-                assert!(worst < 1e-10, "{worst} m at {omega_rad_s} rad/s: {machine:?}");
+                assert!(
+                    worst < 1e-10,
+                    "{worst} m at {omega_rad_s} rad/s: {machine:?}"
+                );
             }
         }
     }

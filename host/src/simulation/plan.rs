@@ -60,12 +60,15 @@ pub fn campaign(plan: &Plan, seed: u64) -> Campaign {
         }
         let turn_s = TAU * planned.test.radius_m / planned.test.feed_m_s;
         // Tenths of a second, as a person would note them.
-        clock_s = ((planned.test.started_s + TURNS_PER_RUN * turn_s + PAUSE_S) * 10.0).round() / 10.0;
+        clock_s =
+            ((planned.test.started_s + TURNS_PER_RUN * turn_s + PAUSE_S) * 10.0).round() / 10.0;
     }
     let run = |(index, planned): (usize, &PlannedTest)| {
         let test = &planned.test;
         let trace = circle(&plan.machine, test);
-        let samples = plan.instrument.record(test, &trace, &mut draws(seed, index as u64 + 1));
+        let samples = plan
+            .instrument
+            .record(test, &trace, &mut draws(seed, index as u64 + 1));
         Run {
             file: format!("run{index:03}.csv"),
             radius_m: test.radius_m,
@@ -74,7 +77,11 @@ pub fn campaign(plan: &Plan, seed: u64) -> Campaign {
             start_angle_rad: test.start_angle_rad,
             started_s: Some(test.started_s),
             temperature_c: None,
-            centre_m: (test.centre_m != [0.0; 2]).then_some([test.centre_m[0], test.centre_m[1], 0.0]),
+            centre_m: (test.centre_m != [0.0; 2]).then_some([
+                test.centre_m[0],
+                test.centre_m[1],
+                0.0,
+            ]),
             samples,
         }
     };

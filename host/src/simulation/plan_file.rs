@@ -69,7 +69,10 @@ pub struct Names {
 
 impl Default for Names {
     fn default() -> Self {
-        Self { name: "simulated".into(), machine: "simulated two-axis machine".into() }
+        Self {
+            name: "simulated".into(),
+            machine: "simulated two-axis machine".into(),
+        }
     }
 }
 
@@ -168,7 +171,9 @@ impl Plan {
     /// As [`Self::load`].
     pub fn parse(text: &str, file: &Path) -> Result<Self, TomlFileError> {
         let dir = file.parent().unwrap_or(Path::new("."));
-        Self::of_text(&TomlText::new(file, text, EXPECTED), |model| ModelFile::load(&dir.join(model)))
+        Self::of_text(&TomlText::new(file, text, EXPECTED), |model| {
+            ModelFile::load(&dir.join(model))
+        })
     }
 
     fn of_text(
@@ -186,13 +191,17 @@ impl Plan {
             }
             (None, None) => Machine::default(),
             (Some(spec), None) => spec.machine().map_err(|e| {
-                let path: Vec<&str> = std::iter::once("machine").chain(e.name.split('.')).collect();
+                let path: Vec<&str> = std::iter::once("machine")
+                    .chain(e.name.split('.'))
+                    .collect();
                 text.value_error(&path, e.value, e.allowed)
             })?,
             (None, Some(file)) => {
                 let model = load(file)?;
                 let machine = Machine::from_model(&model);
-                machine.map_err(|e| text.missed(&["model"], format!("{}: {e}", file.display()), e.allowed))?
+                machine.map_err(|e| {
+                    text.missed(&["model"], format!("{}: {e}", file.display()), e.allowed)
+                })?
             }
         };
         let instrument = match plan.instrument {
@@ -201,23 +210,47 @@ impl Plan {
         };
         let (tests, shuffle) = match (&plan.grid, plan.runs.as_slice()) {
             (None, []) => {
-                return Err(text.missed(&[], "the plan has no runs", "a [grid] or at least one [[run]]"));
+                return Err(text.missed(
+                    &[],
+                    "the plan has no runs",
+                    "a [grid] or at least one [[run]]",
+                ));
             }
             (Some(_), [_, ..]) => {
-                return Err(text.missed(&["run"], "[grid] and [[run]] both say what to run", "one of them"));
+                return Err(text.missed(
+                    &["run"],
+                    "[grid] and [[run]] both say what to run",
+                    "one of them",
+                ));
             }
             (Some(grid), []) => (grid.tests(text)?, grid.order == Order::Random),
             (None, runs) => {
                 let test = |(i, run): (usize, &RunSpec)| run.test(text, i);
-                (runs.iter().enumerate().map(test).collect::<Result<_, _>>()?, false)
+                (
+                    runs.iter()
+                        .enumerate()
+                        .map(test)
+                        .collect::<Result<_, _>>()?,
+                    false,
+                )
             }
         };
         if tests.len() > MAX_RUNS {
             let found = format!("the plan has {} runs", tests.len());
             return Err(text.missed(&["grid"], found, format!("at most {MAX_RUNS}")));
         }
-        let Names { name, machine: machine_name } = plan.campaign;
-        Ok(Self { name, machine_name, machine, instrument, tests, shuffle })
+        let Names {
+            name,
+            machine: machine_name,
+        } = plan.campaign;
+        Ok(Self {
+            name,
+            machine_name,
+            machine,
+            instrument,
+            tests,
+            shuffle,
+        })
     }
 }
 
@@ -242,7 +275,11 @@ impl InstrumentSpec {
         ];
         for (key, value, most) in anywhere {
             if value.abs() > most || value.is_nan() {
-                return Err(text.value_error(&["instrument", key], value, format!("-{most} to {most}")));
+                return Err(text.value_error(
+                    &["instrument", key],
+                    value,
+                    format!("-{most} to {most}"),
+                ));
             }
         }
         Ok(Instrument {
@@ -265,7 +302,10 @@ const RANGE: &str = "0.01 to 100000";
 
 impl Grid {
     fn tests(&self, text: &TomlText) -> Result<Vec<PlannedTest>, TomlFileError> {
-        for (key, list) in [("radii_mm", &self.radii_mm), ("feeds_mm_s", &self.feeds_mm_s)] {
+        for (key, list) in [
+            ("radii_mm", &self.radii_mm),
+            ("feeds_mm_s", &self.feeds_mm_s),
+        ] {
             if list.is_empty() {
                 return Err(text.missed(
                     &["grid", key],
@@ -278,13 +318,25 @@ impl Grid {
             }
         }
         if self.directions.is_empty() || self.repeats == 0 {
-            let key = if self.repeats == 0 { "repeats" } else { "directions" };
-            return Err(text.missed(&["grid", key], format!("`grid.{key}` leaves no runs"), "at least one"));
+            let key = if self.repeats == 0 {
+                "repeats"
+            } else {
+                "directions"
+            };
+            return Err(text.missed(
+                &["grid", key],
+                format!("`grid.{key}` leaves no runs"),
+                "at least one",
+            ));
         }
         let mut tests = Vec::new();
         for radius in &self.radii_mm {
             for feed in &self.feeds_mm_s {
-                for direction in self.directions.iter().flat_map(|d| std::iter::repeat_n(*d, self.repeats)) {
+                for direction in self
+                    .directions
+                    .iter()
+                    .flat_map(|d| std::iter::repeat_n(*d, self.repeats))
+                {
                     let test = CircleTest::new(radius * 1e-3, feed * 1e-3, direction);
                     tests.push(PlannedTest { test, timed: false });
                 }
@@ -326,6 +378,9 @@ impl RunSpec {
             centre_m: [centre[0] * 1e-3, centre[1] * 1e-3],
             ..CircleTest::new(self.radius_mm * 1e-3, self.feed_mm_s * 1e-3, self.direction)
         };
-        Ok(PlannedTest { test, timed: self.started_s.is_some() })
+        Ok(PlannedTest {
+            test,
+            timed: self.started_s.is_some(),
+        })
     }
 }

@@ -51,8 +51,20 @@ fn reads_a_grid_and_a_machine() {
     assert_eq!(plan.tests.len(), 12);
     assert!(plan.shuffle);
     assert_eq!(plan.machine.acc_dec, AccDec::MovingAverage(0.04));
-    assert_eq!(plan.machine.servo[0], PositionLoop { kv_per_s: 48.0, feed_forward: 0.2 });
-    assert_eq!(plan.machine.servo[1], PositionLoop { kv_per_s: 50.0, feed_forward: 0.2 });
+    assert_eq!(
+        plan.machine.servo[0],
+        PositionLoop {
+            kv_per_s: 48.0,
+            feed_forward: 0.2
+        }
+    );
+    assert_eq!(
+        plan.machine.servo[1],
+        PositionLoop {
+            kv_per_s: 50.0,
+            feed_forward: 0.2
+        }
+    );
     assert!((plan.machine.backlash_m[0] - 8e-6).abs() < 1e-18 && plan.machine.backlash_m[1] == 0.0);
     assert!((plan.instrument.setup_m[1] + 10e-6).abs() < 1e-18);
 }
@@ -82,20 +94,32 @@ fn refusals_name_the_place() {
         refuse("[100.0, 300.0]", "[100.0, nan]"),
         "plan.toml:18:20: `grid.radii_mm` is NaN; expected 0.01 to 100000"
     );
-    assert!(refuse("[100.0, 300.0]", "[]").starts_with("plan.toml:18:12: `grid.radii_mm` is empty"));
+    assert!(
+        refuse("[100.0, 300.0]", "[]").starts_with("plan.toml:18:12: `grid.radii_mm` is empty")
+    );
     assert!(
         refuse("moving_average_s = 0.04", "moving_average_s = -0.04")
             .starts_with("plan.toml:6:20: `machine.moving_average_s`")
     );
-    assert!(refuse("moving_average_s", "moving_avarage_s").starts_with("plan.toml:6:1: unknown field"));
     assert!(
-        refuse("[campaign]", "model = \"model.toml\"\n[campaign]").starts_with("plan.toml:1:9: `model` and")
+        refuse("moving_average_s", "moving_avarage_s").starts_with("plan.toml:6:1: unknown field")
     );
-    assert!(refuse("[grid]", "[grid]\norder = \"fastest\"").contains("plan.toml:18:9: unknown variant"));
-    assert!(refuse("[grid]", "[grid]\ndirections = []").contains("`grid.directions` leaves no runs"));
     assert!(
-        refuse("[grid]", "[[run]]\nradius_mm = 1.0\nfeed_mm_s = 1.0\ndirection = \"cw\"\n[grid]")
-            .contains("[grid] and [[run]]")
+        refuse("[campaign]", "model = \"model.toml\"\n[campaign]")
+            .starts_with("plan.toml:1:9: `model` and")
+    );
+    assert!(
+        refuse("[grid]", "[grid]\norder = \"fastest\"").contains("plan.toml:18:9: unknown variant")
+    );
+    assert!(
+        refuse("[grid]", "[grid]\ndirections = []").contains("`grid.directions` leaves no runs")
+    );
+    assert!(
+        refuse(
+            "[grid]",
+            "[[run]]\nradius_mm = 1.0\nfeed_mm_s = 1.0\ndirection = \"cw\"\n[grid]"
+        )
+        .contains("[grid] and [[run]]")
     );
     assert_eq!(
         load("[campaign]\nname = \"x\"\n").unwrap_err().to_string(),
@@ -106,26 +130,43 @@ fn refusals_name_the_place() {
         load(run).unwrap_err().to_string(),
         "plan.toml:3:13: `run.feed_mm_s` is 0; expected 0.01 to 100000"
     );
-    assert!(load("model = \"gone.toml\"\n").unwrap_err().to_string().contains("gone.toml: no such file"));
+    assert!(
+        load("model = \"gone.toml\"\n")
+            .unwrap_err()
+            .to_string()
+            .contains("gone.toml: no such file")
+    );
 }
 
 #[test]
 fn seed_fixes_everything() {
     let plan = load(PLAN).unwrap();
     let first = campaign(&plan, 11);
-    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let one_thread = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .unwrap();
     assert_eq!(one_thread.install(|| campaign(&plan, 11)), first);
     let other = campaign(&plan, 12);
-    let feeds = |c: &crate::campaign::Campaign| c.runs.iter().map(|r| r.feed_m_s).collect::<Vec<_>>();
+    let feeds =
+        |c: &crate::campaign::Campaign| c.runs.iter().map(|r| r.feed_m_s).collect::<Vec<_>>();
     assert_ne!(feeds(&other), feeds(&first), "another seed, another order");
-    assert!(first.runs.windows(2).all(|r| r[0].started_s < r[1].started_s));
+    assert!(
+        first
+            .runs
+            .windows(2)
+            .all(|r| r[0].started_s < r[1].started_s)
+    );
 }
 
 /// What is written is what is read, through the campaign's own border.
 #[test]
 fn written_campaign_reads_back() {
     let mut plan = load(PLAN).unwrap();
-    plan.machine = Machine { backlash_m: plan.machine.backlash_m, ..Machine::default() };
+    plan.machine = Machine {
+        backlash_m: plan.machine.backlash_m,
+        ..Machine::default()
+    };
     let made = campaign(&plan, 3);
     let dir = tempfile::tempdir().unwrap();
     crate::campaign::write(&made, dir.path()).unwrap();

@@ -18,7 +18,11 @@ pub(super) struct Turns {
 impl Turns {
     /// From `start_rad` on, `step_rad` a step.
     pub(super) fn new(start_rad: f64, step_rad: f64) -> Self {
-        Self { start_rad, step_rad, fine: std::array::from_fn(|k| wave(step_rad * k as f64)) }
+        Self {
+            start_rad,
+            step_rad,
+            fine: std::array::from_fn(|k| wave(step_rad * k as f64)),
+        }
     }
 
     /// Angle of a step, rad.
@@ -48,7 +52,12 @@ fn wave(angle_rad: f64) -> [f64; 2] {
 }
 
 /// Phasor of what reaches the chain of one axis (0: X, 1: Y), m: the circle behind dead time and moving average.
-pub(super) fn phasor(machine: &Machine, axis: usize, radius_m: f64, omega_rad_s: f64) -> Complex<f64> {
+pub(super) fn phasor(
+    machine: &Machine,
+    axis: usize,
+    radius_m: f64,
+    omega_rad_s: f64,
+) -> Complex<f64> {
     let quarter = if axis == 0 { 0.0 } else { FRAC_PI_2 };
     let circle = Complex::from_polar(radius_m, -quarter);
     let late = Complex::cis(-omega_rad_s * machine.dead_time_s[axis]);
@@ -70,7 +79,11 @@ mod tests {
     #[test]
     fn turned_waves_are_right_to_what_is_stated() {
         let mut worst: f64 = 0.0;
-        for (start, step) in [(0.3, 1e-3), (-2.0, -0.0174), (0.0, std::f64::consts::TAU / 1e6)] {
+        for (start, step) in [
+            (0.3, 1e-3),
+            (-2.0, -0.0174),
+            (0.0, std::f64::consts::TAU / 1e6),
+        ] {
             let turns = Turns::new(start, step);
             let mut waves = vec![[0.0; 2]; 5000];
             turns.fill(-1700.0, &mut waves);
@@ -89,8 +102,11 @@ mod tests {
     /// Oracle: the mean of the wave over the window, by many points.
     #[test]
     fn phasor_is_the_late_mean_of_the_circle() {
-        let machine =
-            Machine { acc_dec: AccDec::MovingAverage(0.08), dead_time_s: [0.01, 0.03], ..Machine::default() };
+        let machine = Machine {
+            acc_dec: AccDec::MovingAverage(0.08),
+            dead_time_s: [0.01, 0.03],
+            ..Machine::default()
+        };
         let (radius, omega, psi, n) = (0.2, -5.0, 0.7, 20_000);
         for axis in 0..2 {
             let at = |back_s: f64| {

@@ -5,8 +5,13 @@ use std::path::{Path, PathBuf};
 
 fn pages() -> Vec<PathBuf> {
     let folders = [guide(), guide().join("causes")];
-    let all = folders.iter().flat_map(|f| std::fs::read_dir(f).unwrap()).map(|e| e.unwrap().path());
-    let mut pages: Vec<PathBuf> = all.filter(|p| p.extension().is_some_and(|e| e == "md")).collect();
+    let all = folders
+        .iter()
+        .flat_map(|f| std::fs::read_dir(f).unwrap())
+        .map(|e| e.unwrap().path());
+    let mut pages: Vec<PathBuf> = all
+        .filter(|p| p.extension().is_some_and(|e| e == "md"))
+        .collect();
     pages.sort();
     pages
 }
@@ -25,26 +30,43 @@ fn prose(text: &str) -> String {
 /// Anchors of the headings, as they are made by GitHub, mdBook and rustdoc alike: letters, digits, hyphens.
 fn anchors(text: &str) -> BTreeSet<String> {
     let headings = prose(text);
-    let headings = headings
-        .lines()
-        .filter_map(|l| l.trim_start_matches('#').strip_prefix(' ').filter(|_| l.starts_with('#')));
+    let headings = headings.lines().filter_map(|l| {
+        l.trim_start_matches('#')
+            .strip_prefix(' ')
+            .filter(|_| l.starts_with('#'))
+    });
     let kept = |c: char| c.is_alphanumeric() || c == '-' || c == '_' || c == ' ';
     headings
-        .map(|h| h.to_lowercase().chars().filter(|c| kept(*c)).collect::<String>().replace(' ', "-"))
+        .map(|h| {
+            h.to_lowercase()
+                .chars()
+                .filter(|c| kept(*c))
+                .collect::<String>()
+                .replace(' ', "-")
+        })
         .collect()
 }
 
 fn links(text: &str) -> Vec<String> {
     let text = prose(text);
-    text.split("](").skip(1).filter_map(|rest| Some(rest.split_once(')')?.0.to_owned())).collect()
+    text.split("](")
+        .skip(1)
+        .filter_map(|rest| Some(rest.split_once(')')?.0.to_owned()))
+        .collect()
 }
 
 /// What is wrong with the links of a page.
 fn broken(page: &Path, text: &str) -> Vec<String> {
     let mut wrong = Vec::new();
     for link in links(text).iter().filter(|l| !l.contains("://")) {
-        let (path, anchor) = link.split_once('#').map_or((link.as_str(), None), |(p, a)| (p, Some(a)));
-        let target = if path.is_empty() { page.to_path_buf() } else { page.parent().unwrap().join(path) };
+        let (path, anchor) = link
+            .split_once('#')
+            .map_or((link.as_str(), None), |(p, a)| (p, Some(a)));
+        let target = if path.is_empty() {
+            page.to_path_buf()
+        } else {
+            page.parent().unwrap().join(path)
+        };
         match std::fs::read_to_string(&target) {
             Ok(text) if anchor.is_none_or(|a| anchors(&text).contains(a)) => {}
             Ok(_) => wrong.push(format!("{}: no such heading: {link}", page.display())),
@@ -69,7 +91,14 @@ fn every_link_leads_somewhere() {
     assert!(count > 60, "{count} links were found");
     // The check sees what is wrong.
     let page = guide().join("index.md");
-    assert_eq!(broken(&page, "[a](nowhere.md) [b](figures.md#nothing) [c](figures.md#one-run)").len(), 2);
+    assert_eq!(
+        broken(
+            &page,
+            "[a](nowhere.md) [b](figures.md#nothing) [c](figures.md#one-run)"
+        )
+        .len(),
+        2
+    );
 }
 
 #[test]
@@ -79,7 +108,12 @@ fn the_summary_lists_every_page_once() {
     listed.sort();
     let mut there: Vec<String> = pages()
         .iter()
-        .map(|p| p.strip_prefix(guide()).unwrap().to_string_lossy().replace('\\', "/"))
+        .map(|p| {
+            p.strip_prefix(guide())
+                .unwrap()
+                .to_string_lossy()
+                .replace('\\', "/")
+        })
         .filter(|p| p != "SUMMARY.md")
         .collect();
     there.sort();
@@ -91,9 +125,17 @@ fn the_summary_lists_every_page_once() {
 fn every_fence_names_its_language() {
     for page in pages() {
         let text = std::fs::read_to_string(&page).unwrap();
-        let fences: Vec<&str> = text.lines().filter(|l| l.trim_start().starts_with("```")).collect();
+        let fences: Vec<&str> = text
+            .lines()
+            .filter(|l| l.trim_start().starts_with("```"))
+            .collect();
         for (k, fence) in fences.iter().enumerate() {
-            assert_eq!(fence.trim().len() > 3, k % 2 == 0, "{}: {fence}", page.display());
+            assert_eq!(
+                fence.trim().len() > 3,
+                k % 2 == 0,
+                "{}: {fence}",
+                page.display()
+            );
         }
         assert_eq!(fences.len() % 2, 0, "{}", page.display());
     }

@@ -3,7 +3,11 @@
 //! Blocks between `<!-- name -->` and `<!-- end -->` are written by the code: after a change,
 //! `GIOTTO_BLESS=1 cargo test -p giotto --test guide` writes them anew, and the difference is read before it is
 //! committed. Sessions likewise with `TRYCMD=overwrite`.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may fail where it stands")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test may fail where it stands"
+)]
 mod bytes;
 mod links;
 mod sessions;
@@ -21,9 +25,14 @@ fn holds(page: &str, name: &str, expected: &str) {
     let path = guide().join(page);
     let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{page}: {e}"));
     let begin = format!("<!-- {name} -->\n");
-    let from = text.find(&begin).unwrap_or_else(|| panic!("{page}: no block `{name}`")) + begin.len();
-    let to =
-        from + text[from..].find("<!-- end -->").unwrap_or_else(|| panic!("{page}: `{name}` has no end"));
+    let from = text
+        .find(&begin)
+        .unwrap_or_else(|| panic!("{page}: no block `{name}`"))
+        + begin.len();
+    let to = from
+        + text[from..]
+            .find("<!-- end -->")
+            .unwrap_or_else(|| panic!("{page}: `{name}` has no end"));
     let expected = format!("{}\n", expected.trim_end());
     if text[from..to] == expected {
         return;

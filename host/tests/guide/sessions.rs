@@ -7,9 +7,13 @@ use std::path::{Path, PathBuf};
 
 fn shown() -> Vec<PathBuf> {
     let readme = Path::new(env!("CARGO_MANIFEST_DIR")).join("../README.md");
-    let all = std::fs::read_dir(guide()).unwrap().map(|e| e.unwrap().path()).chain([readme]);
+    let all = std::fs::read_dir(guide())
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .chain([readme]);
     let has = |p: &PathBuf| {
-        p.extension().is_some_and(|e| e == "md") && std::fs::read_to_string(p).unwrap().contains("```console")
+        p.extension().is_some_and(|e| e == "md")
+            && std::fs::read_to_string(p).unwrap().contains("```console")
     };
     let mut pages: Vec<PathBuf> = all.filter(has).collect();
     pages.sort();
@@ -21,10 +25,16 @@ fn files(text: &str) -> Vec<(String, String)> {
     let mut found = Vec::new();
     let mut lines = text.lines();
     while let Some(line) = lines.next() {
-        let Some((_, name)) = line.strip_prefix("```").and_then(|fence| fence.split_once(' ')) else {
+        let Some((_, name)) = line
+            .strip_prefix("```")
+            .and_then(|fence| fence.split_once(' '))
+        else {
             continue;
         };
-        let body: Vec<&str> = lines.by_ref().take_while(|l| !l.starts_with("```")).collect();
+        let body: Vec<&str> = lines
+            .by_ref()
+            .take_while(|l| !l.starts_with("```"))
+            .collect();
         found.push((name.trim().to_owned(), body.join("\n") + "\n"));
     }
     found
@@ -53,7 +63,10 @@ fn sessions_are_as_shown() {
     }
     let replay = std::panic::catch_unwind(|| {
         trycmd::TestCases::new()
-            .register_bin("giotto", Path::new(env!("CARGO_BIN_EXE_giotto")).to_path_buf())
+            .register_bin(
+                "giotto",
+                Path::new(env!("CARGO_BIN_EXE_giotto")).to_path_buf(),
+            )
             .env("NO_COLOR", "1")
             .env("COLUMNS", "100")
             .case(stage.path().join("*.md"));

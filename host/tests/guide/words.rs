@@ -14,16 +14,21 @@ fn block(model: &dyn CauseModel) -> String {
             .collect::<Vec<_>>()
             .join(" or "),
     };
-    let corrected = words.not_compensable.map_or_else(|| "yes".to_owned(), |why| format!("no: {why}"));
+    let corrected = words
+        .not_compensable
+        .map_or_else(|| "yes".to_owned(), |why| format!("no: {why}"));
     let sentence = |text: &str| {
         let mut letters = text.chars();
-        letters
-            .next()
-            .map_or_else(String::new, |first| format!("{}{}.", first.to_uppercase(), letters.as_str()))
+        letters.next().map_or_else(String::new, |first| {
+            format!("{}{}.", first.to_uppercase(), letters.as_str())
+        })
     };
     let alike = match words.never_told_from {
         [] => String::new(),
-        names => format!("| circles never tell it from | {} |\n", names.join(", ").replace('_', " ")),
+        names => format!(
+            "| circles never tell it from | {} |\n",
+            names.join(", ").replace('_', " ")
+        ),
     };
     format!(
         "{}\n\n| | |\n|---|---|\n| name in files | `{}` |\n| estimate | {} |\n| axis | {axis} |\n| usually | {} |\n| remedy | {} |\n\
@@ -39,11 +44,16 @@ fn block(model: &dyn CauseModel) -> String {
 
 #[test]
 fn each_cause_has_its_page() {
-    let mut list = String::from("| cause | estimate | what it is | corrected |\n|---|---|---|---|\n");
+    let mut list =
+        String::from("| cause | estimate | what it is | corrected |\n|---|---|---|---|\n");
     for model in ALL {
         let words = model.words();
         holds(&format!("causes/{}.md", words.id), "words", &block(model));
-        let corrected = if words.not_compensable.is_none() { "yes" } else { "no" };
+        let corrected = if words.not_compensable.is_none() {
+            "yes"
+        } else {
+            "no"
+        };
         list += &format!(
             "| [`{0}`](causes/{0}.md) | {1} | {2} | {corrected} |\n",
             words.id, words.unit, words.what
@@ -51,6 +61,8 @@ fn each_cause_has_its_page() {
     }
     holds("causes.md", "list", &list);
     // No page without a cause.
-    let pages = std::fs::read_dir(super::guide().join("causes")).unwrap().count();
+    let pages = std::fs::read_dir(super::guide().join("causes"))
+        .unwrap()
+        .count();
     assert_eq!(pages, ALL.len());
 }

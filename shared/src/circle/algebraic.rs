@@ -27,7 +27,10 @@ impl Scaled {
         if m.count < 3 {
             return Err(CircleError::TooFew { points: m.count });
         }
-        if ![m.xx, m.xy, m.yy, m.xz, m.yz, m.zz, m.mean[0], m.mean[1]].iter().all(|v| v.is_finite()) {
+        if ![m.xx, m.xy, m.yy, m.xz, m.yz, m.zz, m.mean[0], m.mean[1]]
+            .iter()
+            .all(|v| v.is_finite())
+        {
             return Err(CircleError::NonFinite);
         }
         let n = m.count as f64;
@@ -61,10 +64,22 @@ impl Scaled {
     }
 
     /// Circle from its centre about the mean, in scaled units.
-    fn circle(&self, m: &Moments, centre: [f64; 2], radius_squared: f64) -> Result<Circle, CircleError> {
+    fn circle(
+        &self,
+        m: &Moments,
+        centre: [f64; 2],
+        radius_squared: f64,
+    ) -> Result<Circle, CircleError> {
         let radius = self.unit * Float::sqrt(radius_squared);
-        let centre = [m.mean[0] + self.unit * centre[0], m.mean[1] + self.unit * centre[1]];
-        if radius.is_finite() { Ok(Circle { centre, radius }) } else { Err(CircleError::Collinear) }
+        let centre = [
+            m.mean[0] + self.unit * centre[0],
+            m.mean[1] + self.unit * centre[1],
+        ];
+        if radius.is_finite() {
+            Ok(Circle { centre, radius })
+        } else {
+            Err(CircleError::Collinear)
+        }
     }
 }
 
@@ -76,8 +91,15 @@ impl Scaled {
 pub fn kasa(m: &Moments) -> Result<Circle, CircleError> {
     let s = Scaled::new(m)?;
     let twice = 2.0 * s.determinant();
-    let centre = [(s.yy * s.xz - s.xy * s.yz) / twice, (s.xx * s.yz - s.xy * s.xz) / twice];
-    s.circle(m, centre, centre[0] * centre[0] + centre[1] * centre[1] + 1.0)
+    let centre = [
+        (s.yy * s.xz - s.xy * s.yz) / twice,
+        (s.xx * s.yz - s.xy * s.xz) / twice,
+    ];
+    s.circle(
+        m,
+        centre,
+        centre[0] * centre[0] + centre[1] * centre[1] + 1.0,
+    )
 }
 
 /// The hyper-accurate algebraic circle.
@@ -110,6 +132,13 @@ pub fn hyper(m: &Moments) -> Result<Circle, CircleError> {
         (eta, value) = (next, next_value);
     }
     let twice = 2.0 * (eta * eta - eta + determinant);
-    let centre = [(s.xz * (s.yy - eta) - s.yz * s.xy) / twice, (s.yz * (s.xx - eta) - s.xz * s.xy) / twice];
-    s.circle(m, centre, centre[0] * centre[0] + centre[1] * centre[1] + 1.0 - 2.0 * eta)
+    let centre = [
+        (s.xz * (s.yy - eta) - s.yz * s.xy) / twice,
+        (s.yz * (s.xx - eta) - s.xz * s.xy) / twice,
+    ];
+    s.circle(
+        m,
+        centre,
+        centre[0] * centre[0] + centre[1] * centre[1] + 1.0 - 2.0 * eta,
+    )
 }

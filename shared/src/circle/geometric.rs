@@ -87,7 +87,10 @@ impl Part for About {
 
     #[inline(always)]
     fn of<L: Lanes>(&self, lanes: L, x: &[f64], y: &[f64]) -> Sums {
-        Sums { count: x.len(), of: sums(lanes, x, y, self) }
+        Sums {
+            count: x.len(),
+            of: sums(lanes, x, y, self),
+        }
     }
 }
 
@@ -130,7 +133,10 @@ struct Surface {
 
 impl Surface {
     fn at(points: &(impl Points + ?Sized), walk: Walk, about: &About) -> Self {
-        let Sums { count, of: [e, ee, p, q, ep, eq, w, wpp, wpq] } = points.sum(walk, about);
+        let Sums {
+            count,
+            of: [e, ee, p, q, ep, eq, w, wpp, wpq],
+        } = points.sum(walk, about);
         let n = count as f64;
         let mean_e = e / n;
         let best = about.radius + mean_e;
@@ -140,7 +146,11 @@ impl Surface {
             rss: (ee - mean_e * e).max(0.0),
             mean_normal: [p / n, q / n],
             gradient: [mean_e * p - ep, mean_e * q - eq],
-            hessian: [n - best * (w - wpp) - p * p / n, best * wpq - p * q / n, n - best * wpp - q * q / n],
+            hessian: [
+                n - best * (w - wpp) - p * p / n,
+                best * wpq - p * q / n,
+                n - best * wpp - q * q / n,
+            ],
         }
     }
 
@@ -168,14 +178,25 @@ impl Surface {
         let (xx, yy) = (xx + raise, yy + raise);
         let determinant = xx * yy - xy * xy;
         let [gx, gy] = self.gradient;
-        let by = [(xy * gy - yy * gx) / determinant, (xy * gx - xx * gy) / determinant];
+        let by = [
+            (xy * gy - yy * gx) / determinant,
+            (xy * gx - xx * gy) / determinant,
+        ];
         let length = Float::hypot(by[0], by[1]);
         // A flat model reaches for the horizon; half a radius keeps to the valley that the start is in.
         let cut = 0.5 * self.radius / length;
         if cut < 1.0 {
-            return Step { by: by.map(|s| s * cut), length: length * cut, newton: false };
+            return Step {
+                by: by.map(|s| s * cut),
+                length: length * cut,
+                newton: false,
+            };
         }
-        Step { by, length, newton: convex && shift == 0.0 }
+        Step {
+            by,
+            length,
+            newton: convex && shift == 0.0,
+        }
     }
 
     /// Bound on the next Newton step after one of `length`: |f‴| ≤ 3N/d of each point, so the gradient left is below
@@ -192,13 +213,25 @@ impl Surface {
         let variance = rss / free;
         let [xx, xy, yy] = self.hessian;
         let determinant = xx * yy - xy * xy;
-        let inverse = [[yy / determinant, -xy / determinant], [-xy / determinant, xx / determinant]];
+        let inverse = [
+            [yy / determinant, -xy / determinant],
+            [-xy / determinant, xx / determinant],
+        ];
         let m = self.mean_normal;
-        let cross: [f64; 2] = core::array::from_fn(|i| -(inverse[i][0] * m[0] + inverse[i][1] * m[1]));
+        let cross: [f64; 2] =
+            core::array::from_fn(|i| -(inverse[i][0] * m[0] + inverse[i][1] * m[1]));
         let radius = 1.0 / self.n() - (cross[0] * m[0] + cross[1] * m[1]);
         Some([
-            [variance * inverse[0][0], variance * inverse[0][1], variance * cross[0]],
-            [variance * inverse[1][0], variance * inverse[1][1], variance * cross[1]],
+            [
+                variance * inverse[0][0],
+                variance * inverse[0][1],
+                variance * cross[0],
+            ],
+            [
+                variance * inverse[1][0],
+                variance * inverse[1][1],
+                variance * cross[1],
+            ],
             [variance * cross[0], variance * cross[1], variance * radius],
         ])
     }
@@ -229,20 +262,34 @@ pub(super) fn refine_walk(
     hyper(moments)?;
     let origin = moments.mean;
     let spread = Float::sqrt((moments.xx + moments.yy) / moments.count as f64);
-    let surface =
-        |centre: [f64; 2], radius: f64| Surface::at(points, walk, &About { origin, centre, radius });
+    let surface = |centre: [f64; 2], radius: f64| {
+        Surface::at(
+            points,
+            walk,
+            &About {
+                origin,
+                centre,
+                radius,
+            },
+        )
+    };
     let mut centre = [start.centre[0] - origin[0], start.centre[1] - origin[1]];
     let mut here = surface(centre, start.radius);
     let (mut passes, mut shift) = (1, 0.0);
     let report =
-        |centre: [f64; 2], at: &Surface, radius: f64, rss: f64, passes: usize, stopped: Stop| CircleFit {
-            circle: Circle { centre: [origin[0] + centre[0], origin[1] + centre[1]], radius },
-            covariance: at.covariance(rss),
-            rss,
-            rms: Float::sqrt(rss / at.n()),
-            points: at.count,
-            passes,
-            stopped,
+        |centre: [f64; 2], at: &Surface, radius: f64, rss: f64, passes: usize, stopped: Stop| {
+            CircleFit {
+                circle: Circle {
+                    centre: [origin[0] + centre[0], origin[1] + centre[1]],
+                    radius,
+                },
+                covariance: at.covariance(rss),
+                rss,
+                rms: Float::sqrt(rss / at.n()),
+                points: at.count,
+                passes,
+                stopped,
+            }
         };
     loop {
         if !here.rss.is_finite() || !here.radius.is_finite() {
@@ -251,17 +298,29 @@ pub(super) fn refine_walk(
         if here.radius >= LINE * spread {
             return Err(CircleError::Collinear);
         }
-        let Step { by: step, length, newton } = here.step(shift);
+        let Step {
+            by: step,
+            length,
+            newton,
+        } = here.step(shift);
         let to = [centre[0] + step[0], centre[1] + step[1]];
         let next = length.min(here.next_step(length));
         if newton && length <= 1e-6 * here.radius && next <= TINY_STEP * here.radius {
             // The quadratic model is exact here to the cube of the step, below the digits: no further pass.
-            let radius = here.radius - (here.mean_normal[0] * step[0] + here.mean_normal[1] * step[1]);
+            let radius =
+                here.radius - (here.mean_normal[0] * step[0] + here.mean_normal[1] * step[1]);
             let rss = (here.rss + here.gradient[0] * step[0] + here.gradient[1] * step[1]).max(0.0);
             return Ok(report(to, &here, radius, rss, passes, Stop::Converged));
         }
         if passes >= MAX_PASSES {
-            return Ok(report(centre, &here, here.radius, here.rss, passes, Stop::PassLimit));
+            return Ok(report(
+                centre,
+                &here,
+                here.radius,
+                here.rss,
+                passes,
+                Stop::PassLimit,
+            ));
         }
         let there = surface(to, here.radius);
         passes += 1;
@@ -270,7 +329,14 @@ pub(super) fn refine_walk(
             shift = if shift < 1e-6 { 0.0 } else { shift * 0.1 };
         } else if length <= 1e-7 * here.radius || shift > 1e12 {
             // Rounding of the sums, not shape, decides which is lower.
-            return Ok(report(centre, &here, here.radius, here.rss, passes, Stop::NoImprovement));
+            return Ok(report(
+                centre,
+                &here,
+                here.radius,
+                here.rss,
+                passes,
+                Stop::NoImprovement,
+            ));
         } else {
             shift = (shift * 10.0).max(1e-4);
         }

@@ -98,7 +98,8 @@ pub fn fit(points: &(impl Points + ?Sized)) -> Result<CircleFit, CircleError> {
         let few = Walk::some(RUN, points.count() / (FEW / RUN));
         let moments = Moments::of_walk(few, points);
         // Whatever is odd about the few is left to all of them to show.
-        if let Ok(start) = hyper(&moments).and_then(|start| refine_walk(few, points, &moments, start))
+        if let Ok(start) =
+            hyper(&moments).and_then(|start| refine_walk(few, points, &moments, start))
             && let Ok(fit) = refine(points, &moments, start.circle)
         {
             return Ok(fit);

@@ -95,7 +95,18 @@ impl Part for OfBlock {
         let [sx, sy, xx, xy, yy, xz, yz, zz] = sums(lanes, x, y, &SeenFrom([mx, my]));
         // The mean is rounded: at 100 m its last digit is 1e-14 m. Move the origin by what is left.
         let (rx, ry) = (sx / n, sy / n);
-        Moments { count, mean: [mx, my], rest: [0.0; 2], xx, xy, yy, xz, yz, zz }.recentred(n, rx, ry)
+        Moments {
+            count,
+            mean: [mx, my],
+            rest: [0.0; 2],
+            xx,
+            xy,
+            yy,
+            xz,
+            yz,
+            zz,
+        }
+        .recentred(n, rx, ry)
     }
 }
 
@@ -136,15 +147,26 @@ impl Merge for Moments {
         }
         let (na, nb) = (self.count as f64, other.count as f64);
         let (wa, wb) = (na / (na + nb), nb / (na + nb));
-        let [dx, dy] =
-            core::array::from_fn(|k| (other.mean[k] - self.mean[k]) + (other.rest[k] - self.rest[k]));
+        let [dx, dy] = core::array::from_fn(|k| {
+            (other.mean[k] - self.mean[k]) + (other.rest[k] - self.rest[k])
+        });
         let a = self.about(-wb * dx, -wb * dy);
         let b = other.about(wa * dx, wa * dy);
         let [xx, xy, yy, xz, yz, zz] = core::array::from_fn(|i| a[i] + b[i]);
         let by = [self.rest[0] + wb * dx, self.rest[1] + wb * dy];
         let mean: [f64; 2] = core::array::from_fn(|k| self.mean[k] + by[k]);
         let rest = core::array::from_fn(|k| by[k] - (mean[k] - self.mean[k]));
-        *self = Self { count: self.count + other.count, mean, rest, xx, xy, yy, xz, yz, zz };
+        *self = Self {
+            count: self.count + other.count,
+            mean,
+            rest,
+            xx,
+            xy,
+            yy,
+            xz,
+            yz,
+            zz,
+        };
     }
 }
 
@@ -159,7 +181,11 @@ mod tests {
     fn naive(points: &[[f64; 2]]) -> Moments {
         let n = points.len() as f64;
         let mean = [0, 1].map(|k| points.iter().map(|p| p[k]).sum::<f64>() / n);
-        let mut m = Moments { count: points.len(), mean, ..Moments::default() };
+        let mut m = Moments {
+            count: points.len(),
+            mean,
+            ..Moments::default()
+        };
         for p in points {
             let (x, y) = (p[0] - mean[0], p[1] - mean[1]);
             let z = x * x + y * y;
@@ -184,7 +210,10 @@ mod tests {
             (a.yz, b.yz, 3),
             (a.zz, b.zz, 4),
         ] {
-            prop_assert!((a - b).abs() <= 1e-11 * size.powi(power), "{a} against {b}, order {power}");
+            prop_assert!(
+                (a - b).abs() <= 1e-11 * size.powi(power),
+                "{a} against {b}, order {power}"
+            );
         }
         Ok(())
     }
@@ -207,7 +236,12 @@ mod tests {
     #[test]
     fn a_far_origin_costs_nothing() {
         // Multiples of 2⁻²⁰ survive the shift by 2²⁰ exactly, so both sets hold the same points.
-        let at = |i: usize| [(i * 37 % 1000) as f64 / 1048576.0, (i * 91 % 1000) as f64 / 1048576.0];
+        let at = |i: usize| {
+            [
+                (i * 37 % 1000) as f64 / 1048576.0,
+                (i * 91 % 1000) as f64 / 1048576.0,
+            ]
+        };
         let near = Moments::of(&Sampled::new(5000, at));
         let far = Moments::of(&Sampled::new(5000, |i| at(i).map(|v| v + 1048576.0)));
         for (a, b) in [(near.xx, far.xx), (near.yy, far.yy), (near.zz, far.zz)] {
@@ -217,8 +251,13 @@ mod tests {
 
     #[test]
     fn both_layouts_give_the_same_bits() {
-        let aos: Vec<[f64; 2]> = (0..2000).map(|i| [f64::from(i).sin(), f64::from(i).cos()]).collect();
+        let aos: Vec<[f64; 2]> = (0..2000)
+            .map(|i| [f64::from(i).sin(), f64::from(i).cos()])
+            .collect();
         let (x, y): (Vec<_>, Vec<_>) = aos.iter().map(|p| (p[0], p[1])).unzip();
-        assert_eq!(Moments::of(aos.as_slice()), Moments::of(&Xy::new(&x, &y).unwrap()));
+        assert_eq!(
+            Moments::of(aos.as_slice()),
+            Moments::of(&Xy::new(&x, &y).unwrap())
+        );
     }
 }

@@ -55,7 +55,11 @@ impl Plane {
             squares += height * height;
         }
         let rms = Float::sqrt(squares / scatter.count as f64);
-        Ok(Self { rms, flatness: highest - lowest, ..plane })
+        Ok(Self {
+            rms,
+            flatness: highest - lowest,
+            ..plane
+        })
     }
 
     /// The plane of points by their moments. Its `flatness` is NaN: moments know of no extremes, see [`height`](Self::height).
@@ -64,7 +68,9 @@ impl Plane {
     /// As [`fit`](Self::fit).
     pub fn through(scatter: &Scatter) -> Result<Self, CircleError> {
         if scatter.count < 3 {
-            return Err(CircleError::TooFew { points: scatter.count });
+            return Err(CircleError::TooFew {
+                points: scatter.count,
+            });
         }
         let [xx, xy, xz, yy, yz, zz] = scatter.sums.map(|sum| sum / scatter.count as f64);
         let moments = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
@@ -87,7 +93,11 @@ impl Plane {
         if normal.z < 0.0 {
             normal = -normal;
         }
-        let reference = if Float::abs(normal.x) < 0.999 { Vector3::x() } else { Vector3::y() };
+        let reference = if Float::abs(normal.x) < 0.999 {
+            Vector3::x()
+        } else {
+            Vector3::y()
+        };
         let along = (reference - normal * normal.dot(&reference)).normalize();
         let across = normal.cross(&along);
         Ok(Self {
@@ -109,11 +119,14 @@ impl Plane {
     /// Coordinates of a point along [`axes`](Self::axes), from the centroid, m.
     pub fn project(&self, point: [f64; 3]) -> [f64; 2] {
         let d: [f64; 3] = core::array::from_fn(|i| point[i] - self.centroid[i]);
-        self.axes.map(|axis| axis[0] * d[0] + axis[1] * d[1] + axis[2] * d[2])
+        self.axes
+            .map(|axis| axis[0] * d[0] + axis[1] * d[1] + axis[2] * d[2])
     }
 
     /// The point in space at coordinates that [`project`](Self::project) gives.
     pub fn lift(&self, point: [f64; 2]) -> [f64; 3] {
-        core::array::from_fn(|i| self.centroid[i] + point[0] * self.axes[0][i] + point[1] * self.axes[1][i])
+        core::array::from_fn(|i| {
+            self.centroid[i] + point[0] * self.axes[0][i] + point[1] * self.axes[1][i]
+        })
     }
 }

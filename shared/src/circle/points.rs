@@ -21,7 +21,10 @@ pub struct Walk {
 
 impl Walk {
     /// All points.
-    pub const ALL: Self = Self { run: BLOCK, of: BLOCK };
+    pub const ALL: Self = Self {
+        run: BLOCK,
+        of: BLOCK,
+    };
 
     /// The first `run` of each `of` points; 1 ≤ `run` ≤ [`BLOCK`], and `of` is no less.
     pub(super) const fn some(run: usize, of: usize) -> Self {
@@ -36,7 +39,11 @@ impl Walk {
 
     /// The blocks of the points (`x`, `y`), x and y of equal length.
     #[inline(always)]
-    pub fn blocks<'a>(self, x: &'a [f64], y: &'a [f64]) -> impl Iterator<Item = (&'a [f64], &'a [f64])> {
+    pub fn blocks<'a>(
+        self,
+        x: &'a [f64],
+        y: &'a [f64],
+    ) -> impl Iterator<Item = (&'a [f64], &'a [f64])> {
         x.chunks(self.of).zip(y.chunks(self.of)).map(move |(x, y)| {
             let run = self.run.min(x.len());
             (&x[..run], &y[..run])
@@ -56,7 +63,13 @@ pub trait Part: Sync {
 
 /// The sum over the blocks of a walk over the points (`x`, `y`), in order.
 #[inline(always)]
-pub fn sum_blocks<P: Part, L: Lanes>(part: &P, lanes: L, walk: Walk, x: &[f64], y: &[f64]) -> P::Sum {
+pub fn sum_blocks<P: Part, L: Lanes>(
+    part: &P,
+    lanes: L,
+    walk: Walk,
+    x: &[f64],
+    y: &[f64],
+) -> P::Sum {
     let mut total = P::Sum::default();
     for (x, y) in walk.blocks(x, y) {
         total.merge(&part.of(lanes, x, y));
@@ -89,7 +102,10 @@ impl<'a> Xy<'a> {
         if x.len() == y.len() {
             Ok(Self { x, y })
         } else {
-            Err(CircleError::Lengths { x: x.len(), y: y.len() })
+            Err(CircleError::Lengths {
+                x: x.len(),
+                y: y.len(),
+            })
         }
     }
 

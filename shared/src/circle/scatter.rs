@@ -41,7 +41,11 @@ impl Scatter {
                 *sum += product;
             }
         }
-        Self { count, mean: core::array::from_fn(|k| first[k] + offset[k]), sums }
+        Self {
+            count,
+            mean: core::array::from_fn(|k| first[k] + offset[k]),
+            sums,
+        }
     }
 }
 
@@ -57,7 +61,8 @@ impl Merge for Scatter {
         let (a, b) = (self.count as f64, other.count as f64);
         let between: [f64; 3] = core::array::from_fn(|k| other.mean[k] - self.mean[k]);
         let weight = a * b / (a + b);
-        for ((sum, theirs), product) in self.sums.iter_mut().zip(other.sums).zip(products(between)) {
+        for ((sum, theirs), product) in self.sums.iter_mut().zip(other.sums).zip(products(between))
+        {
             *sum += theirs + weight * product;
         }
         for (mean, by) in self.mean.iter_mut().zip(between) {

@@ -1,5 +1,8 @@
 //! Circles against published numbers, exact constructions and each other.
-#![allow(clippy::excessive_precision, reason = "reference numbers are quoted as published")]
+#![allow(
+    clippy::excessive_precision,
+    reason = "reference numbers are quoted as published"
+)]
 use super::*;
 use core::f64::consts::{PI, TAU};
 use std::vec::Vec;
@@ -16,25 +19,59 @@ const REFERENCES: [Reference; 5] = [
     Reference {
         points: &[[1., 7.], [2., 6.], [5., 8.], [7., 7.], [9., 5.], [3., 7.]],
         kasa: [4.742331288343558, 3.835122699386503, 4.108761522345449],
-        geometric: [4.73978241090607403, 2.98353269929247516, 4.71422603779210975, 1.22759907818365635],
+        geometric: [
+            4.73978241090607403,
+            2.98353269929247516,
+            4.71422603779210975,
+            1.22759907818365635,
+        ],
     },
     // SciPy cookbook
     Reference {
-        points: &[[9., 34.], [35., 10.], [-13., 6.], [10., -14.], [23., 27.], [0., -10.]],
+        points: &[
+            [9., 34.],
+            [35., 10.],
+            [-13., 6.],
+            [10., -14.],
+            [23., 27.],
+            [0., -10.],
+        ],
         kasa: [10.55231285578565, 9.705900055995934, 23.36241056178362],
-        geometric: [10.500086213944377, 9.65994950583643048, 23.3335276461828767, 7.7118522388199628],
+        geometric: [
+            10.500086213944377,
+            9.65994950583643048,
+            23.3335276461828767,
+            7.7118522388199628,
+        ],
     },
     // SciPy cookbook, arc
     Reference {
-        points: &[[36., 14.], [36., 10.], [19., 28.], [18., 31.], [33., 18.], [26., 26.]],
+        points: &[
+            [36., 14.],
+            [36., 10.],
+            [19., 28.],
+            [18., 31.],
+            [33., 18.],
+            [26., 26.],
+        ],
         kasa: [15.05503486956201, 8.836149957566141, 20.85072309131152],
-        geometric: [9.88756656747738748, 3.68749730978412046, 27.3504431681337441, 4.04252189831859094],
+        geometric: [
+            9.88756656747738748,
+            3.68749730978412046,
+            27.3504431681337441,
+            4.04252189831859094,
+        ],
     },
     // Apache commons-math
     Reference {
         points: &[[30., 68.], [50., -6.], [110., -20.], [35., 15.], [45., 97.]],
         kasa: [96.00573345901923, 48.10393940404276, 69.91471921082821],
-        geometric: [96.0759020960109499, 48.1351678947139973, 69.9601617535997453, 3.126752705904914],
+        geometric: [
+            96.0759020960109499,
+            48.1351678947139973,
+            69.9601617535997453,
+            3.126752705904914,
+        ],
     },
     Reference {
         points: &[
@@ -48,17 +85,27 @@ const REFERENCES: [Reference; 5] = [
             [-1.1, 1.3],
         ],
         kasa: [3.06030356572735, 0.7436073210423231, 4.10913703607478],
-        geometric: [3.04323825158254216, 0.745678313458604047, 4.10585583795433105, 0.295948437998298817],
+        geometric: [
+            3.04323825158254216,
+            0.745678313458604047,
+            4.10585583795433105,
+            0.295948437998298817,
+        ],
     },
 ];
 
 fn assert_relative(got: f64, want: f64, tolerance: f64) {
-    assert!((got - want).abs() <= tolerance * want.abs(), "{got} is not {want} to {tolerance}");
+    assert!(
+        (got - want).abs() <= tolerance * want.abs(),
+        "{got} is not {want} to {tolerance}"
+    );
 }
 
 /// A repeatable sequence in (−1, 1): Weyl's, whitened by a mixing step.
 fn noise(i: usize) -> f64 {
-    let mut z = (i as u64).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let mut z = (i as u64)
+        .wrapping_add(1)
+        .wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
@@ -68,7 +115,10 @@ fn noise(i: usize) -> f64 {
 fn kasa_gives_the_reference_numbers() {
     for reference in &REFERENCES {
         let circle = kasa(&Moments::of(reference.points)).unwrap();
-        for (got, want) in [circle.centre[0], circle.centre[1], circle.radius].iter().zip(reference.kasa) {
+        for (got, want) in [circle.centre[0], circle.centre[1], circle.radius]
+            .iter()
+            .zip(reference.kasa)
+        {
             assert_relative(*got, want, 1e-13);
         }
     }
@@ -78,7 +128,12 @@ fn kasa_gives_the_reference_numbers() {
 fn geometric_fit_gives_the_reference_numbers() {
     for reference in &REFERENCES {
         let fit = fit(reference.points).unwrap();
-        let got = [fit.circle.centre[0], fit.circle.centre[1], fit.circle.radius, fit.rss];
+        let got = [
+            fit.circle.centre[0],
+            fit.circle.centre[1],
+            fit.circle.radius,
+            fit.rss,
+        ];
         for (got, want) in got.iter().zip(reference.geometric) {
             assert_relative(*got, want, 2e-13);
         }
@@ -95,7 +150,15 @@ fn a_start_half_a_radius_off_is_good_enough() {
         for i in 0..12 {
             let (sin, cos) = (TAU * f64::from(i) / 12.0).sin_cos();
             let centre = [x + 0.5 * radius * cos, y + 0.5 * radius * sin];
-            let fit = refine(reference.points, &moments, Circle { centre, radius: 0.3 * radius }).unwrap();
+            let fit = refine(
+                reference.points,
+                &moments,
+                Circle {
+                    centre,
+                    radius: 0.3 * radius,
+                },
+            )
+            .unwrap();
             assert_relative(fit.rss, rss, 1e-12);
             assert!(fit.passes <= 15, "{} passes", fit.passes);
         }
@@ -125,7 +188,12 @@ fn a_circle_100_m_away_loses_nothing() {
 
 #[test]
 fn any_scale_gives_the_same_circle() {
-    let at = |i: usize| [3.0 + 2.0 * (i as f64).sin() + 0.1 * noise(i), 2.0 * (i as f64).cos()];
+    let at = |i: usize| {
+        [
+            3.0 + 2.0 * (i as f64).sin() + 0.1 * noise(i),
+            2.0 * (i as f64).cos(),
+        ]
+    };
     let one = fit(&Sampled::new(200, at)).unwrap();
     for scale in [1e-60, 1e-6, 1e6, 1e60] {
         let fit = fit(&Sampled::new(200, |i| at(i).map(|v| v * scale))).unwrap();
@@ -152,9 +220,15 @@ fn starting_from_a_few_of_many_points_ends_at_the_same_circle() {
     assert_eq!(few.passes, 1);
     // Of many points on a line, or with a bad one that is not among the few, the few say nothing.
     x[333_333] = f64::NAN;
-    assert_eq!(fit(&Xy::new(&x, &y).unwrap()).unwrap_err(), CircleError::NonFinite);
+    assert_eq!(
+        fit(&Xy::new(&x, &y).unwrap()).unwrap_err(),
+        CircleError::NonFinite
+    );
     x.iter_mut().zip(&y).for_each(|(x, y)| *x = 2.0 * y);
-    assert_eq!(fit(&Xy::new(&x, &y).unwrap()).unwrap_err(), CircleError::Collinear);
+    assert_eq!(
+        fit(&Xy::new(&x, &y).unwrap()).unwrap_err(),
+        CircleError::Collinear
+    );
 }
 
 #[test]
@@ -199,7 +273,11 @@ fn covariance_is_what_the_scatter_over_sets_shows() {
             [radius * angle.cos(), radius * angle.sin()]
         }))
         .unwrap();
-        let error = [fit.circle.centre[0], fit.circle.centre[1], fit.circle.radius - 1.0];
+        let error = [
+            fit.circle.centre[0],
+            fit.circle.centre[1],
+            fit.circle.radius - 1.0,
+        ];
         let covariance = fit.covariance.unwrap();
         for i in 0..3 {
             for j in 0..3 {
@@ -211,7 +289,10 @@ fn covariance_is_what_the_scatter_over_sets_shows() {
     for i in 0..3 {
         for j in 0..3 {
             let unit = (stated[i][i] * stated[j][j]).sqrt();
-            assert!((scatter[i][j] - stated[i][j]).abs() < 0.1 * unit, "{i}{j}: {scatter:?} {stated:?}");
+            assert!(
+                (scatter[i][j] - stated[i][j]).abs() < 0.1 * unit,
+                "{i}{j}: {scatter:?} {stated:?}"
+            );
         }
     }
 }
@@ -219,26 +300,49 @@ fn covariance_is_what_the_scatter_over_sets_shows() {
 #[test]
 fn degenerate_points_are_told_apart() {
     let ring = |i: usize| [(i as f64).cos(), (i as f64).sin()];
-    assert_eq!(fit(&Sampled::new(2, ring)).unwrap_err(), CircleError::TooFew { points: 2 });
-    assert_eq!(fit([].as_slice()).unwrap_err(), CircleError::TooFew { points: 0 });
-    assert_eq!(fit(&Sampled::new(9, |_| [100.0, 0.1])).unwrap_err(), CircleError::Coincident);
-    assert_eq!(fit(&Sampled::new(9, |_| [0.0, 0.0])).unwrap_err(), CircleError::Coincident);
+    assert_eq!(
+        fit(&Sampled::new(2, ring)).unwrap_err(),
+        CircleError::TooFew { points: 2 }
+    );
+    assert_eq!(
+        fit([].as_slice()).unwrap_err(),
+        CircleError::TooFew { points: 0 }
+    );
+    assert_eq!(
+        fit(&Sampled::new(9, |_| [100.0, 0.1])).unwrap_err(),
+        CircleError::Coincident
+    );
+    assert_eq!(
+        fit(&Sampled::new(9, |_| [0.0, 0.0])).unwrap_err(),
+        CircleError::Coincident
+    );
     for slope in [0.0, 0.3, 1.0, 1e9] {
         let line = Sampled::new(50, |i| [i as f64 * 0.1 + 7.0, slope * i as f64 * 0.1]);
-        assert_eq!(fit(&line).unwrap_err(), CircleError::Collinear, "slope {slope}");
+        assert_eq!(
+            fit(&line).unwrap_err(),
+            CircleError::Collinear,
+            "slope {slope}"
+        );
     }
     for bad in [f64::NAN, f64::INFINITY, 1e90] {
         let points = Sampled::new(30, |i| if i == 17 { [bad, 0.0] } else { ring(i) });
         assert_eq!(fit(&points).unwrap_err(), CircleError::NonFinite, "{bad}");
     }
-    assert_eq!(Xy::new(&[0.0], &[]).unwrap_err(), CircleError::Lengths { x: 1, y: 0 });
+    assert_eq!(
+        Xy::new(&[0.0], &[]).unwrap_err(),
+        CircleError::Lengths { x: 1, y: 0 }
+    );
 }
 
 #[test]
 fn a_point_on_the_centre_is_only_a_bad_point() {
     let fit = fit(&Sampled::new(101, |i| {
         let angle = TAU * i as f64 / 100.0;
-        if i == 100 { [0.0, 0.0] } else { [angle.cos(), angle.sin()] }
+        if i == 100 {
+            [0.0, 0.0]
+        } else {
+            [angle.cos(), angle.sin()]
+        }
     }))
     .unwrap();
     assert!(fit.circle.radius.is_finite() && (fit.circle.radius - 1.0).abs() < 0.02);
@@ -254,7 +358,11 @@ fn a_tilted_circle_in_space_is_found_in_its_plane() {
             let off = 1e-6 * (3.0 * angle).cos();
             let (sin, cos) = tilt.sin_cos();
             // Tilted about y, the departure along the normal.
-            [-0.29 + x * cos + off * sin, 0.987 + y, height - x * sin + off * cos]
+            [
+                -0.29 + x * cos + off * sin,
+                0.987 + y,
+                height - x * sin + off * cos,
+            ]
         })
         .collect();
     let plane = Plane::fit(points.iter().copied()).unwrap();
@@ -266,7 +374,11 @@ fn a_tilted_circle_in_space_is_found_in_its_plane() {
     assert!((fit.circle.radius - radius).abs() < 1e-14);
     // Counter-clockwise from above stays so, starting along x.
     assert!(flat[0][0] > 0.0999 && flat[180][1] > 0.0999);
-    for (got, want) in plane.lift(fit.circle.centre).iter().zip([-0.29, 0.987, height]) {
+    for (got, want) in plane
+        .lift(fit.circle.centre)
+        .iter()
+        .zip([-0.29, 0.987, height])
+    {
         assert!((got - want).abs() < 1e-12);
     }
 }
@@ -275,8 +387,14 @@ fn a_tilted_circle_in_space_is_found_in_its_plane() {
 fn degenerate_planes_are_told_apart() {
     let line = (0..9).map(|i| [f64::from(i), 2.0 * f64::from(i), 1.0]);
     assert_eq!(Plane::fit(line).unwrap_err(), CircleError::Collinear);
-    assert_eq!(Plane::fit((0..9).map(|_| [1.0, 2.0, 3.0])).unwrap_err(), CircleError::Coincident);
-    assert_eq!(Plane::fit((0..2).map(|_| [1.0, 2.0, 3.0])).unwrap_err(), CircleError::TooFew { points: 2 });
+    assert_eq!(
+        Plane::fit((0..9).map(|_| [1.0, 2.0, 3.0])).unwrap_err(),
+        CircleError::Coincident
+    );
+    assert_eq!(
+        Plane::fit((0..2).map(|_| [1.0, 2.0, 3.0])).unwrap_err(),
+        CircleError::TooFew { points: 2 }
+    );
     let bad = (0..9).map(|i| [f64::from(i * i), f64::from(i), f64::NAN]);
     assert_eq!(Plane::fit(bad).unwrap_err(), CircleError::NonFinite);
 }

@@ -39,7 +39,10 @@ impl<T: Float> Operator<T> {
         let two = T::one() + T::one();
         let eight = two * two * two;
         let (k2, k4) = (cumulants.kappa2_s2, cumulants.kappa4_s4);
-        Self { second_s2: -k2 / two, fourth_s4: k2 * k2 / eight - k4 / (eight + eight + eight) }
+        Self {
+            second_s2: -k2 / two,
+            fourth_s4: k2 * k2 / eight - k4 / (eight + eight + eight),
+        }
     }
 
     /// p_cmd − p from the second and fourth derivative of p.
@@ -72,7 +75,12 @@ mod tests {
     /// q = e^{iθ} obeys q′ = iθ′q, which gives its Taylor coefficients one after the other.
     #[test]
     fn gain_is_the_operator_on_a_circle_with_moving_rate() {
-        let m = AngularMotion { rate: 5.0, acceleration: -31.0, jerk: 410.0, snap: -7300.0 };
+        let m = AngularMotion {
+            rate: 5.0,
+            acceleration: -31.0,
+            jerk: 410.0,
+            snap: -7300.0,
+        };
         // Taylor coefficients of θ′.
         let rate = [m.rate, m.acceleration, m.jerk / 2.0, m.snap / 6.0];
         let mut q = [(0.0f64, 0.0f64); 5];
@@ -85,12 +93,21 @@ mod tests {
             }
             q[n + 1] = (sum.0 / (n + 1) as f64, sum.1 / (n + 1) as f64);
         }
-        let operator = Operator::new(&Cumulants { kappa2_s2: 5.3e-4, kappa4_s4: 9.4e-7 });
+        let operator = Operator::new(&Cumulants {
+            kappa2_s2: 5.3e-4,
+            kappa4_s4: 9.4e-7,
+        });
         let gain = operator.gain(&m);
         let radial = operator.offset(2.0 * q[2].0, 24.0 * q[4].0);
         let tangential = operator.offset(2.0 * q[2].1, 24.0 * q[4].1);
-        assert!((gain.radial - radial).abs() < 1e-15 && radial.abs() > 1e-3, "{gain:?} {radial}");
-        assert!((gain.tangential - tangential).abs() < 1e-15 && tangential.abs() > 1e-3, "{tangential}");
+        assert!(
+            (gain.radial - radial).abs() < 1e-15 && radial.abs() > 1e-3,
+            "{gain:?} {radial}"
+        );
+        assert!(
+            (gain.tangential - tangential).abs() < 1e-15 && tangential.abs() > 1e-3,
+            "{tangential}"
+        );
     }
 
     #[test]
@@ -98,10 +115,16 @@ mod tests {
         // β of the source paper's robot; κ from β: β1 = −κ2/2, β2 = κ2²/8 + κ4/24.
         let (beta1, beta2): (f64, f64) = (-23.29e-6, -0.23e-6);
         let kappa2_s2 = -2.0 * beta1;
-        let cumulants = Cumulants { kappa2_s2, kappa4_s4: 24.0 * (beta2 - kappa2_s2 * kappa2_s2 / 8.0) };
+        let cumulants = Cumulants {
+            kappa2_s2,
+            kappa4_s4: 24.0 * (beta2 - kappa2_s2 * kappa2_s2 / 8.0),
+        };
         let operator = Operator::new(&cumulants);
         let loop_error = |w: f64| {
-            let gain = operator.gain(&AngularMotion { rate: w, ..Default::default() });
+            let gain = operator.gain(&AngularMotion {
+                rate: w,
+                ..Default::default()
+            });
             ((1.0 + gain.radial) * (1.0 + beta1 * w * w + beta2 * w.powi(4)) - 1.0).abs()
         };
         // What is left is of order ω⁶: halving ω divides it by 64.

@@ -69,8 +69,16 @@ impl<T: Float> Profile<T> {
     /// Merges terms.
     pub fn new(terms: &[Term<T>]) -> Result<Self, ProfileError> {
         let zero = T::zero();
-        let none = Spike { peak_m: zero, decay_s: zero };
-        let still = CyclicError { axis: 0, amplitude_m: zero, pitch_m: T::one(), phase_rad: zero };
+        let none = Spike {
+            peak_m: zero,
+            decay_s: zero,
+        };
+        let still = CyclicError {
+            axis: 0,
+            amplitude_m: zero,
+            pitch_m: T::one(),
+            phase_rad: zero,
+        };
         let flat = [[zero; 2]; 2];
         let mut p = Self {
             radius_offset_m: zero,
@@ -90,9 +98,19 @@ impl<T: Float> Profile<T> {
     }
 
     fn add(&mut self, term: &Term<T>, index: usize) -> Result<(), ProfileError> {
-        let finite = |v: T| if v.is_finite() { Ok(v) } else { Err(ProfileError::Value(index)) };
+        let finite = |v: T| {
+            if v.is_finite() {
+                Ok(v)
+            } else {
+                Err(ProfileError::Value(index))
+            }
+        };
         let positive = |v: T| {
-            if v.is_finite() && v > T::zero() { Ok(v) } else { Err(ProfileError::Value(index)) }
+            if v.is_finite() && v > T::zero() {
+                Ok(v)
+            } else {
+                Err(ProfileError::Value(index))
+            }
         };
         let half = T::one() / (T::one() + T::one());
         let opposite = |m: &mut [[T; 2]; 2], v: T| {
@@ -108,7 +126,9 @@ impl<T: Float> Profile<T> {
                 self.position[0][0] = self.position[0][0] + v;
                 self.position[1][1] = self.position[1][1] + v;
             }
-            Term::ScaleMismatch { relative } => opposite(&mut self.position, half * finite(relative)?),
+            Term::ScaleMismatch { relative } => {
+                opposite(&mut self.position, half * finite(relative)?)
+            }
             Term::Squareness { shear_rad } => {
                 let v = half * finite(shear_rad)?;
                 self.position[0][1] = self.position[0][1] + v;
@@ -118,7 +138,10 @@ impl<T: Float> Profile<T> {
                 opposite(&mut self.velocity_s, -half * finite(delta_tau_s)?);
             }
             Term::BandwidthMismatch { delta_kappa2_s2 } => {
-                opposite(&mut self.acceleration_s2, half * half * finite(delta_kappa2_s2)?);
+                opposite(
+                    &mut self.acceleration_s2,
+                    half * half * finite(delta_kappa2_s2)?,
+                );
             }
             Term::Backlash { axis, step_m } => {
                 let at = &mut self.backlash_m[axis.index()];
@@ -128,15 +151,27 @@ impl<T: Float> Profile<T> {
                 let at = &mut self.lateral_m[axis.index()];
                 *at = *at + finite(shift_m)?;
             }
-            Term::ReversalSpike { axis, peak_m, decay_s } => {
+            Term::ReversalSpike {
+                axis,
+                peak_m,
+                decay_s,
+            } => {
                 let at = &mut self.spike[axis.index()];
                 let (peak_m, decay_s) = (finite(peak_m)?, positive(decay_s)?);
                 if at.peak_m != T::zero() && at.decay_s != decay_s {
                     return Err(ProfileError::TooMany(index));
                 }
-                *at = Spike { peak_m: at.peak_m + peak_m, decay_s };
+                *at = Spike {
+                    peak_m: at.peak_m + peak_m,
+                    decay_s,
+                };
             }
-            Term::Cyclic { axis, amplitude_m, pitch_m, phase_rad } => {
+            Term::Cyclic {
+                axis,
+                amplitude_m,
+                pitch_m,
+                phase_rad,
+            } => {
                 let cyclic = CyclicError {
                     axis: axis.index(),
                     amplitude_m: finite(amplitude_m)?,
@@ -146,7 +181,10 @@ impl<T: Float> Profile<T> {
                 let free = self.cyclic.iter_mut().find(|c| c.amplitude_m == T::zero());
                 *free.ok_or(ProfileError::TooMany(index))? = cyclic;
             }
-            Term::Straightness { axis, curvature_per_m } => {
+            Term::Straightness {
+                axis,
+                curvature_per_m,
+            } => {
                 let at = &mut self.bow_per_m[axis.index()];
                 *at = *at + finite(curvature_per_m)?;
             }

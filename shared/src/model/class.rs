@@ -88,7 +88,10 @@ impl Classes {
 
     /// Whether the interval rules out nothing: it reaches from below a moving average to above a lag.
     pub fn is_any(&self) -> bool {
-        Class::ALL.into_iter().filter(|class| *class != Class::Cascade).all(|class| self.contains(class))
+        Class::ALL
+            .into_iter()
+            .filter(|class| *class != Class::Cascade)
+            .all(|class| self.contains(class))
     }
 }
 
@@ -126,7 +129,11 @@ mod tests {
             (f64::NAN, 1.0, "any"),
             (2.0, 1.0, "any"),
         ] {
-            assert_eq!(Classes::of_interval(low, high).to_string(), words, "{low} {high}");
+            assert_eq!(
+                Classes::of_interval(low, high).to_string(),
+                words,
+                "{low} {high}"
+            );
         }
     }
 }

@@ -46,7 +46,11 @@ pub enum Element<T> {
 /// sin(x)/x.
 fn sinc<T: Float>(x: T) -> T {
     // Below this the quadratic term is under the last digit.
-    if x.abs() < T::epsilon().sqrt() { T::one() } else { x.sin() / x }
+    if x.abs() < T::epsilon().sqrt() {
+        T::one()
+    } else {
+        x.sin() / x
+    }
 }
 
 impl<T: Float> Element<T> {
@@ -62,16 +66,25 @@ impl<T: Float> Element<T> {
                 let t2 = time_constant_s * time_constant_s;
                 (t2, n(6.0) * t2 * t2)
             }
-            Self::FeedForwardLag { kv_per_s, feed_forward } => {
+            Self::FeedForwardLag {
+                kv_per_s,
+                feed_forward,
+            } => {
                 let t2 = (kv_per_s * kv_per_s).recip();
                 let a2 = feed_forward * feed_forward;
-                ((T::one() - a2) * t2, n(6.0) * (T::one() - a2 * a2) * t2 * t2)
+                (
+                    (T::one() - a2) * t2,
+                    n(6.0) * (T::one() - a2 * a2) * t2 * t2,
+                )
             }
             Self::MovingAverage { window_s } => {
                 let t2 = window_s * window_s;
                 (t2 / n(12.0), -t2 * t2 / n(120.0))
             }
-            Self::SecondOrder { omega_n_rad_s, zeta } => {
+            Self::SecondOrder {
+                omega_n_rad_s,
+                zeta,
+            } => {
                 let t2 = (omega_n_rad_s * omega_n_rad_s).recip();
                 let z2 = zeta * zeta;
                 (
@@ -84,7 +97,10 @@ impl<T: Float> Element<T> {
                 (t2 / n(6.0), -t2 * t2 / n(60.0))
             }
         };
-        Cumulants { kappa2_s2, kappa4_s4 }
+        Cumulants {
+            kappa2_s2,
+            kappa4_s4,
+        }
     }
 
     /// |G(jω)|, exact, for any ω in rad/s.
@@ -93,14 +109,22 @@ impl<T: Float> Element<T> {
         let w = omega_rad_s;
         match *self {
             Self::Lag { kv_per_s } => T::one().hypot(w / kv_per_s).recip(),
-            Self::ExponentialFilter { time_constant_s } => T::one().hypot(w * time_constant_s).recip(),
-            Self::FeedForwardLag { kv_per_s, feed_forward } => {
-                T::one().hypot(feed_forward * w / kv_per_s) / T::one().hypot(w / kv_per_s)
+            Self::ExponentialFilter { time_constant_s } => {
+                T::one().hypot(w * time_constant_s).recip()
             }
+            Self::FeedForwardLag {
+                kv_per_s,
+                feed_forward,
+            } => T::one().hypot(feed_forward * w / kv_per_s) / T::one().hypot(w / kv_per_s),
             Self::MovingAverage { window_s } => sinc(w * window_s / n(2.0)).abs(),
-            Self::SecondOrder { omega_n_rad_s, zeta } => {
+            Self::SecondOrder {
+                omega_n_rad_s,
+                zeta,
+            } => {
                 let v = w / omega_n_rad_s;
-                ((T::one() - v) * (T::one() + v)).hypot(n(2.0) * zeta * v).recip()
+                ((T::one() - v) * (T::one() + v))
+                    .hypot(n(2.0) * zeta * v)
+                    .recip()
             }
             Self::Chord { interval_s } => {
                 let s = sinc(w * interval_s / n(2.0));
@@ -116,10 +140,18 @@ mod tests {
 
     const ELEMENTS: [Element<f64>; 6] = [
         Element::Lag { kv_per_s: 50.0 },
-        Element::ExponentialFilter { time_constant_s: 0.03 },
-        Element::FeedForwardLag { kv_per_s: 40.0, feed_forward: 0.7 },
+        Element::ExponentialFilter {
+            time_constant_s: 0.03,
+        },
+        Element::FeedForwardLag {
+            kv_per_s: 40.0,
+            feed_forward: 0.7,
+        },
         Element::MovingAverage { window_s: 0.04 },
-        Element::SecondOrder { omega_n_rad_s: 38.0, zeta: 0.72 },
+        Element::SecondOrder {
+            omega_n_rad_s: 38.0,
+            zeta: 0.72,
+        },
         Element::Chord { interval_s: 0.024 },
     ];
 
@@ -157,9 +189,14 @@ mod tests {
         let half = 0.5 * 0.024 * 10.0_f64;
         let (s, c) = half.sin_cos();
         let at = |i: usize| (s * i as f64 / 1000.0).hypot(c);
-        let simpson: f64 =
-            (0..500).map(|i| at(2 * i) + 4.0 * at(2 * i + 1) + at(2 * i + 2)).sum::<f64>() / 3000.0;
+        let simpson: f64 = (0..500)
+            .map(|i| at(2 * i) + 4.0 * at(2 * i + 1) + at(2 * i + 2))
+            .sum::<f64>()
+            / 3000.0;
         let gain = ELEMENTS[5].gain(10.0);
-        assert!((gain - simpson).abs() < 0.5 * half.powi(6), "{gain} {simpson}");
+        assert!(
+            (gain - simpson).abs() < 0.5 * half.powi(6),
+            "{gain} {simpson}"
+        );
     }
 }

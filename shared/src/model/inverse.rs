@@ -49,7 +49,11 @@ impl<T: Float> RadiusModel<T> {
     ///
     /// # Errors
     /// [`InverseError`]; out of reach where the gain 1 + β1ω² + β2ω⁴ is not positive.
-    pub fn inverse_keeping_omega(&self, radius_m: T, feed_m_s: T) -> Result<Programmed<T>, InverseError> {
+    pub fn inverse_keeping_omega(
+        &self,
+        radius_m: T,
+        feed_m_s: T,
+    ) -> Result<Programmed<T>, InverseError> {
         self.check(radius_m, feed_m_s)?;
         let omega = feed_m_s / radius_m;
         let gain = T::one() + self.relative_error(omega);
@@ -57,7 +61,11 @@ impl<T: Float> RadiusModel<T> {
         if gain <= T::zero() || !radius.is_finite() || radius <= T::zero() {
             return Err(InverseError::OutOfReach);
         }
-        Ok(Programmed { radius_m: radius, feed_m_s: omega * radius, iterations: 0 })
+        Ok(Programmed {
+            radius_m: radius,
+            feed_m_s: omega * radius,
+            iterations: 0,
+        })
     }
 
     /// Keeps the feed: solves Rp + β1f²/Rp + β2f⁴/Rp³ = R.
@@ -68,7 +76,11 @@ impl<T: Float> RadiusModel<T> {
     ///
     /// # Errors
     /// [`InverseError`]; out of reach exactly where h(x*) > 1.
-    pub fn inverse_keeping_feed(&self, radius_m: T, feed_m_s: T) -> Result<Programmed<T>, InverseError> {
+    pub fn inverse_keeping_feed(
+        &self,
+        radius_m: T,
+        feed_m_s: T,
+    ) -> Result<Programmed<T>, InverseError> {
         self.check(radius_m, feed_m_s)?;
         let n = number::<T>;
         let w2 = (feed_m_s / radius_m) * (feed_m_s / radius_m);
@@ -80,7 +92,11 @@ impl<T: Float> RadiusModel<T> {
         let residual = |x: T| ((x - T::one()) * x * x + a * x) * x + b;
         let slope = |x: T| (x * x - a) * x * x - n(3.0) * b;
         let discriminant = a * a + n(12.0) * b;
-        let turning2 = if discriminant >= T::zero() { (a + discriminant.sqrt()) / n(2.0) } else { T::zero() };
+        let turning2 = if discriminant >= T::zero() {
+            (a + discriminant.sqrt()) / n(2.0)
+        } else {
+            T::zero()
+        };
         let mut low = turning2.max(T::zero()).sqrt();
         if low > T::zero() && residual(low) > T::zero() {
             return Err(InverseError::OutOfReach);
@@ -100,16 +116,25 @@ impl<T: Float> RadiusModel<T> {
             // h/h′ = x·(h x³)/(h′ x⁴)
             let newton = x - x * value / slope(x);
             let digits = n(2.0) * T::epsilon() * x;
-            if (newton - x).abs() <= digits || high - low <= digits || iterations >= MAX_ITERATIONS {
+            if (newton - x).abs() <= digits || high - low <= digits || iterations >= MAX_ITERATIONS
+            {
                 break;
             }
-            x = if newton > low && newton < high { newton } else { (low + high) / n(2.0) };
+            x = if newton > low && newton < high {
+                newton
+            } else {
+                (low + high) / n(2.0)
+            };
         }
         let radius = x * radius_m;
         if !radius.is_finite() || radius <= T::zero() {
             return Err(InverseError::OutOfReach);
         }
-        Ok(Programmed { radius_m: radius, feed_m_s, iterations })
+        Ok(Programmed {
+            radius_m: radius,
+            feed_m_s,
+            iterations,
+        })
     }
 
     fn check(&self, radius_m: T, feed_m_s: T) -> Result<(), InverseError> {
@@ -131,7 +156,10 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const PAPER: RadiusModel<f64> = RadiusModel { beta1_s2: -23.29e-6, beta2_s4: -0.23e-6 };
+    const PAPER: RadiusModel<f64> = RadiusModel {
+        beta1_s2: -23.29e-6,
+        beta2_s4: -0.23e-6,
+    };
 
     #[test]
     fn the_papers_circle_comes_out_as_wanted_both_ways() {
@@ -143,7 +171,8 @@ mod tests {
                 assert!((out / radius - 1.0).abs() < 2e-15, "{radius} {feed}: {out}");
             }
             assert!(
-                (same_omega.feed_m_s / same_omega.radius_m - feed / radius).abs() < 1e-14 * feed / radius
+                (same_omega.feed_m_s / same_omega.radius_m - feed / radius).abs()
+                    < 1e-14 * feed / radius
             );
             assert_eq!(same_feed.feed_m_s, feed);
         }
@@ -159,7 +188,8 @@ mod tests {
     fn by_continuation(a: f64, b: f64) -> Option<f64> {
         // Follows dx/ds of h(x; s·a, s²·b) = 1, s = ω² share, in small Runge–Kutta steps; a fold shows as slope ≤ 0.
         let rate = |s: f64, x: f64| {
-            -(a / x + 2.0 * s * b / x.powi(3)) / (1.0 - s * a / (x * x) - 3.0 * s * s * b / x.powi(4))
+            -(a / x + 2.0 * s * b / x.powi(3))
+                / (1.0 - s * a / (x * x) - 3.0 * s * s * b / x.powi(4))
         };
         let steps = 4000;
         let (mut x, ds) = (1.0, 1.0 / f64::from(steps));
@@ -240,17 +270,38 @@ mod tests {
     #[test]
     fn the_fold_is_where_theory_puts_it() {
         // b = 0: x² − x + a = 0 has real roots up to a = 1/4.
-        let at = |a: f64| RadiusModel { beta1_s2: a, beta2_s4: 0.0 }.inverse_keeping_feed(1.0, 1.0);
+        let at = |a: f64| {
+            RadiusModel {
+                beta1_s2: a,
+                beta2_s4: 0.0,
+            }
+            .inverse_keeping_feed(1.0, 1.0)
+        };
         assert!((at(0.2499).unwrap().radius_m - 0.51).abs() < 1e-12);
         assert_eq!(at(0.2501).unwrap_err(), InverseError::OutOfReach);
     }
 
     #[test]
     fn bad_arguments_have_their_own_error() {
-        assert_eq!(PAPER.inverse_keeping_feed(0.0, 0.1).unwrap_err(), InverseError::Radius);
-        assert_eq!(PAPER.inverse_keeping_feed(f64::NAN, 0.1).unwrap_err(), InverseError::Radius);
-        assert_eq!(PAPER.inverse_keeping_omega(0.1, -0.1).unwrap_err(), InverseError::Feed);
-        let bad = RadiusModel { beta1_s2: f64::NAN, beta2_s4: 0.0 };
-        assert_eq!(bad.inverse_keeping_omega(0.1, 0.1).unwrap_err(), InverseError::Coefficient);
+        assert_eq!(
+            PAPER.inverse_keeping_feed(0.0, 0.1).unwrap_err(),
+            InverseError::Radius
+        );
+        assert_eq!(
+            PAPER.inverse_keeping_feed(f64::NAN, 0.1).unwrap_err(),
+            InverseError::Radius
+        );
+        assert_eq!(
+            PAPER.inverse_keeping_omega(0.1, -0.1).unwrap_err(),
+            InverseError::Feed
+        );
+        let bad = RadiusModel {
+            beta1_s2: f64::NAN,
+            beta2_s4: 0.0,
+        };
+        assert_eq!(
+            bad.inverse_keeping_omega(0.1, 0.1).unwrap_err(),
+            InverseError::Coefficient
+        );
     }
 }

@@ -86,7 +86,10 @@ impl<T: Float> From<Cumulants<T>> for RadiusModel<T> {
     /// β1 = −κ2/2, β2 = κ2²/8 + κ4/24.
     fn from(k: Cumulants<T>) -> Self {
         let (k2, k4) = (k.kappa2_s2, k.kappa4_s4);
-        Self { beta1_s2: -k2 / number(2.0), beta2_s4: k2 * k2 / number(8.0) + k4 / number(24.0) }
+        Self {
+            beta1_s2: -k2 / number(2.0),
+            beta2_s4: k2 * k2 / number(8.0) + k4 / number(24.0),
+        }
     }
 }
 
@@ -106,7 +109,10 @@ impl<T: Float> Add for Cumulants<T> {
 
     /// The cumulants of one element after the other.
     fn add(self, other: Self) -> Self {
-        Self { kappa2_s2: self.kappa2_s2 + other.kappa2_s2, kappa4_s4: self.kappa4_s4 + other.kappa4_s4 }
+        Self {
+            kappa2_s2: self.kappa2_s2 + other.kappa2_s2,
+            kappa4_s4: self.kappa4_s4 + other.kappa4_s4,
+        }
     }
 }
 
@@ -121,13 +127,22 @@ impl<T: Float> Neg for Cumulants<T> {
 
     /// The cumulants of the inverse chain.
     fn neg(self) -> Self {
-        Self { kappa2_s2: -self.kappa2_s2, kappa4_s4: -self.kappa4_s4 }
+        Self {
+            kappa2_s2: -self.kappa2_s2,
+            kappa4_s4: -self.kappa4_s4,
+        }
     }
 }
 
 impl<T: Float> core::iter::Sum for Cumulants<T> {
     fn sum<I: Iterator<Item = Self>>(elements: I) -> Self {
-        elements.fold(Self { kappa2_s2: T::zero(), kappa4_s4: T::zero() }, Add::add)
+        elements.fold(
+            Self {
+                kappa2_s2: T::zero(),
+                kappa4_s4: T::zero(),
+            },
+            Add::add,
+        )
     }
 }
 
@@ -137,7 +152,10 @@ mod tests {
 
     #[test]
     fn conversions_undo_each_other() {
-        let beta = RadiusModel { beta1_s2: -23.29e-6, beta2_s4: -0.23e-6 };
+        let beta = RadiusModel {
+            beta1_s2: -23.29e-6,
+            beta2_s4: -0.23e-6,
+        };
         let back = RadiusModel::from(Cumulants::from(beta));
         assert!((back.beta1_s2 / beta.beta1_s2 - 1.0_f64).abs() < 1e-15);
         assert!((back.beta2_s4 / beta.beta2_s4 - 1.0_f64).abs() < 1e-13);
@@ -145,13 +163,19 @@ mod tests {
 
     #[test]
     fn the_papers_robot_needs_a_ratio_no_lag_can_give() {
-        let k = Cumulants::from(RadiusModel { beta1_s2: -23.29e-6_f64, beta2_s4: -0.23e-6 });
+        let k = Cumulants::from(RadiusModel {
+            beta1_s2: -23.29e-6_f64,
+            beta2_s4: -0.23e-6,
+        });
         assert!((k.ratio() + 2547.0).abs() < 1.0, "{}", k.ratio());
     }
 
     #[test]
     fn both_predictions_agree_to_sixth_order() {
-        let k = Cumulants { kappa2_s2: 4e-4_f64, kappa4_s4: 9.6e-7 };
+        let k = Cumulants {
+            kappa2_s2: 4e-4_f64,
+            kappa4_s4: 9.6e-7,
+        };
         let beta = RadiusModel::from(k);
         let difference = |w: f64| k.log_gain(w).exp_m1() - beta.relative_error(w);
         // Halving ω divides a sixth-order remainder by 64.

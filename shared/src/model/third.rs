@@ -31,10 +31,19 @@ mod tests {
 
     #[test]
     fn a_lag_an_average_and_any_mixture_give_theirs() {
-        for (lag, average) in [(0.02f64, 0.0), (0.02, 0.04), (0.01, 0.1), (0.0, 0.04), (0.003, 0.001)] {
+        for (lag, average) in [
+            (0.02f64, 0.0),
+            (0.02, 0.04),
+            (0.01, 0.1),
+            (0.0, 0.04),
+            (0.003, 0.001),
+        ] {
             let mut sum = Cumulants::default();
             if lag > 0.0 {
-                sum += Element::Lag { kv_per_s: 1.0 / lag }.cumulants();
+                sum += Element::Lag {
+                    kv_per_s: 1.0 / lag,
+                }
+                .cumulants();
             }
             if average > 0.0 {
                 sum += Element::MovingAverage { window_s: average }.cumulants();
@@ -42,7 +51,10 @@ mod tests {
             // κ3 of a lag: ln(1 + τs) has τ³s³/3, and the cumulant generating function is its opposite at −s.
             let expected = 2.0 * lag.powi(3);
             let got = sum.third_of_lag_and_average();
-            assert!((got - expected).abs() < 1e-6 * expected + 1e-12, "{lag} {average}: {got} {expected}");
+            assert!(
+                (got - expected).abs() < 1e-6 * expected + 1e-12,
+                "{lag} {average}: {got} {expected}"
+            );
         }
     }
 
@@ -55,8 +67,20 @@ mod tests {
 
     #[test]
     fn what_no_such_chain_has_gives_none() {
-        for (kappa2_s2, kappa4_s4) in [(46.58e-6, -5.5e-6), (-1e-4, 1e-9), (1e-4, 7e-8), (f64::NAN, 0.0)] {
-            assert_eq!(Cumulants { kappa2_s2, kappa4_s4 }.third_of_lag_and_average(), 0.0);
+        for (kappa2_s2, kappa4_s4) in [
+            (46.58e-6, -5.5e-6),
+            (-1e-4, 1e-9),
+            (1e-4, 7e-8),
+            (f64::NAN, 0.0),
+        ] {
+            assert_eq!(
+                Cumulants {
+                    kappa2_s2,
+                    kappa4_s4
+                }
+                .third_of_lag_and_average(),
+                0.0
+            );
         }
     }
 }

@@ -1,6 +1,7 @@
 //! From SI in double precision to the engine's own numbers, for whoever talks to a controller.
 use super::exact::{
-    ExactArc, ExactCircle, ExactSegment, MAX_POSITION_M, MAX_RADIUS_M, MAX_TURNS, MIN_FRACTION, MIN_RADIUS_M,
+    ExactArc, ExactCircle, ExactSegment, MAX_POSITION_M, MAX_RADIUS_M, MAX_TURNS, MIN_FRACTION,
+    MIN_RADIUS_M,
 };
 use super::{CircleRun, Quantity, Segment};
 use crate::angle::phase_from_rad;
@@ -46,11 +47,24 @@ impl PathError {
 fn finite(quantity: Quantity, values: &[f64]) -> Result<(), PathError> {
     // In single precision, which what follows them has.
     let all = values.iter().all(|value| (*value as f32).is_finite());
-    if all { Ok(()) } else { Err(PathError::NotANumber(quantity)) }
+    if all {
+        Ok(())
+    } else {
+        Err(PathError::NotANumber(quantity))
+    }
 }
 
 fn within(quantity: Quantity, value: f64, [lo, hi]: [f64; 2]) -> Result<(), PathError> {
-    if value >= lo && value <= hi { Ok(()) } else { Err(PathError::OutOfBounds { quantity, value, lo, hi }) }
+    if value >= lo && value <= hi {
+        Ok(())
+    } else {
+        Err(PathError::OutOfBounds {
+            quantity,
+            value,
+            lo,
+            hi,
+        })
+    }
 }
 
 /// A place, nm.
@@ -74,10 +88,18 @@ impl CircleRun {
     /// runs it, it decides itself.
     pub fn exact(&self) -> Result<ExactCircle, PathError> {
         finite(Quantity::Radius, &[self.radius_m])?;
-        within(Quantity::Radius, self.radius_m, [-MAX_RADIUS_M, MAX_RADIUS_M])?;
+        within(
+            Quantity::Radius,
+            self.radius_m,
+            [-MAX_RADIUS_M, MAX_RADIUS_M],
+        )?;
         finite(Quantity::Feed, &[self.feed_m_s])?;
         finite(Quantity::Start, &[self.start_rad])?;
-        within(Quantity::Start, self.start_rad, [-MAX_START_RAD, MAX_START_RAD])?;
+        within(
+            Quantity::Start,
+            self.start_rad,
+            [-MAX_START_RAD, MAX_START_RAD],
+        )?;
         Ok(ExactCircle {
             centre_nm: to_nm(Quantity::Centre, &self.centre_m)?,
             radius_half_nm: to_half_nm(self.radius_m),
@@ -99,15 +121,34 @@ impl Segment {
             Self::Line { to_m, feed_m_s } => {
                 finite(Quantity::Feed, &[*feed_m_s])?;
                 let to_nm = to_nm(Quantity::Position, to_m)?;
-                Ok(ExactSegment::Line { to_nm, feed_m_s: *feed_m_s as f32 })
+                Ok(ExactSegment::Line {
+                    to_nm,
+                    feed_m_s: *feed_m_s as f32,
+                })
             }
-            Self::Arc { centre_m, normal, sweep_rad, rise_m, feed_m_s } => {
+            Self::Arc {
+                centre_m,
+                normal,
+                sweep_rad,
+                rise_m,
+                feed_m_s,
+            } => {
                 finite(Quantity::Feed, &[*feed_m_s])?;
-                arc(from_nm, *centre_m, *normal, *sweep_rad, *rise_m, *feed_m_s as f32).map(ExactSegment::Arc)
+                arc(
+                    from_nm,
+                    *centre_m,
+                    *normal,
+                    *sweep_rad,
+                    *rise_m,
+                    *feed_m_s as f32,
+                )
+                .map(ExactSegment::Arc)
             }
             Self::Dwell { time_s } => {
                 finite(Quantity::Time, &[*time_s])?;
-                Ok(ExactSegment::Dwell { time_s: *time_s as f32 })
+                Ok(ExactSegment::Dwell {
+                    time_s: *time_s as f32,
+                })
             }
         }
     }
@@ -131,18 +172,31 @@ fn arc(
     let height = dot(sub(from, centre), n);
     let centre = add(centre, n.map(|n| height * n));
     let u = sub(from, centre);
-    within(Quantity::Radius, libm::sqrt(dot(u, u)), [MIN_RADIUS_M, MAX_RADIUS_M])?;
+    within(
+        Quantity::Radius,
+        libm::sqrt(dot(u, u)),
+        [MIN_RADIUS_M, MAX_RADIUS_M],
+    )?;
     let (sign, angle) = (if sweep < 0.0 { -1.0 } else { 1.0 }, libm::fabs(sweep));
     let least = MIN_FRACTION as f64 / TURN * TAU;
-    within(Quantity::Sweep, angle, [least * (1.0 - 1e-9), f64::from(MAX_TURNS) * TAU])?;
-    within(Quantity::Rise, rise, [-2.0 * MAX_POSITION_M, 2.0 * MAX_POSITION_M])?;
+    within(
+        Quantity::Sweep,
+        angle,
+        [least * (1.0 - 1e-9), f64::from(MAX_TURNS) * TAU],
+    )?;
+    within(
+        Quantity::Rise,
+        rise,
+        [-2.0 * MAX_POSITION_M, 2.0 * MAX_POSITION_M],
+    )?;
     let per_turn = n.map(|n| n * rise * TAU / angle);
     // Steeper than that it is more of a line: the travel of a whole turn would not fit into a coordinate.
     for travel in per_turn {
         within(Quantity::Rise, travel, [-MAX_POSITION_M, MAX_POSITION_M])?;
     }
     let turns = libm::floor(angle / TAU);
-    let fraction = (((angle / TAU - turns) * TURN) as u64).max(if turns > 0.0 { 0 } else { MIN_FRACTION });
+    let fraction =
+        (((angle / TAU - turns) * TURN) as u64).max(if turns > 0.0 { 0 } else { MIN_FRACTION });
     Ok(ExactArc {
         centre_nm: to_nm(Quantity::Centre, &centre)?,
         u_half_nm: u.map(to_half_nm),
@@ -185,7 +239,13 @@ mod tests {
     const FROM_NM: [i32; 3] = [60_000_000, 5_000_000, 1_000_000];
 
     fn arc_of(normal: [f64; 3], sweep_rad: f64, rise_m: f64) -> Segment {
-        Segment::Arc { centre_m: [0.01, 0.005, 0.3], normal, sweep_rad, rise_m, feed_m_s: 0.3 }
+        Segment::Arc {
+            centre_m: [0.01, 0.005, 0.3],
+            normal,
+            sweep_rad,
+            rise_m,
+            feed_m_s: 0.3,
+        }
     }
 
     /// Rodrigues' formula in double precision.
@@ -193,27 +253,43 @@ mod tests {
         let r = sub(p, centre);
         let (s, c) = libm::sincos(angle);
         let along = dot(n, r) * (1.0 - c);
-        let turned = add(add(r.map(|r| r * c), cross(n, r).map(|k| k * s)), n.map(|n| n * (along + rise)));
+        let turned = add(
+            add(r.map(|r| r * c), cross(n, r).map(|k| k * s)),
+            n.map(|n| n * (along + rise)),
+        );
         add(centre, turned)
     }
 
     #[test]
     fn ends_are_those_of_a_rotation_in_double_precision() {
-        let planes = [[0.0, 0.0, 1.0], [0.0, 0.0, -3.0], [0.3, -0.2, 1.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.1]];
+        let planes = [
+            [0.0, 0.0, 1.0],
+            [0.0, 0.0, -3.0],
+            [0.3, -0.2, 1.0],
+            [1.0, 0.0, 0.0],
+            [0.0, 2.0, 0.1],
+        ];
         let sweeps = [1.5, -1.5, TAU, -TAU, 2.5 * TAU, -7.3, 0.001];
         for normal in planes {
             for sweep in sweeps {
                 for rise in [0.0, 0.02, -0.007] {
                     // Short and steep is refused, which is another test.
-                    let Ok(exact) = arc_of(normal, sweep, rise).exact(FROM_NM) else { continue };
+                    let Ok(exact) = arc_of(normal, sweep, rise).exact(FROM_NM) else {
+                        continue;
+                    };
                     let from = FROM_NM.map(|nm| f64::from(nm) * 1e-9);
                     let n = unit(normal).unwrap();
                     let expected = turned(from, [0.01, 0.005, 0.3], n, sweep, rise);
                     let end = exact.end_nm(FROM_NM);
                     for (end, expected) in end.iter().zip(expected) {
-                        assert!((f64::from(*end) - expected * 1e9).abs() < 5.0, "{normal:?} {sweep} {rise}");
+                        assert!(
+                            (f64::from(*end) - expected * 1e9).abs() < 5.0,
+                            "{normal:?} {sweep} {rise}"
+                        );
                     }
-                    let ExactSegment::Arc(arc) = exact else { panic!() };
+                    let ExactSegment::Arc(arc) = exact else {
+                        panic!()
+                    };
                     assert!(
                         arc.gap_nm(FROM_NM).iter().all(|gap| gap.abs() <= 3),
                         "{:?}",
@@ -231,10 +307,17 @@ mod tests {
         let mut worst = 0;
         for n in 0..1000 {
             // A full turn in four quarters, now here, now there.
-            let (centre_m, sweep_rad) =
-                ([0.01, 0.005, 0.001], TAU / 4.0 * if n / 4 % 2 == 0 { 1.0 } else { -1.0 });
-            let quarter =
-                Segment::Arc { centre_m, normal: [0.0, 0.0, 1.0], sweep_rad, rise_m: 0.0, feed_m_s: 0.3 };
+            let (centre_m, sweep_rad) = (
+                [0.01, 0.005, 0.001],
+                TAU / 4.0 * if n / 4 % 2 == 0 { 1.0 } else { -1.0 },
+            );
+            let quarter = Segment::Arc {
+                centre_m,
+                normal: [0.0, 0.0, 1.0],
+                sweep_rad,
+                rise_m: 0.0,
+                feed_m_s: 0.3,
+            };
             at = quarter.exact(at).unwrap().end_nm(at);
             if n % 4 == 3 {
                 worst = worst.max((0..3).map(|i| (at[i] - FROM_NM[i]).abs()).max().unwrap());
@@ -256,10 +339,22 @@ mod tests {
         };
         let exact = run.exact().unwrap();
         assert_eq!(exact.centre_nm, [-290_000_000, 987_000_000, 615_000_000]);
-        assert_eq!((exact.radius_half_nm, exact.start, exact.laps), (200_000_000, 3 << 30, 3));
+        assert_eq!(
+            (exact.radius_half_nm, exact.start, exact.laps),
+            (200_000_000, 3 << 30, 3)
+        );
         assert_eq!(exact.feed_m_s, 0.7);
         // Negative radii are for the controller to refuse; the integers hold them.
-        assert_eq!(CircleRun { radius_m: -0.005, ..run }.exact().unwrap().radius_half_nm, -10_000_000);
+        assert_eq!(
+            CircleRun {
+                radius_m: -0.005,
+                ..run
+            }
+            .exact()
+            .unwrap()
+            .radius_half_nm,
+            -10_000_000
+        );
         assert!((f64::from(exact.start) * RAD_PER_UNIT - 0.75 * TAU).abs() < 1e-9);
     }
 
@@ -274,27 +369,84 @@ mod tests {
             start_rad: 0.0,
         };
         let runs = [
-            (CircleRun { radius_m: f64::NAN, ..good }, Quantity::Radius),
-            (CircleRun { radius_m: 1.06, ..good }, Quantity::Radius),
-            (CircleRun { feed_m_s: 1e300, ..good }, Quantity::Feed),
-            (CircleRun { centre_m: [0.0, 2.2, 0.0], ..good }, Quantity::Centre),
-            (CircleRun { start_rad: f64::INFINITY, ..good }, Quantity::Start),
+            (
+                CircleRun {
+                    radius_m: f64::NAN,
+                    ..good
+                },
+                Quantity::Radius,
+            ),
+            (
+                CircleRun {
+                    radius_m: 1.06,
+                    ..good
+                },
+                Quantity::Radius,
+            ),
+            (
+                CircleRun {
+                    feed_m_s: 1e300,
+                    ..good
+                },
+                Quantity::Feed,
+            ),
+            (
+                CircleRun {
+                    centre_m: [0.0, 2.2, 0.0],
+                    ..good
+                },
+                Quantity::Centre,
+            ),
+            (
+                CircleRun {
+                    start_rad: f64::INFINITY,
+                    ..good
+                },
+                Quantity::Start,
+            ),
         ];
-        let refused: Vec<_> = runs.iter().map(|(run, _)| run.exact().unwrap_err().quantity()).collect();
+        let refused: Vec<_> = runs
+            .iter()
+            .map(|(run, _)| run.exact().unwrap_err().quantity())
+            .collect();
         assert_eq!(refused, runs.map(|(_, quantity)| quantity));
         let z = [0.0, 0.0, 1.0];
         let segments = [
-            (Segment::Line { to_m: [0.0, 0.0, f64::NAN], feed_m_s: 0.1 }, Quantity::Position),
-            (Segment::Line { to_m: [0.0, 0.0, -2.11], feed_m_s: 0.1 }, Quantity::Position),
-            (Segment::Dwell { time_s: f64::INFINITY }, Quantity::Time),
+            (
+                Segment::Line {
+                    to_m: [0.0, 0.0, f64::NAN],
+                    feed_m_s: 0.1,
+                },
+                Quantity::Position,
+            ),
+            (
+                Segment::Line {
+                    to_m: [0.0, 0.0, -2.11],
+                    feed_m_s: 0.1,
+                },
+                Quantity::Position,
+            ),
+            (
+                Segment::Dwell {
+                    time_s: f64::INFINITY,
+                },
+                Quantity::Time,
+            ),
             (arc_of([0.0; 3], 1.0, 0.0), Quantity::Normal),
             (arc_of(z, 0.0, 0.0), Quantity::Sweep),
             (arc_of(z, 1e8, 0.0), Quantity::Sweep),
             (arc_of(z, 0.01, 0.1), Quantity::Rise),
-            (arc_of([f64::INFINITY, 0.0, 0.0], 1.0, 0.0), Quantity::Normal),
+            (
+                arc_of([f64::INFINITY, 0.0, 0.0], 1.0, 0.0),
+                Quantity::Normal,
+            ),
         ];
         for (segment, quantity) in segments {
-            assert_eq!(segment.exact(FROM_NM).unwrap_err().quantity(), quantity, "{segment:?}");
+            assert_eq!(
+                segment.exact(FROM_NM).unwrap_err().quantity(),
+                quantity,
+                "{segment:?}"
+            );
         }
         let on_the_axis = arc_of(z, 1.0, 0.0).exact([10_000_000, 5_000_000, 0]);
         assert_eq!(on_the_axis.unwrap_err().quantity(), Quantity::Radius);

@@ -95,8 +95,13 @@ impl ExactArc {
     /// The place at a phase (2³² a turn), nm, rise not counted.
     fn at(&self, phase: u32) -> [i32; 3] {
         let (c, s) = sincos(phase);
-        let ([bx, by, bz], [ux, uy, uz], [vx, vy, vz]) = (self.centre_nm, self.u_half_nm, self.v_half_nm);
-        [on_arc([bx, ux, vx], c, s), on_arc([by, uy, vy], c, s), on_arc([bz, uz, vz], c, s)]
+        let ([bx, by, bz], [ux, uy, uz], [vx, vy, vz]) =
+            (self.centre_nm, self.u_half_nm, self.v_half_nm);
+        [
+            on_arc([bx, ux, vx], c, s),
+            on_arc([by, uy, vy], c, s),
+            on_arc([bz, uz, vz], c, s),
+        ]
     }
 
     /// From its own start to the place it really starts at, nm: what rounding of centre and vectors leaves, 2 nm at most.

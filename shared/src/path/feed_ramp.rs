@@ -62,7 +62,10 @@ pub struct FeedRamp<T> {
 }
 
 /// Largest S′ and S″: 630/4⁴, and 2520 q³r at r² = 1/7.
-pub const STEEPEST: [f64; 2] = [315.0 / 128.0, 2520.0 * 27.0 / 2744.0 / 2.645_751_311_064_590_6];
+pub const STEEPEST: [f64; 2] = [
+    315.0 / 128.0,
+    2520.0 * 27.0 / 2744.0 / 2.645_751_311_064_590_6,
+];
 
 impl FeedRamp<f64> {
     /// The quickest ramp within the limits.
@@ -71,7 +74,11 @@ impl FeedRamp<f64> {
         let by_jerk = STEEPEST[1] / limits.jerk_m_s3;
         let change = libm::fabs(to_m_s - from_m_s);
         let duration_s = (change * by_acceleration).max(libm::sqrt(change * by_jerk));
-        Self { from_m_s, to_m_s, duration_s }
+        Self {
+            from_m_s,
+            to_m_s,
+            duration_s,
+        }
     }
 }
 
@@ -112,19 +119,33 @@ mod tests {
             let (before, here, after) = (parts(u - h), parts(u), parts(u + h));
             for k in 0..4 {
                 let slope = (after[k] - before[k]) / (2.0 * h);
-                assert!((slope - here[k + 1]).abs() < 1e-3, "derivative {k} at {u}: {slope} {}", here[k + 1]);
+                assert!(
+                    (slope - here[k + 1]).abs() < 1e-3,
+                    "derivative {k} at {u}: {slope} {}",
+                    here[k + 1]
+                );
             }
         }
         assert_eq!(
             smoothstep(1.0),
-            Smoothstep { integral: 0.5, value: 1.0, first: 0.0, second: 0.0, third: 0.0 }
+            Smoothstep {
+                integral: 0.5,
+                value: 1.0,
+                first: 0.0,
+                second: 0.0,
+                third: 0.0
+            }
         );
     }
 
     #[test]
     fn the_quickest_ramp_touches_a_limit_and_passes_none() {
         for (acceleration_m_s2, jerk_m_s3) in [(5.0, 1e9), (1e9, 200.0), (5.0, 200.0)] {
-            let limits = MotionLimits { feed_m_s: 1.0, acceleration_m_s2, jerk_m_s3 };
+            let limits = MotionLimits {
+                feed_m_s: 1.0,
+                acceleration_m_s2,
+                jerk_m_s3,
+            };
             let ramp = FeedRamp::within(0.1, 0.8, &limits);
             let worst = (0..=10_000)
                 .map(|i| ramp.at(ramp.duration_s * f64::from(i) / 10_000.0))

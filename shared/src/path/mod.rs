@@ -15,8 +15,8 @@ mod segment;
 
 pub use convert::PathError;
 pub use exact::{
-    ExactArc, ExactCircle, ExactSegment, MAX_POSITION_M, MAX_RADIUS_M, MAX_TURNS, MIN_FRACTION, MIN_RADIUS_M,
-    on_arc, risen,
+    ExactArc, ExactCircle, ExactSegment, MAX_POSITION_M, MAX_RADIUS_M, MAX_TURNS, MIN_FRACTION,
+    MIN_RADIUS_M, on_arc, risen,
 };
 pub use feed_ramp::{FeedRamp, MotionLimits, STEEPEST, Smoothstep, smoothstep};
 pub use quantity::Quantity;

@@ -3,7 +3,10 @@ use serde::{Deserialize, Serialize};
 
 /// Which number of a path an error speaks of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
-#[allow(missing_docs, reason = "the message of each variant is its documentation")]
+#[allow(
+    missing_docs,
+    reason = "the message of each variant is its documentation"
+)]
 pub enum Quantity {
     #[error("radius (m)")]
     Radius,

@@ -72,9 +72,17 @@ impl Header {
         if !bytes.starts_with(&MAGIC) {
             return Err(TableError::NotATable);
         }
-        let fields = (word(bytes, 4), word(bytes, 6), word(bytes, 8), word(bytes, 12));
+        let fields = (
+            word(bytes, 4),
+            word(bytes, 6),
+            word(bytes, 8),
+            word(bytes, 12),
+        );
         let (Some(version), Some(flags), Some(length), Some(crc)) = fields else {
-            return Err(TableError::Truncated { have: bytes.len() as u32, need });
+            return Err(TableError::Truncated {
+                have: bytes.len() as u32,
+                need,
+            });
         };
         let length = u32::from_le_bytes(length);
         let max = MAX_IMAGE_BYTES as u32;
@@ -100,11 +108,16 @@ impl Header {
     pub fn check(bytes: &[u8]) -> Result<Self, TableError> {
         let header = Self::read(bytes)?;
         let have = bytes.len() as u32;
-        let image =
-            bytes.get(..header.length).ok_or(TableError::Truncated { have, need: header.length as u32 })?;
+        let image = bytes.get(..header.length).ok_or(TableError::Truncated {
+            have,
+            need: header.length as u32,
+        })?;
         let computed = crc_of(image);
         if computed != header.crc {
-            return Err(TableError::BadCrc { stored: header.crc, computed });
+            return Err(TableError::BadCrc {
+                stored: header.crc,
+                computed,
+            });
         }
         Ok(header)
     }
@@ -126,7 +139,9 @@ pub fn decode(bytes: &[u8]) -> Result<Table, TableError> {
 /// As [`decode`].
 pub fn decode_into(bytes: &[u8], table: &mut Table) -> Result<(), TableError> {
     table.zones.clear();
-    let head = read(bytes, &mut |zone| table.zones.push(zone).map_err(|_| TableError::Malformed))?;
+    let head = read(bytes, &mut |zone| {
+        table.zones.push(zone).map_err(|_| TableError::Malformed)
+    })?;
     (table.machine, table.limits) = head;
     Ok(())
 }
@@ -139,7 +154,11 @@ pub fn check(bytes: &[u8]) -> Result<(), TableError> {
     let mut zones = 0;
     read(bytes, &mut |_| {
         zones += 1;
-        if zones > MAX_ZONES { Err(TableError::Malformed) } else { Ok(()) }
+        if zones > MAX_ZONES {
+            Err(TableError::Malformed)
+        } else {
+            Ok(())
+        }
     })
     .map(drop)
 }
@@ -148,23 +167,41 @@ pub fn check(bytes: &[u8]) -> Result<(), TableError> {
 fn body(bytes: &[u8]) -> Result<&[u8], TableError> {
     let header = Header::check(bytes)?;
     if bytes.len() > header.length {
-        return Err(TableError::TooLong { length: bytes.len() as u32, max: header.length as u32 });
+        return Err(TableError::TooLong {
+            length: bytes.len() as u32,
+            max: header.length as u32,
+        });
     }
     match header.version {
         FORMAT_VERSION => {}
         0 => return Err(TableError::UnknownVersion { version: 0 }),
-        version => return Err(TableError::NewerVersion { version, supported: FORMAT_VERSION }),
+        version => {
+            return Err(TableError::NewerVersion {
+                version,
+                supported: FORMAT_VERSION,
+            });
+        }
     }
     if header.flags & !FLAG_SIGNED != 0 {
-        return Err(TableError::UnknownFlags { flags: header.flags });
+        return Err(TableError::UnknownFlags {
+            flags: header.flags,
+        });
     }
     let found = word(bytes, 16).map_or(0, u32::from_le_bytes);
     if found != SCHEMA_HASH {
-        return Err(TableError::SchemaMismatch { found, expected: SCHEMA_HASH });
+        return Err(TableError::SchemaMismatch {
+            found,
+            expected: SCHEMA_HASH,
+        });
     }
-    let trailer = if header.flags & FLAG_SIGNED == 0 { 0 } else { SIGNATURE_BYTES };
+    let trailer = if header.flags & FLAG_SIGNED == 0 {
+        0
+    } else {
+        SIGNATURE_BYTES
+    };
     let end = header.length.checked_sub(trailer);
-    end.and_then(|end| bytes.get(HEADER_BYTES..end)).ok_or(TableError::Malformed)
+    end.and_then(|end| bytes.get(HEADER_BYTES..end))
+        .ok_or(TableError::Malformed)
 }
 
 /// What a table has beside its zones.
@@ -172,7 +209,10 @@ type Head = (heapless::String<32>, Limits);
 
 /// Reads an image zone by zone. Postcard writes a struct as its fields in order and a vector as its length (LEB128)
 /// and its elements; the tests compare with the whole.
-fn read(bytes: &[u8], keep: &mut dyn FnMut(Zone) -> Result<(), TableError>) -> Result<Head, TableError> {
+fn read(
+    bytes: &[u8],
+    keep: &mut dyn FnMut(Zone) -> Result<(), TableError>,
+) -> Result<Head, TableError> {
     let (machine, rest) = take(body(bytes)?).ok_or(TableError::Malformed)?;
     let (count, mut rest) = take::<u32>(rest).ok_or(TableError::Malformed)?;
     if count == 0 {
@@ -199,7 +239,10 @@ fn read(bytes: &[u8], keep: &mut dyn FnMut(Zone) -> Result<(), TableError>) -> R
 pub fn encode(table: &Table, out: &mut [u8]) -> Result<usize, TableError> {
     table.validate()?;
     let max = out.len() as u32;
-    let too_long = TableError::TooLong { length: MAX_IMAGE_BYTES as u32, max };
+    let too_long = TableError::TooLong {
+        length: MAX_IMAGE_BYTES as u32,
+        max,
+    };
     let body = out.get_mut(HEADER_BYTES..).ok_or(too_long)?;
     let body = postcard::to_slice(table, body).map_err(|_| too_long)?.len();
     let length = HEADER_BYTES + body;
@@ -243,7 +286,11 @@ pub fn signed_parts(image: &[u8]) -> Option<Signed<'_>> {
     }
     let image = image.get(..header.length)?;
     let (rest, signature) = image.split_last_chunk::<SIGNATURE_BYTES>()?;
-    Some(Signed { head: rest.get(4..8)?, body: rest.get(16..)?, signature })
+    Some(Signed {
+        head: rest.get(4..8)?,
+        body: rest.get(16..)?,
+        signature,
+    })
 }
 
 /// Turns the unsigned image at the start of `out` (`length` bytes) into a signed one: `sign` is given head
@@ -259,7 +306,10 @@ pub fn attach_signature(
     Header::read(out)?;
     let max = out.len() as u32;
     let signed = length + SIGNATURE_BYTES;
-    let image = out.get_mut(..signed).ok_or(TableError::TooLong { length: signed as u32, max })?;
+    let image = out.get_mut(..signed).ok_or(TableError::TooLong {
+        length: signed as u32,
+        max,
+    })?;
     write_header(image, FLAG_SIGNED);
     let (rest, signature) = image.split_at_mut(length);
     *signature.first_chunk_mut().ok_or(TableError::Malformed)? =

@@ -4,7 +4,9 @@ pub mod bounds;
 pub mod image;
 pub mod validate;
 
-pub use image::{FORMAT_VERSION, Header, MAX_IMAGE_BYTES, SCHEMA_HASH, check, decode, decode_into, encode};
+pub use image::{
+    FORMAT_VERSION, Header, MAX_IMAGE_BYTES, SCHEMA_HASH, check, decode, decode_into, encode,
+};
 pub use validate::{Field, TableError};
 
 use crate::model::Cumulants;
@@ -72,7 +74,14 @@ pub struct Table {
 impl Table {
     /// A table without zones, whose limits allow nothing: a place to decode into.
     pub const fn empty() -> Self {
-        let limits = Limits { offset_m: 0.0, slew_m_s: 0.0 };
-        Self { machine: heapless::String::new(), zones: heapless::Vec::new(), limits }
+        let limits = Limits {
+            offset_m: 0.0,
+            slew_m_s: 0.0,
+        };
+        Self {
+            machine: heapless::String::new(),
+            zones: heapless::Vec::new(),
+            limits,
+        }
     }
 }

@@ -189,7 +189,13 @@ impl Check {
             return Err(TableError::NonFinite { at: self.0, field });
         }
         if value < lo || value > hi {
-            return Err(TableError::OutOfBounds { at: self.0, field, value, lo, hi });
+            return Err(TableError::OutOfBounds {
+                at: self.0,
+                field,
+                value,
+                lo,
+                hi,
+            });
         }
         Ok(())
     }
@@ -202,7 +208,12 @@ impl Check {
         self.within(field, lo, bound)?;
         self.within(field, hi, bound)?;
         if lo > hi {
-            return Err(TableError::EmptyRange { at: self.0, field, lo, hi });
+            return Err(TableError::EmptyRange {
+                at: self.0,
+                field,
+                lo,
+                hi,
+            });
         }
         Ok(())
     }
@@ -220,23 +231,36 @@ impl Check {
             Term::ServoMismatch { delta_tau_s } => {
                 self.magnitude(Field::TermDeltaTau, delta_tau_s, bounds::DELTA_TAU_MAX_S)
             }
-            Term::BandwidthMismatch { delta_kappa2_s2 } => {
-                self.magnitude(Field::TermDeltaKappa2, delta_kappa2_s2, bounds::KAPPA2_MAX_S2)
-            }
+            Term::BandwidthMismatch { delta_kappa2_s2 } => self.magnitude(
+                Field::TermDeltaKappa2,
+                delta_kappa2_s2,
+                bounds::KAPPA2_MAX_S2,
+            ),
             Term::Backlash { step_m, .. } => length(step_m),
             Term::LateralPlay { shift_m, .. } => length(shift_m),
-            Term::ReversalSpike { peak_m, decay_s, .. } => {
+            Term::ReversalSpike {
+                peak_m, decay_s, ..
+            } => {
                 length(peak_m)?;
                 self.within(Field::TermDecay, decay_s, bounds::DECAY_S)
             }
-            Term::Cyclic { amplitude_m, pitch_m, phase_rad, .. } => {
+            Term::Cyclic {
+                amplitude_m,
+                pitch_m,
+                phase_rad,
+                ..
+            } => {
                 length(amplitude_m)?;
                 self.within(Field::TermPitch, pitch_m, bounds::PITCH_M)?;
                 self.magnitude(Field::TermPhase, phase_rad, bounds::PHASE_MAX_RAD)
             }
-            Term::Straightness { curvature_per_m, .. } => {
-                self.magnitude(Field::TermCurvature, curvature_per_m, bounds::CURVATURE_MAX_PER_M)
-            }
+            Term::Straightness {
+                curvature_per_m, ..
+            } => self.magnitude(
+                Field::TermCurvature,
+                curvature_per_m,
+                bounds::CURVATURE_MAX_PER_M,
+            ),
         }
     }
 }
@@ -245,7 +269,11 @@ impl Limits {
     /// Checks the bounds of the table against those of the image.
     pub fn validate(&self) -> Result<(), TableError> {
         let check = Check(Where::HEAD);
-        check.within(Field::LimitOffset, self.offset_m, [0.0, bounds::OFFSET_MAX_M])?;
+        check.within(
+            Field::LimitOffset,
+            self.offset_m,
+            [0.0, bounds::OFFSET_MAX_M],
+        )?;
         check.within(Field::LimitSlew, self.slew_m_s, [0.0, bounds::SLEW_MAX_M_S])
     }
 }
@@ -255,13 +283,33 @@ impl Zone {
         let check = Check(Where(Some(index as u8)));
         if let Some([lo, hi]) = self.place_m {
             for (lo, hi) in lo.into_iter().zip(hi) {
-                check.range(Field::Place, [lo, hi], [-bounds::PLACE_MAX_M, bounds::PLACE_MAX_M])?;
+                check.range(
+                    Field::Place,
+                    [lo, hi],
+                    [-bounds::PLACE_MAX_M, bounds::PLACE_MAX_M],
+                )?;
             }
         }
-        check.range(Field::Radius, self.radius_m, [bounds::RADIUS_MIN_M, bounds::RADIUS_MAX_M])?;
-        check.range(Field::Feed, self.feed_m_s, [bounds::FEED_MIN_M_S, bounds::FEED_MAX_M_S])?;
-        check.magnitude(Field::Kappa2, self.cumulants.kappa2_s2, bounds::KAPPA2_MAX_S2)?;
-        check.magnitude(Field::Kappa4, self.cumulants.kappa4_s4, bounds::KAPPA4_MAX_S4)?;
+        check.range(
+            Field::Radius,
+            self.radius_m,
+            [bounds::RADIUS_MIN_M, bounds::RADIUS_MAX_M],
+        )?;
+        check.range(
+            Field::Feed,
+            self.feed_m_s,
+            [bounds::FEED_MIN_M_S, bounds::FEED_MAX_M_S],
+        )?;
+        check.magnitude(
+            Field::Kappa2,
+            self.cumulants.kappa2_s2,
+            bounds::KAPPA2_MAX_S2,
+        )?;
+        check.magnitude(
+            Field::Kappa4,
+            self.cumulants.kappa4_s4,
+            bounds::KAPPA4_MAX_S4,
+        )?;
         self.terms.iter().try_for_each(|term| check.term(term))
     }
 }
@@ -276,6 +324,9 @@ impl Table {
         if self.zones.is_empty() {
             return Err(TableError::NoZones);
         }
-        self.zones.iter().enumerate().try_for_each(|(index, zone)| zone.validate(index))
+        self.zones
+            .iter()
+            .enumerate()
+            .try_for_each(|(index, zone)| zone.validate(index))
     }
 }

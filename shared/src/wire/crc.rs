@@ -13,7 +13,11 @@ const fn remainders(bits: u32) -> [u32; 16] {
     while value < 16 {
         let (mut remainder, mut bit) = (value, 0);
         while bit < bits {
-            remainder = if remainder & 1 == 0 { remainder >> 1 } else { (remainder >> 1) ^ 0xedb8_8320 };
+            remainder = if remainder & 1 == 0 {
+                remainder >> 1
+            } else {
+                (remainder >> 1) ^ 0xedb8_8320
+            };
             bit += 1;
         }
         table[value as usize] = remainder;

@@ -13,8 +13,10 @@ const CRC_BYTES: usize = 4;
 const MAX_CONTENT: usize = MAX_PAYLOAD + CRC_BYTES;
 /// Longest frame with its COBS overhead, one byte, and the closing zero.
 pub const MAX_FRAME: usize = MAX_CONTENT + 2;
-const _: () =
-    assert!(MAX_FRAME == cobs::max_encoding_length(MAX_CONTENT) + 1, "longer ones take more overhead");
+const _: () = assert!(
+    MAX_FRAME == cobs::max_encoding_length(MAX_CONTENT) + 1,
+    "longer ones take more overhead"
+);
 
 /// A message that does not fit into [`MAX_PAYLOAD`] or the buffer. Messages are bounded by their types, so
 /// this is a defect of the build; the tests encode the largest of each kind.
@@ -39,7 +41,9 @@ pub fn encode<'a, M: Serialize>(message: &M, out: &'a mut [u8]) -> Result<&'a mu
 fn close(length: usize, out: &mut [u8]) -> Result<&mut [u8], TooLong> {
     let crc = crc32(out.get(1..=length).ok_or(TooLong)?).to_le_bytes();
     let end = length + 1 + CRC_BYTES;
-    *out.get_mut(length + 1..).and_then(<[u8]>::first_chunk_mut).ok_or(TooLong)? = crc;
+    *out.get_mut(length + 1..)
+        .and_then(<[u8]>::first_chunk_mut)
+        .ok_or(TooLong)? = crc;
     let frame = out.get_mut(..=end).ok_or(TooLong)?;
     // Each zero becomes the distance to the next one; the first byte stands for one before them all. None is further than
     // 254 away.
@@ -88,8 +92,17 @@ impl Default for Accumulator {
 impl Accumulator {
     /// Nothing collected yet.
     pub const fn new() -> Self {
-        let counts = FrameCounts { crc_errors: 0, malformed: 0, overlong: 0 };
-        Self { bytes: [0; MAX_FRAME], length: 0, discarding: false, counts }
+        let counts = FrameCounts {
+            crc_errors: 0,
+            malformed: 0,
+            overlong: 0,
+        };
+        Self {
+            bytes: [0; MAX_FRAME],
+            length: 0,
+            discarding: false,
+            counts,
+        }
     }
 
     /// What was thrown away.

@@ -147,7 +147,9 @@ fn array<'de, D: Deserializer<'de>, const N: usize>(from: D) -> Result<[u8; N], 
         fn visit_seq<A: SeqAccess<'de>>(self, mut from: A) -> Result<[u8; N], A::Error> {
             let mut bytes = [0; N];
             for byte in &mut bytes {
-                *byte = from.next_element()?.ok_or_else(|| A::Error::custom("too few"))?;
+                *byte = from
+                    .next_element()?
+                    .ok_or_else(|| A::Error::custom("too few"))?;
             }
             Ok(bytes)
         }

@@ -6,9 +6,16 @@ use serde::de::{self, Deserialize, DeserializeSeed, IntoDeserializer, Visitor};
 
 /// Reads a value from the start of `bytes`; with what is behind it, or `None` if it is not there whole.
 pub fn take<'de, T: Deserialize<'de>>(bytes: &'de [u8]) -> Option<(T, &'de [u8])> {
-    let mut reader = Reader { rest: bytes, failed: false };
+    let mut reader = Reader {
+        rest: bytes,
+        failed: false,
+    };
     let value = T::deserialize(&mut reader);
-    if reader.failed { None } else { value.ok().map(|value| (value, reader.rest)) }
+    if reader.failed {
+        None
+    } else {
+        value.ok().map(|value| (value, reader.rest))
+    }
 }
 
 struct Reader<'de> {
@@ -160,7 +167,11 @@ impl<'de> de::Deserializer<'de> for &mut Reader<'de> {
     }
 
     fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Unknown> {
-        if self.flag() { visitor.visit_some(self) } else { visitor.visit_none() }
+        if self.flag() {
+            visitor.visit_some(self)
+        } else {
+            visitor.visit_none()
+        }
     }
 
     fn deserialize_unit<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Unknown> {
@@ -270,7 +281,10 @@ struct Fields<'a, 'de>(&'a mut Reader<'de>);
 impl<'de> de::SeqAccess<'de> for Fields<'_, 'de> {
     type Error = Unknown;
 
-    fn next_element_seed<T: DeserializeSeed<'de>>(&mut self, seed: T) -> Result<Option<T::Value>, Unknown> {
+    fn next_element_seed<T: DeserializeSeed<'de>>(
+        &mut self,
+        seed: T,
+    ) -> Result<Option<T::Value>, Unknown> {
         seed.deserialize(&mut *self.0).map(Some)
     }
 }
@@ -284,7 +298,10 @@ struct Elements<'a, 'de> {
 impl<'de> de::SeqAccess<'de> for Elements<'_, 'de> {
     type Error = Unknown;
 
-    fn next_element_seed<T: DeserializeSeed<'de>>(&mut self, seed: T) -> Result<Option<T::Value>, Unknown> {
+    fn next_element_seed<T: DeserializeSeed<'de>>(
+        &mut self,
+        seed: T,
+    ) -> Result<Option<T::Value>, Unknown> {
         if self.left == 0 || self.reader.failed {
             return Ok(None);
         }
@@ -311,7 +328,13 @@ mod tests {
 
     type Everything = (
         (u8, i8, u16, i16, u32, i32, u64, i64, f32, f64),
-        (bool, Option<u32>, [u8; 3], heapless::Vec<i32, 40>, heapless::String<40>),
+        (
+            bool,
+            Option<u32>,
+            [u8; 3],
+            heapless::Vec<i32, 40>,
+            heapless::String<40>,
+        ),
         [Kind; 5],
     );
 
@@ -322,7 +345,10 @@ mod tests {
             value.as_ref().map(|(value, rest)| {
                 let mut buffer = [0; 4000];
                 // Compared as bytes: NaN is not itself.
-                (postcard::to_slice(value, &mut buffer).unwrap().to_vec(), rest.len())
+                (
+                    postcard::to_slice(value, &mut buffer).unwrap().to_vec(),
+                    rest.len(),
+                )
             })
         };
         assert_eq!(written(&ours), written(&theirs), "{bytes:02x?}");

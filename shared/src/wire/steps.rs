@@ -17,7 +17,10 @@ pub struct Steps {
 impl Steps {
     /// At rest at a place.
     pub const fn from(place_nm: [i32; 3]) -> Self {
-        Self { place_nm, step_nm: [0; 3] }
+        Self {
+            place_nm,
+            step_nm: [0; 3],
+        }
     }
 
     /// Appends a set-point to a message; `false`: there is no room for it, and nothing has changed.
@@ -31,7 +34,10 @@ impl Steps {
         let mut writer = Writer::new(&mut bytes);
         let written = changes.serialize(&mut writer).is_ok();
         let length = writer.length().filter(|_| written).unwrap_or(0);
-        if steps.extend_from_slice(bytes.get(..length).unwrap_or(&[])).is_err() {
+        if steps
+            .extend_from_slice(bytes.get(..length).unwrap_or(&[]))
+            .is_err()
+        {
             return false;
         }
         (self.place_nm, self.step_nm) = (place_nm, step_nm);
@@ -79,6 +85,11 @@ mod tests {
         let mut chunk = Chunk::new();
         // 5 m/s² in two axes, at 1 kHz.
         let places = (1..).map(|n: i32| [2500 * n * n, -2500 * n * n, 0]);
-        assert_eq!(places.take_while(|&place| writer.write(place, &mut chunk)).count(), 128 / 5);
+        assert_eq!(
+            places
+                .take_while(|&place| writer.write(place, &mut chunk))
+                .count(),
+            128 / 5
+        );
     }
 }

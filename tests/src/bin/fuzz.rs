@@ -87,7 +87,11 @@ fn main() -> ExitCode {
         let started = Instant::now();
         if let Some(execution) = first_defect(target, &args, threads) {
             let seed = args.seed.wrapping_add(execution);
-            eprintln!("target {}, seed {seed}: bytes {:02x?}", target.name, Noise::new(target).bytes(seed));
+            eprintln!(
+                "target {}, seed {seed}: bytes {:02x?}",
+                target.name,
+                Noise::new(target).bytes(seed)
+            );
             return ExitCode::from(5);
         }
         let seconds = started.elapsed().as_secs_f64();

@@ -62,13 +62,27 @@ fn kind(name: &str) -> Kind {
 
 fn main() -> std::process::ExitCode {
     let args = Args::parse();
-    let variety = if args.broad { Variety::Broad } else { Variety::Usual };
+    let variety = if args.broad {
+        Variety::Broad
+    } else {
+        Variety::Usual
+    };
     let mut jobs: Vec<(String, f64, PathBuf)> = Vec::new();
     if let Some(dir) = &args.all {
         let mut add = |name: &str, strength: f64| {
-            jobs.push((name.to_owned(), strength, dir.join(format!("{name}_{strength}"))));
+            jobs.push((
+                name.to_owned(),
+                strength,
+                dir.join(format!("{name}_{strength}")),
+            ));
         };
-        for null in ["null_noise", "null_spread", "null_lag", "null_model", "permuted_servo_mismatch"] {
+        for null in [
+            "null_noise",
+            "null_spread",
+            "null_lag",
+            "null_model",
+            "permuted_servo_mismatch",
+        ] {
             add(null, 3.0);
         }
         for name in LISTED {
@@ -104,12 +118,22 @@ fn main() -> std::process::ExitCode {
             if let Some(keep) = args.keep {
                 keep.thin(&mut case.campaign);
             }
-            files::write(&case, dir).err().map(|e| format!("{}: {e}", dir.display()))
+            files::write(&case, dir)
+                .err()
+                .map(|e| format!("{}: {e}", dir.display()))
         })
         .collect();
     for line in &failed {
         eprintln!("{line}");
     }
-    println!("seed {}: {} campaigns", args.seed, jobs.len() - failed.len());
-    if failed.is_empty() { std::process::ExitCode::SUCCESS } else { std::process::ExitCode::from(2) }
+    println!(
+        "seed {}: {} campaigns",
+        args.seed,
+        jobs.len() - failed.len()
+    );
+    if failed.is_empty() {
+        std::process::ExitCode::SUCCESS
+    } else {
+        std::process::ExitCode::from(2)
+    }
 }

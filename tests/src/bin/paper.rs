@@ -61,19 +61,31 @@ fn run(args: &Args) -> Result<bool, FitError> {
     );
     let joint = study(args.first, args.seeds, how, Offset::Joint)?;
     show("joint (default)", &joint);
-    show("lowest-speed (the paper's)", &study(args.first, args.seeds, how, Offset::LowestSpeed)?);
+    show(
+        "lowest-speed (the paper's)",
+        &study(args.first, args.seeds, how, Offset::LowestSpeed)?,
+    );
     let met = joint.least_explained_percent.iter().all(|e| *e >= 99.5)
         && joint.rms_um.iter().all(|r| r.0 <= 1.0)
         && joint.max_um <= 4.0
-        && joint.coverage_percent.iter().all(|c| (93.0..=97.0).contains(c));
+        && joint
+            .coverage_percent
+            .iter()
+            .all(|c| (93.0..=97.0).contains(c));
     println!(
         "bars (explained ≥ 99.5 %, rms ≤ 1 µm, none over 4 µm, coverage 93–97 %): {}\n",
         if met { "met" } else { "NOT met" }
     );
 
-    println!("Printed in the paper, and what its own model gives at R = 100 mm with n = {}:", 2 * FEEDS);
+    println!(
+        "Printed in the paper, and what its own model gives at R = 100 mm with n = {}:",
+        2 * FEEDS
+    );
     let f = printed::follows()?;
-    println!("  F(0.05; 1; 24)      4.26     {:.2}", critical_f(0.05, 1, 24)?);
+    println!(
+        "  F(0.05; 1; 24)      4.26     {:.2}",
+        critical_f(0.05, 1, 24)?
+    );
     match f.scatter_um {
         Some(scatter) => println!(
             "  F1                  {F1}   {F1} with a scatter of {scatter:.2} µm between runs (chosen so)"
@@ -85,7 +97,11 @@ fn run(args: &Args) -> Result<bool, FitError> {
     }
     println!("  F2                  {F2}    {:.1}", f.f2);
     println!("  F2/1                {F21}     {:.1}", f.f21);
-    println!("  half-widths β1/β2   {:.0} s⁻²   {:.0} s⁻²", HALF_BETA1 / HALF_BETA2, f.half_width_ratio);
+    println!(
+        "  half-widths β1/β2   {:.0} s⁻²   {:.0} s⁻²",
+        HALF_BETA1 / HALF_BETA2,
+        f.half_width_ratio
+    );
     println!("  (half-width of β0    {HALF_BETA0_UM:.2} µm)");
     println!(
         "F2, F2/1 depend on the list of feeds, which the paper does not print; the ratio of the half-widths has no scatter in it\n\

@@ -51,9 +51,16 @@ const HEADING: &str = "hidden\tstrength\tseed\tseconds\texact\tgain_share\tcover
 
 /// One line of `--rows`.
 fn line(row: &Row) -> String {
-    let Row { job, verdict, seconds } = row;
-    let covered: Vec<String> =
-        verdict.covered.iter().map(|(name, inside)| format!("{name}={}", u8::from(*inside))).collect();
+    let Row {
+        job,
+        verdict,
+        seconds,
+    } = row;
+    let covered: Vec<String> = verdict
+        .covered
+        .iter()
+        .map(|(name, inside)| format!("{name}={}", u8::from(*inside)))
+        .collect();
     format!(
         "{}\t{}\t{}\t{seconds:.2}\t{}\t{:.3}\t{}\t{}",
         job.kind,
@@ -73,12 +80,20 @@ fn ask(job: &Job, variety: Variety) -> Result<Row, String> {
     files::write(&case, dir.path()).map_err(|e| e.to_string())?;
     let start = Instant::now();
     let outcome = Outcome::of(dir.path())?;
-    Ok(Row { job: job.clone(), verdict: judge(&case, &outcome), seconds: start.elapsed().as_secs_f64() })
+    Ok(Row {
+        job: job.clone(),
+        verdict: judge(&case, &outcome),
+        seconds: start.elapsed().as_secs_f64(),
+    })
 }
 
 fn main() -> ExitCode {
     let args = Args::parse();
-    let variety = if args.broad { Variety::Broad } else { Variety::Usual };
+    let variety = if args.broad {
+        Variety::Broad
+    } else {
+        Variety::Usual
+    };
     let each = if args.quick { 4 } else { args.each };
     let mut jobs = schedule(args.seed, each, args.only.as_deref());
     jobs.retain(|j| args.strength.is_none_or(|s| s == j.strength));
@@ -137,7 +152,15 @@ fn main() -> ExitCode {
         eprintln!("{}: {e}", args.output.display());
         return ExitCode::from(2);
     } else {
-        println!("{} campaigns, {broken} without an answer: {}", rows.len(), args.output.display());
+        println!(
+            "{} campaigns, {broken} without an answer: {}",
+            rows.len(),
+            args.output.display()
+        );
     }
-    if broken == 0 { ExitCode::SUCCESS } else { ExitCode::from(5) }
+    if broken == 0 {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(5)
+    }
 }

@@ -85,15 +85,24 @@ impl Case {
                     Null::Noise | Null::Spread => base = Machine::default(),
                     Null::Lag => {}
                     Null::Model => {
-                        let omega_zeta = [30.0 + 30.0 * fraction(seed, 1), 0.6 + 0.2 * fraction(seed, 2)];
+                        let omega_zeta = [
+                            30.0 + 30.0 * fraction(seed, 1),
+                            0.6 + 0.2 * fraction(seed, 2),
+                        ];
                         base = Machine::default();
-                        base.axes.iter_mut().for_each(|a| a.mechanics = Some(omega_zeta));
+                        base.axes
+                            .iter_mut()
+                            .for_each(|a| a.mechanics = Some(omega_zeta));
                         model = Some(omega_zeta);
                     }
                 }
                 if *null == Null::Noise {
-                    instrument.spread =
-                        Spread { radius_m: 0.0, oval_m: 0.0, lobes_m: 0.0, ..instrument.spread };
+                    instrument.spread = Spread {
+                        radius_m: 0.0,
+                        oval_m: 0.0,
+                        lobes_m: 0.0,
+                        ..instrument.spread
+                    };
                     instrument.drift_m = 0.0;
                 }
                 Vec::new()
@@ -167,7 +176,9 @@ pub enum Keep {
 impl Keep {
     /// Leaves out the other runs; the first run decides which stay.
     pub fn thin(self, campaign: &mut Campaign) {
-        let Some(first) = campaign.runs.first() else { return };
+        let Some(first) = campaign.runs.first() else {
+            return;
+        };
         let (radius, feed, direction) = (first.radius_m, first.feed_m_s, first.direction);
         campaign.runs.retain(|r| match self {
             Self::OneRadius => r.radius_m == radius,
@@ -222,28 +233,50 @@ fn merged(mut machine: Machine, base: &Machine, alone: &Machine) -> Machine {
 
 /// Gives the residual of each run (measured minus base machine) to another run with as many samples, place by place
 /// on the circle: a turn in the other direction is dealt backwards, or what flips with the direction would go along.
-fn deal_residuals(campaign: &mut Campaign, base: &Machine, plan: &Plan, instrument: &Instrument, seed: u64) {
+fn deal_residuals(
+    campaign: &mut Campaign,
+    base: &Machine,
+    plan: &Plan,
+    instrument: &Instrument,
+    seed: u64,
+) {
     use rand::{SeedableRng, seq::SliceRandom};
-    let bare =
-        Instrument { offset_m: instrument.offset_m, height_m: instrument.height_m, ..Instrument::perfect() }
-            .measure(base, plan, seed);
+    let bare = Instrument {
+        offset_m: instrument.offset_m,
+        height_m: instrument.height_m,
+        ..Instrument::perfect()
+    }
+    .measure(base, plan, seed);
     let residuals: Vec<Vec<f64>> = campaign
         .runs
         .iter()
         .zip(&bare.runs)
-        .map(|(a, b)| a.samples.deviation_m.iter().zip(&b.samples.deviation_m).map(|(a, b)| a - b).collect())
+        .map(|(a, b)| {
+            a.samples
+                .deviation_m
+                .iter()
+                .zip(&b.samples.deviation_m)
+                .map(|(a, b)| a - b)
+                .collect()
+        })
         .collect();
     let mut order: Vec<usize> = (0..residuals.len()).collect();
-    order.shuffle(&mut rand_chacha::ChaCha8Rng::seed_from_u64(seed ^ 0x6465_616c));
+    order.shuffle(&mut rand_chacha::ChaCha8Rng::seed_from_u64(
+        seed ^ 0x6465_616c,
+    ));
     let signs: Vec<f64> = campaign.runs.iter().map(|run| run.sign()).collect();
     for (i, run) in campaign.runs.iter_mut().enumerate() {
         let n = run.samples.deviation_m.len();
         // The next in the shuffled order that is as long as this run; itself if none is.
-        let from = order.iter().position(|k| residuals[*k].len() == n).map_or(i, |k| order.remove(k));
+        let from = order
+            .iter()
+            .position(|k| residuals[*k].len() == n)
+            .map_or(i, |k| order.remove(k));
         let backwards = signs[i] != signs[from];
         for (k, x) in run.samples.deviation_m.iter_mut().enumerate() {
             let place = if backwards { (n - k) % n } else { k };
-            *x = bare.runs[i].samples.deviation_m[k] + residuals[from].get(place).copied().unwrap_or(0.0);
+            *x = bare.runs[i].samples.deviation_m[k]
+                + residuals[from].get(place).copied().unwrap_or(0.0);
         }
     }
 }

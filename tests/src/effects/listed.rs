@@ -104,7 +104,11 @@ pub fn listed(name: &str, seed: u64) -> Option<Effect> {
                 20e-6,
                 Box::new(move |m, size| {
                     for (i, a) in m.axes.iter_mut().enumerate() {
-                        let half = if i == 0 { 0.5 * sign * size } else { -0.5 * sign * size };
+                        let half = if i == 0 {
+                            0.5 * sign * size
+                        } else {
+                            -0.5 * sign * size
+                        };
                         if dead {
                             // Both stay causal.
                             a.dead_time_s += size / 2.0 + half;
@@ -150,7 +154,12 @@ pub fn listed(name: &str, seed: u64) -> Option<Effect> {
                 "um",
                 5e-6,
                 Box::new(move |m, size| {
-                    let friction = Friction { peak_m: size, decay_s, rise_s, presliding_m };
+                    let friction = Friction {
+                        peak_m: size,
+                        decay_s,
+                        rise_s,
+                        presliding_m,
+                    };
                     for (i, a) in m.axes.iter_mut().enumerate() {
                         if both || i == axis {
                             a.friction = Some(friction);
@@ -173,7 +182,11 @@ pub fn listed(name: &str, seed: u64) -> Option<Effect> {
                 "um",
                 2e-6,
                 Box::new(move |m, size| {
-                    m.geometry.cyclic[axis] = Some(Cyclic { amplitude_m: size, pitch_m, phase_rad });
+                    m.geometry.cyclic[axis] = Some(Cyclic {
+                        amplitude_m: size,
+                        pitch_m,
+                        phase_rad,
+                    });
                 }),
                 Box::new(move |m, _| 1e6 * m.geometry.cyclic[axis].map_or(0.0, |c| c.amplitude_m)),
             )
@@ -190,12 +203,20 @@ pub fn listed(name: &str, seed: u64) -> Option<Effect> {
         ),
         "vibration" => {
             let frequency_hz = rng.random_range(4.0..60.0);
-            let along = if rng.random_bool(0.5) { None } else { Some(axis) };
+            let along = if rng.random_bool(0.5) {
+                None
+            } else {
+                Some(axis)
+            };
             plain(
                 "Hz",
                 2e-6,
                 Box::new(move |m, size| {
-                    m.vibration = Some(Vibration { frequency_hz, amplitude_m: size, axis: along });
+                    m.vibration = Some(Vibration {
+                        frequency_hz,
+                        amplitude_m: size,
+                        axis: along,
+                    });
                 }),
                 constant(frequency_hz),
             )
@@ -220,11 +241,20 @@ pub fn listed(name: &str, seed: u64) -> Option<Effect> {
             Box::new(|m, _| 1e3 * m.centripetal_limit_m_s2),
         ),
         "thermal_drift" => {
-            let curvature = if rng.random_bool(0.5) { 0.0 } else { rng.random_range(0.5..3.0) };
+            let curvature = if rng.random_bool(0.5) {
+                0.0
+            } else {
+                rng.random_range(0.5..3.0)
+            };
             plain(
                 "um/m",
                 30e-6,
-                Box::new(move |m, size| m.thermal = Some(Thermal { total: sign * size, curvature })),
+                Box::new(move |m, size| {
+                    m.thermal = Some(Thermal {
+                        total: sign * size,
+                        curvature,
+                    })
+                }),
                 // What can be known: the growth between the first run and the last.
                 Box::new(|m, plan| {
                     let last_s = plan.tests.iter().map(|t| t.started_s).fold(0.0, f64::max);
@@ -239,7 +269,11 @@ pub fn listed(name: &str, seed: u64) -> Option<Effect> {
                 "um",
                 5e-6,
                 Box::new(move |m, size| {
-                    m.axes[axis].stick_slip = Some(StickSlip { height_m: size, speed_m_s, slip_s });
+                    m.axes[axis].stick_slip = Some(StickSlip {
+                        height_m: size,
+                        speed_m_s,
+                        slip_s,
+                    });
                 }),
                 Box::new(move |m, _| 1e6 * m.axes[axis].stick_slip.map_or(0.0, |s| s.height_m)),
             )
@@ -248,7 +282,15 @@ pub fn listed(name: &str, seed: u64) -> Option<Effect> {
     };
     let owned = matches!(
         name,
-        "backlash" | "lateral_play" | "reversal_spike" | "cyclic_error" | "straightness" | "stick_slip"
+        "backlash"
+            | "lateral_play"
+            | "reversal_spike"
+            | "cyclic_error"
+            | "straightness"
+            | "stick_slip"
     );
-    Some(Effect { axis: owned.then_some(axis), ..effect })
+    Some(Effect {
+        axis: owned.then_some(axis),
+        ..effect
+    })
 }

@@ -14,7 +14,10 @@ fn profiles(machine: &Machine, tests: &[&Test], campaign_s: f64) -> Vec<Vec<f64>
         .iter()
         .map(|test| {
             let lap = simulate(machine, test, campaign_s, 0.7);
-            lap.position_m.iter().map(|p| p[0].hypot(p[1]) - test.radius_m).collect()
+            lap.position_m
+                .iter()
+                .map(|p| p[0].hypot(p[1]) - test.radius_m)
+                .collect()
         })
         .collect()
 }
@@ -23,7 +26,11 @@ fn profiles(machine: &Machine, tests: &[&Test], campaign_s: f64) -> Vec<Vec<f64>
 fn in_order(plan: &Plan) -> Vec<&Test> {
     let mut tests: Vec<&Test> = plan.tests.iter().collect();
     let key = |t: &Test| (t.radius_m, t.feed_m_s, t.sign());
-    tests.sort_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal));
+    tests.sort_by(|a, b| {
+        key(a)
+            .partial_cmp(&key(b))
+            .unwrap_or(std::cmp::Ordering::Equal)
+    });
     tests
 }
 
@@ -31,7 +38,10 @@ fn in_order(plan: &Plan) -> Vec<&Test> {
 /// centre has been taken off and one servo lag has been fitted over all runs. Every third test (by radius,
 /// feed, direction) is looked at unless `whole`.
 pub fn misfit_m(machine: &Machine, plan: &Plan, whole: bool) -> f64 {
-    let tests: Vec<&Test> = in_order(plan).into_iter().step_by(if whole { 1 } else { EVERY }).collect();
+    let tests: Vec<&Test> = in_order(plan)
+        .into_iter()
+        .step_by(if whole { 1 } else { EVERY })
+        .collect();
     let mut runs = Vec::new();
     let mut within = 0.0;
     for (test, profile) in tests.iter().zip(profiles(machine, &tests, plan.length_s)) {
@@ -52,11 +62,18 @@ pub fn misfit_m(machine: &Machine, plan: &Plan, whole: bool) -> f64 {
                 (x - mean - cos * c - sin * s).powi(2)
             })
             .sum::<f64>();
-        runs.push((n, test.radius_m, (test.feed_m_s / test.radius_m).powi(2), mean));
+        runs.push((
+            n,
+            test.radius_m,
+            (test.feed_m_s / test.radius_m).powi(2),
+            mean,
+        ));
     }
     let between = |lag2: f64| -> f64 {
         runs.iter()
-            .map(|&(n, radius, w2, mean)| n * (mean - radius * ((1.0 + w2 * lag2).powf(-0.5) - 1.0)).powi(2))
+            .map(|&(n, radius, w2, mean)| {
+                n * (mean - radius * ((1.0 + w2 * lag2).powf(-0.5) - 1.0)).powi(2)
+            })
             .sum()
     };
     let count: f64 = runs.iter().map(|r| r.0).sum();
@@ -114,7 +131,11 @@ pub fn scaled(effect: &Effect, base: &Machine, plan: &Plan, wanted_m: f64) -> (M
             .filter(|s| s.is_finite() && *s > 0.2)
             .map_or(1.0, |s| s.min(20.0));
         // A clamp above every run is not felt at all: a small step then, so as not to jump over the onset.
-        let step = if felt { ((wanted_m.ln() - reached.ln()) / slope).clamp(-2.0, 2.0) } else { 0.2 };
+        let step = if felt {
+            ((wanted_m.ln() - reached.ln()) / slope).clamp(-2.0, 2.0)
+        } else {
+            0.2
+        };
         before = felt.then_some([at, reached.ln()]);
         let mut next = at + step;
         if low.is_finite() && high.is_finite() && (next <= low || next >= high) {
@@ -141,8 +162,14 @@ mod tests {
             let (machine, reached_m) = scaled(&effect, &lab.machine, &plan, 3e-6);
             assert!((reached_m / 3e-6 - 1.0).abs() < 0.05, "{name}: {reached_m}");
             let whole = misfit_m(&machine, &plan, true);
-            assert!((whole / 3e-6 - 1.0).abs() < 0.25, "{name}: {whole} over all tests");
-            assert!(misfit_m(&lab.machine, &plan, true) < 2e-8, "{name}: the bare machine is one lag");
+            assert!(
+                (whole / 3e-6 - 1.0).abs() < 0.25,
+                "{name}: {whole} over all tests"
+            );
+            assert!(
+                misfit_m(&lab.machine, &plan, true) < 2e-8,
+                "{name}: the bare machine is one lag"
+            );
         }
     }
 }

@@ -26,7 +26,13 @@ pub fn unlisted(name: &str, seed: u64) -> Option<Effect> {
     let sign = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
     let phase_rad = rng.random_range(0.0..2.0 * PI);
     let lobes = |order: f64, odd: bool, reach: [f64; 2]| {
-        move |size: f64| Pattern::Lobes { order, amplitude_m: sign * size, phase_rad, odd, reach }
+        move |size: f64| Pattern::Lobes {
+            order,
+            amplitude_m: sign * size,
+            phase_rad,
+            odd,
+            reach,
+        }
     };
     let width_rad = rng.random_range(0.08..0.25);
     let which = rng.random_range(0..4_u8);
@@ -44,11 +50,23 @@ pub fn unlisted(name: &str, seed: u64) -> Option<Effect> {
             width_rad,
             reach: [0.0, 0.0],
         }),
-        "unknown_quadrant" => Box::new(move |size| Pattern::Quadrant { shift_m: sign * size, which }),
+        "unknown_quadrant" => Box::new(move |size| Pattern::Quadrant {
+            shift_m: sign * size,
+            which,
+        }),
         "unknown_size_with_feed" => Box::new(lobes_of_size(sign)),
-        "unknown_step" => Box::new(move |size| Pattern::Step { jump_m: sign * size, at }),
-        "unknown_sweep" => Box::new(move |size| Pattern::Sweep { amplitude_m: sign * size, orders }),
-        _ => Box::new(move |size| Pattern::Transient { height_m: sign * size, decay_s }),
+        "unknown_step" => Box::new(move |size| Pattern::Step {
+            jump_m: sign * size,
+            at,
+        }),
+        "unknown_sweep" => Box::new(move |size| Pattern::Sweep {
+            amplitude_m: sign * size,
+            orders,
+        }),
+        _ => Box::new(move |size| Pattern::Transient {
+            height_m: sign * size,
+            decay_s,
+        }),
     };
     Some(Effect {
         name,

@@ -19,7 +19,11 @@ const ERASE: usize = 512;
 pub const FLASH: usize = 2 * SLOT + ERASE;
 const LAYOUT: Layout = Layout::new([0, SLOT as u32], SLOT as u32).with_key(2 * SLOT as u32);
 /// Slow ticks: a move is as long in seconds, and takes a fourth of the ticks of the boards.
-const BOARD: Board = Board { name: "fuzz", build: "0", tick_hz: 250 };
+const BOARD: Board = Board {
+    name: "fuzz",
+    build: "0",
+    tick_hz: 250,
+};
 
 /// Its flash.
 pub struct Flash {
@@ -31,7 +35,10 @@ pub struct Flash {
 impl Flash {
     /// Erased.
     pub fn new() -> Self {
-        Self { cells: Box::default(), changes: 0 }
+        Self {
+            cells: Box::default(),
+            changes: 0,
+        }
     }
 
     /// The cells, to fill.
@@ -94,7 +101,9 @@ pub fn message_in(frame: &[u8]) -> FromController {
         }
     }
     assert_eq!(left, 0, "the last run of a frame is whole");
-    let (payload, crc) = content[..length].split_last_chunk().expect("a frame has a CRC");
+    let (payload, crc) = content[..length]
+        .split_last_chunk()
+        .expect("a frame has a CRC");
     assert_eq!(u32::from_le_bytes(*crc), crc32(payload), "its CRC holds");
     postcard::from_bytes(payload).expect("a message can be read")
 }
@@ -215,7 +224,10 @@ impl Bench {
         assert!(apart(nominal, corrected) <= FARTHEST, "{output:?}");
         let last = self.last_nm.replace(corrected);
         let moved = last.map(|last| apart(last, corrected));
-        assert!(moved.is_none_or(|moved| moved <= FASTEST), "{last:?} to {output:?}");
+        assert!(
+            moved.is_none_or(|moved| moved <= FASTEST),
+            "{last:?} to {output:?}"
+        );
         moved == Some(0)
     }
 
@@ -236,12 +248,18 @@ impl Bench {
             }
         }
         // Rest is rest.
-        assert!(status.motion != MotionState::Fault || status.fault.is_some(), "a fault without a cause");
+        assert!(
+            status.motion != MotionState::Fault || status.fault.is_some(),
+            "a fault without a cause"
+        );
     }
 
     /// As a reset leaves it.
     pub fn reset(self) -> Self {
         let thorough = self.thorough;
-        Self { thorough, ..Self::boot(self.server.into_parts().0) }
+        Self {
+            thorough,
+            ..Self::boot(self.server.into_parts().0)
+        }
     }
 }

@@ -7,9 +7,15 @@ use giotto_shared::wire::{
 fn ask(bench: &mut Bench, seq: &mut u16, command: Command) -> Reply {
     *seq += 1;
     let mut frame = [0; MAX_FRAME];
-    let request = Request { session: 1, seq: *seq, command };
+    let request = Request {
+        session: 1,
+        seq: *seq,
+        command,
+    };
     let frame = wire::encode(&request, &mut frame).expect("a request fits");
-    let mut answers = frame.iter().filter_map(|&byte| bench.receive(byte).map(message_in));
+    let mut answers = frame
+        .iter()
+        .filter_map(|&byte| bench.receive(byte).map(message_in));
     match answers.next() {
         Some(FromController::Reply { reply, .. }) => reply,
         other => panic!("no answer, or what nobody has asked for: {other:?}"),
@@ -25,12 +31,17 @@ fn status(bench: &mut Bench, seq: &mut u16) -> Status {
 
 /// Boots from these bytes, the rest of the flash blank; the first byte says how they are laid out.
 pub fn run(bytes: &[u8]) {
-    let Some((how, bytes)) = bytes.split_first() else { return };
+    let Some((how, bytes)) = bytes.split_first() else {
+        return;
+    };
     let mut flash = Flash::new();
     let cells = flash.bytes_mut();
     let half = FLASH / 9 * 4;
-    let (first, second) =
-        bytes.split_at(bytes.len().min(if how & 1 == 0 { bytes.len() } else { bytes.len() / 2 }));
+    let (first, second) = bytes.split_at(bytes.len().min(if how & 1 == 0 {
+        bytes.len()
+    } else {
+        bytes.len() / 2
+    }));
     for (base, part) in [(0, first), (half, second)] {
         let mut part = part.to_vec();
         if how & 2 != 0 {
@@ -59,13 +70,31 @@ pub fn run(bytes: &[u8]) {
     bench.ticks(20, false);
     // And it can be flashed, unless what it holds says that it takes signed tables only.
     let table = &super::table::tables()[0];
-    ask(&mut bench, &mut seq, Command::WriteBegin { length: table.len() as u16, crc: crc32(table) });
+    ask(
+        &mut bench,
+        &mut seq,
+        Command::WriteBegin {
+            length: table.len() as u16,
+            crc: crc32(table),
+        },
+    );
     for (index, piece) in table.chunks(CHUNK).enumerate() {
         let data = Chunk::from_slice(piece).expect("a chunk fits");
-        ask(&mut bench, &mut seq, Command::WriteChunk { offset: (index * CHUNK) as u16, data });
+        ask(
+            &mut bench,
+            &mut seq,
+            Command::WriteChunk {
+                offset: (index * CHUNK) as u16,
+                data,
+            },
+        );
     }
     let written = ask(&mut bench, &mut seq, Command::WriteEnd);
-    assert_eq!(matches!(written, Reply::Written { .. }), !signed, "{written:?}");
+    assert_eq!(
+        matches!(written, Reply::Written { .. }),
+        !signed,
+        "{written:?}"
+    );
     if !signed {
         assert_eq!(ask(&mut bench, &mut seq, Command::Commit), Reply::Done);
         assert_eq!(ask(&mut bench, &mut seq, Command::Confirm), Reply::Done);
@@ -83,5 +112,8 @@ pub fn run(bytes: &[u8]) {
 /// A table in each slot, confirmed or not.
 pub fn seeds() -> Vec<Vec<u8>> {
     let [plain, full] = super::table::tables();
-    [0_u8, 1, 2, 3, 6, 7, 15].iter().map(|how| [&[*how], &plain[..], &full[..]].concat()).collect()
+    [0_u8, 1, 2, 3, 6, 7, 15]
+        .iter()
+        .map(|how| [&[*how], &plain[..], &full[..]].concat())
+        .collect()
 }

@@ -1,15 +1,21 @@
 //! The frame decoder and what is in the frames: any bytes are survived, and what is understood is written the same.
-use giotto_shared::wire::{self, Accumulator, Command, FromController, MAX_FRAME, MAX_PAYLOAD, Request};
+use giotto_shared::wire::{
+    self, Accumulator, Command, FromController, MAX_FRAME, MAX_PAYLOAD, Request,
+};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 /// What can be read from a payload can be written, and is then read as the same.
 fn round_trip<M: Serialize + DeserializeOwned>(payload: &[u8]) {
-    let Ok(message) = postcard::from_bytes::<M>(payload) else { return };
+    let Ok(message) = postcard::from_bytes::<M>(payload) else {
+        return;
+    };
     let mut frame = [0; MAX_FRAME];
     let frame = wire::encode(&message, &mut frame).expect("what was read fits into a frame");
     let mut accumulator = Accumulator::new();
-    let back = frame.iter().find_map(|&byte| accumulator.push(byte).map(<[u8]>::to_vec));
+    let back = frame
+        .iter()
+        .find_map(|&byte| accumulator.push(byte).map(<[u8]>::to_vec));
     let back = back.expect("a frame just written is whole");
     let again = postcard::from_bytes::<M>(&back).expect("a message just written can be read");
     // Compared as bytes: NaN is not itself.
@@ -35,7 +41,11 @@ pub fn run(bytes: &[u8]) {
     assert!(counts.crc_errors + counts.malformed + counts.overlong <= zeros);
     // Whatever came before, the next whole frame after a zero is found.
     accumulator.push(0);
-    let request = Request { session: 1, seq: 2, command: Command::Status };
+    let request = Request {
+        session: 1,
+        seq: 2,
+        command: Command::Status,
+    };
     let mut frame = [0; MAX_FRAME];
     let frame = wire::encode(&request, &mut frame).expect("it fits");
     let found = frame.iter().any(|&byte| accumulator.push(byte).is_some());
@@ -46,8 +56,14 @@ pub fn run(bytes: &[u8]) {
 pub fn seeds() -> Vec<Vec<u8>> {
     let mut out = [0; MAX_FRAME];
     let mut frame = |command: Command| {
-        let request = Request { session: 1, seq: 2, command };
-        wire::encode(&request, &mut out).map(|frame| frame.to_vec()).unwrap_or_default()
+        let request = Request {
+            session: 1,
+            seq: 2,
+            command,
+        };
+        wire::encode(&request, &mut out)
+            .map(|frame| frame.to_vec())
+            .unwrap_or_default()
     };
     let hello = frame(Command::Hello);
     let provision = frame(Command::Provision { key: [7; 32] });

@@ -17,7 +17,10 @@
 //! | `table` | 1e8, 1,000,001 | 2 |
 //! | `boot` | 1e8, 1,000,001 | 19 |
 //! | `server` | 1e8, 1,000,001, in 50 runs of 2e6 | 80 |
-#![allow(clippy::panic, reason = "a defect is reported by a panic: that is what a fuzzer looks for")]
+#![allow(
+    clippy::panic,
+    reason = "a defect is reported by a panic: that is what a fuzzer looks for"
+)]
 mod bench;
 pub mod boot;
 pub mod frame;
@@ -36,8 +39,24 @@ pub struct Target {
 
 /// All targets.
 pub const TARGETS: [Target; 4] = [
-    Target { name: "frame", run: frame::run, seeds: frame::seeds },
-    Target { name: "server", run: server::run, seeds: server::seeds },
-    Target { name: "table", run: table::run, seeds: table::seeds },
-    Target { name: "boot", run: boot::run, seeds: boot::seeds },
+    Target {
+        name: "frame",
+        run: frame::run,
+        seeds: frame::seeds,
+    },
+    Target {
+        name: "server",
+        run: server::run,
+        seeds: server::seeds,
+    },
+    Target {
+        name: "table",
+        run: table::run,
+        seeds: table::seeds,
+    },
+    Target {
+        name: "boot",
+        run: boot::run,
+        seeds: boot::seeds,
+    },
 ];

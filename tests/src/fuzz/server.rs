@@ -2,8 +2,8 @@
 use super::bench::{Bench, Flash, message_in};
 use giotto_shared::path::Segment;
 use giotto_shared::wire::{
-    self, CHUNK, Chunk, Command, ExactCircle, ExactSegment, FromController, MAX_FRAME, POINTS, Reply,
-    Request, Status, Steps, crc32,
+    self, CHUNK, Chunk, Command, ExactCircle, ExactSegment, FromController, MAX_FRAME, POINTS,
+    Reply, Request, Status, Steps, crc32,
 };
 
 /// Reads a conversation.
@@ -35,15 +35,23 @@ struct Talk {
 impl Talk {
     fn new(thorough: bool) -> Self {
         let transcript = None;
-        let mut talk =
-            Self { bench: Bench::boot(Flash::new()), seq: 0, steps: Steps::from([0; 3]), transcript };
+        let mut talk = Self {
+            bench: Bench::boot(Flash::new()),
+            seq: 0,
+            steps: Steps::from([0; 3]),
+            transcript,
+        };
         talk.bench.thorough = thorough;
         talk
     }
 
     /// Takes the power away and opens the session again.
     fn reset(self) -> Self {
-        let mut talk = Self { bench: self.bench.reset(), seq: 0, ..self };
+        let mut talk = Self {
+            bench: self.bench.reset(),
+            seq: 0,
+            ..self
+        };
         talk.ask(Command::Hello);
         talk
     }
@@ -77,7 +85,11 @@ impl Talk {
     fn ask(&mut self, command: Command) -> Option<Reply> {
         self.seq = self.seq.wrapping_add(1);
         let mut frame = [0; MAX_FRAME];
-        let request = Request { session: 1, seq: self.seq, command };
+        let request = Request {
+            session: 1,
+            seq: self.seq,
+            command,
+        };
         self.send(wire::encode(&request, &mut frame).expect("a request fits"))
     }
 
@@ -89,10 +101,16 @@ impl Talk {
     }
 
     fn upload(&mut self, image: &[u8]) {
-        self.ask(Command::WriteBegin { length: image.len() as u16, crc: crc32(image) });
+        self.ask(Command::WriteBegin {
+            length: image.len() as u16,
+            crc: crc32(image),
+        });
         for (index, piece) in image.chunks(CHUNK).enumerate() {
             let data = Chunk::from_slice(piece).expect("a chunk fits");
-            self.ask(Command::WriteChunk { offset: (index * CHUNK) as u16, data });
+            self.ask(Command::WriteChunk {
+                offset: (index * CHUNK) as u16,
+                data,
+            });
         }
         self.ask(Command::WriteEnd);
     }
@@ -102,19 +120,28 @@ impl Talk {
         if how == 0 {
             let here_nm = self.status().map_or([0; 3], |status| status.raw_nm);
             self.steps = Steps::from(here_nm);
-            self.ask(Command::BeginStream { feed_m_s: 0.5, ahead: places as u16 });
+            self.ask(Command::BeginStream {
+                feed_m_s: 0.5,
+                ahead: places as u16,
+            });
             return;
         }
         let mut steps = Chunk::new();
         for _ in 0..places {
-            let Steps { place_nm: [x, y, z], .. } = self.steps;
+            let Steps {
+                place_nm: [x, y, z],
+                ..
+            } = self.steps;
             let [dx, dy] = match how {
                 1..12 => [i32::from(how) * 10_000, -3_000],
                 12 => [600_000, 0],
                 13 => [i32::MAX, 0],
                 _ => [0, 0],
             };
-            if !self.steps.write([x.wrapping_add(dx), y.wrapping_add(dy), z], &mut steps) {
+            if !self
+                .steps
+                .write([x.wrapping_add(dx), y.wrapping_add(dy), z], &mut steps)
+            {
                 break;
             }
         }
@@ -151,7 +178,9 @@ fn hold(mut talk: Talk, bytes: &[u8]) -> Talk {
                 payload.extend(script.some(usize::from(length) % 64));
                 drop(talk.payload(&payload));
             }
-            3 => talk.bench.ticks(wait(script.byte().unwrap_or(1)), step > 240),
+            3 => talk
+                .bench
+                .ticks(wait(script.byte().unwrap_or(1)), step > 240),
             4 => {
                 let seeds = super::table::tables();
                 let which = usize::from(script.byte().unwrap_or(0)) % seeds.len();
@@ -190,21 +219,41 @@ fn hold(mut talk: Talk, bytes: &[u8]) -> Talk {
                 let mut coordinate = || (i32::from(script.byte().unwrap_or(9)) - 128) * 3_000_000;
                 let place = [coordinate(), coordinate(), 0];
                 let segment = match step / 16 {
-                    0..6 => ExactSegment::Line { to_nm: place, feed_m_s: 0.5 },
+                    0..6 => ExactSegment::Line {
+                        to_nm: place,
+                        feed_m_s: 0.5,
+                    },
                     6..8 => ExactSegment::Dwell { time_s: 0.01 },
                     // From where it stands, if nothing is in the queue.
                     _ => {
                         let centre_m = place.map(|nm| f64::from(nm) * 1e-9);
                         let (normal, sweep_rad) = ([0.0, 0.0, 1.0], f64::from(step) / 40.0);
-                        let arc = Segment::Arc { centre_m, normal, sweep_rad, rise_m: 0.01, feed_m_s: 0.3 };
+                        let arc = Segment::Arc {
+                            centre_m,
+                            normal,
+                            sweep_rad,
+                            rise_m: 0.01,
+                            feed_m_s: 0.3,
+                        };
                         let here_nm = talk.status().map_or([0; 3], |status| status.raw_nm);
-                        arc.exact(here_nm).unwrap_or(ExactSegment::Dwell { time_s: f32::NAN })
+                        arc.exact(here_nm)
+                            .unwrap_or(ExactSegment::Dwell { time_s: f32::NAN })
                     }
                 };
-                drop(talk.ask(Command::Append { segment, tolerance_nm: u32::from(step) << 12 }));
+                drop(talk.ask(Command::Append {
+                    segment,
+                    tolerance_nm: u32::from(step) << 12,
+                }));
             }
-            14 => drop(talk.ask(if step > 100 { Command::Begin } else { Command::End })),
-            15 => talk.stream(step / 16, usize::from(script.byte().unwrap_or(8)) % (2 * POINTS)),
+            14 => drop(talk.ask(if step > 100 {
+                Command::Begin
+            } else {
+                Command::End
+            })),
+            15 => talk.stream(
+                step / 16,
+                usize::from(script.byte().unwrap_or(8)) % (2 * POINTS),
+            ),
             10 if step > 200 => talk.bench.set_stop_input(step > 230),
             10 => drop(talk.ask(Command::Stop)),
             11 => drop(talk.ask(Command::Hello)),
@@ -221,7 +270,8 @@ fn hold(mut talk: Talk, bytes: &[u8]) -> Talk {
             talk = talk.reset();
             status = talk.status();
         }
-        talk.bench.check(&status.expect("a controller that was reset says how it is"));
+        talk.bench
+            .check(&status.expect("a controller that was reset says how it is"));
     }
     talk
 }
@@ -229,13 +279,20 @@ fn hold(mut talk: Talk, bytes: &[u8]) -> Talk {
 /// A flash and a run; a run, a stop and a reset; a program.
 pub fn seeds() -> Vec<Vec<u8>> {
     vec![
-        vec![4, 0, 1, 1, 5, 6, 9, 128, 100, 60, 0, 3, 255, 3, 255, 10, 3, 255, 12],
-        vec![9, 128, 30, 20, 7, 3, 200, 10, 3, 100, 8, 3, 1, 255, 3, 9],
-        vec![110, 13, 200, 90, 13, 100, 100, 3, 255, 253, 13, 1, 3, 255, 14, 3, 255, 3, 255],
         vec![
-            15, 20, 31, 25, 47, 25, 3, 100, 79, 30, 79, 30, 14, 3, 255, 3, 255, 15, 9, 31, 40, 3, 255, 3, 255,
+            4, 0, 1, 1, 5, 6, 9, 128, 100, 60, 0, 3, 255, 3, 255, 10, 3, 255, 12,
         ],
-        vec![4, 1, 1, 1, 5, 12, 4, 0, 1, 1, 5, 6, 4, 1, 1, 1, 5, 6, 7, 7, 12],
+        vec![9, 128, 30, 20, 7, 3, 200, 10, 3, 100, 8, 3, 1, 255, 3, 9],
+        vec![
+            110, 13, 200, 90, 13, 100, 100, 3, 255, 253, 13, 1, 3, 255, 14, 3, 255, 3, 255,
+        ],
+        vec![
+            15, 20, 31, 25, 47, 25, 3, 100, 79, 30, 79, 30, 14, 3, 255, 3, 255, 15, 9, 31, 40, 3,
+            255, 3, 255,
+        ],
+        vec![
+            4, 1, 1, 1, 5, 12, 4, 0, 1, 1, 5, 6, 4, 1, 1, 1, 5, 6, 7, 7, 12,
+        ],
     ]
 }
 
@@ -248,7 +305,10 @@ mod tests {
     /// A rest that passes at once is one whose ticks are all made: every byte that the controller says is the same.
     #[test]
     fn rests_that_are_skipped_change_nothing() {
-        let server = TARGETS.iter().find(|target| target.name == "server").unwrap();
+        let server = TARGETS
+            .iter()
+            .find(|target| target.name == "server")
+            .unwrap();
         let noise = Noise::new(server);
         for seed in 0..3000 {
             let bytes = noise.bytes(seed);
@@ -257,7 +317,10 @@ mod tests {
                 talk.transcript = Some(Vec::new());
                 hold(talk, &bytes).transcript
             };
-            assert!(transcript(true) == transcript(false), "seed {seed}: {bytes:02x?}");
+            assert!(
+                transcript(true) == transcript(false),
+                "seed {seed}: {bytes:02x?}"
+            );
         }
     }
 }

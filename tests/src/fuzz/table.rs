@@ -20,19 +20,28 @@ pub fn mend(image: &mut [u8]) {
 
 /// Reads the bytes behind the first one as a table.
 pub fn run(bytes: &[u8]) {
-    let Some((how, bytes)) = bytes.split_first() else { return };
+    let Some((how, bytes)) = bytes.split_first() else {
+        return;
+    };
     let mut image = bytes.to_vec();
     if how & 1 == 1 {
         mend(&mut image);
     }
     let checked = table::check(&image);
     let decoded = table::decode(&image);
-    assert_eq!(checked.is_ok(), decoded.is_ok(), "{checked:?} and {decoded:?}");
+    assert_eq!(
+        checked.is_ok(),
+        decoded.is_ok(),
+        "{checked:?} and {decoded:?}"
+    );
     let Ok(table) = decoded else { return };
     table.validate().expect("what was decoded is valid");
     let mut again = [0; MAX_IMAGE_BYTES];
     let length = table::encode(&table, &mut again).expect("what was decoded can be encoded");
-    assert_eq!(table::decode(&again[..length]).expect("and decoded again"), table);
+    assert_eq!(
+        table::decode(&again[..length]).expect("and decoded again"),
+        table
+    );
     // Any table that passes: the engine takes it, or says which term it cannot undo.
     let config = Config::robot(1000);
     let _ = Planner::new(&config, [0; 3]).set_table(Some(&table));
@@ -50,12 +59,18 @@ fn encoded() -> [Vec<u8>; 2] {
         radius_m: [0.05, 0.3],
         feed_m_s: [0.02, 0.7],
         travel: Travel::Both,
-        cumulants: Cumulants { kappa2_s2: 46.58e-6, kappa4_s4: -5.53e-6 },
+        cumulants: Cumulants {
+            kappa2_s2: 46.58e-6,
+            kappa4_s4: -5.53e-6,
+        },
         terms: heapless::Vec::new(),
     };
     let image = |zone: &Zone| {
         let mut table = Table::empty();
-        table.limits = Limits { offset_m: 2e-3, slew_m_s: 0.1 };
+        table.limits = Limits {
+            offset_m: 2e-3,
+            slew_m_s: 0.1,
+        };
         let _ = table.zones.push(zone.clone());
         let mut out = [0; MAX_IMAGE_BYTES];
         let length = table::encode(&table, &mut out).unwrap_or(0);
@@ -69,9 +84,21 @@ fn encoded() -> [Vec<u8>; 2] {
         Term::Squareness { shear_rad: 1e-4 },
         Term::ServoMismatch { delta_tau_s: 1e-4 },
         Term::Backlash { axis, step_m: 1e-5 },
-        Term::ReversalSpike { axis, peak_m: 5e-6, decay_s: 0.02 },
-        Term::Cyclic { axis, amplitude_m: 2e-6, pitch_m: 0.01, phase_rad: 0.5 },
-        Term::Straightness { axis, curvature_per_m: 1e-4 },
+        Term::ReversalSpike {
+            axis,
+            peak_m: 5e-6,
+            decay_s: 0.02,
+        },
+        Term::Cyclic {
+            axis,
+            amplitude_m: 2e-6,
+            pitch_m: 0.01,
+            phase_rad: 0.5,
+        },
+        Term::Straightness {
+            axis,
+            curvature_per_m: 1e-4,
+        },
     ];
     zone.terms.extend(terms);
     zone.place_m = Some([[-1.0; 3], [1.0; 3]]);
@@ -80,5 +107,8 @@ fn encoded() -> [Vec<u8>; 2] {
 
 /// Tables, with and without the header made right.
 pub fn seeds() -> Vec<Vec<u8>> {
-    tables().iter().flat_map(|image| [0, 1].map(|how| [&[how], &image[..]].concat())).collect()
+    tables()
+        .iter()
+        .flat_map(|image| [0, 1].map(|how| [&[how], &image[..]].concat()))
+        .collect()
 }

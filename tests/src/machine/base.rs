@@ -31,13 +31,35 @@ impl Lab {
     pub fn drawn(seed: u64, variety: Variety) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let broad = variety == Variety::Broad;
-        let lag_s = if broad { rng.random_range(0.003..0.016) } else { rng.random_range(0.005..0.012) };
-        let dead_time_s = if rng.random_bool(0.5) { rng.random_range(0.0..0.004) } else { 0.0 };
-        let axis = AxisChain { lag_s, dead_time_s, ..AxisChain::default() };
-        let machine = Machine { axes: [axis.clone(), axis], ..Machine::default() };
-        let noise_m = if broad { rng.random_range(0.4e-6..2.5e-6) } else { rng.random_range(0.7e-6..1.2e-6) };
-        let radius_m =
-            if broad { rng.random_range(0.1e-6..2.0e-6) } else { rng.random_range(0.4e-6..0.8e-6) };
+        let lag_s = if broad {
+            rng.random_range(0.003..0.016)
+        } else {
+            rng.random_range(0.005..0.012)
+        };
+        let dead_time_s = if rng.random_bool(0.5) {
+            rng.random_range(0.0..0.004)
+        } else {
+            0.0
+        };
+        let axis = AxisChain {
+            lag_s,
+            dead_time_s,
+            ..AxisChain::default()
+        };
+        let machine = Machine {
+            axes: [axis.clone(), axis],
+            ..Machine::default()
+        };
+        let noise_m = if broad {
+            rng.random_range(0.4e-6..2.5e-6)
+        } else {
+            rng.random_range(0.7e-6..1.2e-6)
+        };
+        let radius_m = if broad {
+            rng.random_range(0.1e-6..2.0e-6)
+        } else {
+            rng.random_range(0.4e-6..0.8e-6)
+        };
         let around: f64 = rng.random_range(-3.2..3.2);
         let off = rng.random_range(5e-6..60e-6);
         let shape = if broad {
@@ -50,13 +72,30 @@ impl Lab {
             resolution_m: 0.1e-6,
             spread: Spread {
                 radius_m,
-                oval_m: radius_m * if broad { rng.random_range(0.0..0.4) } else { 0.2 },
-                lobes_m: if broad { radius_m * rng.random_range(0.0..0.1) } else { 0.0 },
+                oval_m: radius_m
+                    * if broad {
+                        rng.random_range(0.0..0.4)
+                    } else {
+                        0.2
+                    },
+                lobes_m: if broad {
+                    radius_m * rng.random_range(0.0..0.1)
+                } else {
+                    0.0
+                },
                 shape,
             },
             offset_m: [off * around.cos(), off * around.sin()],
-            height_m: if broad { rng.random_range(0.0..0.2e-3) } else { 0.0 },
-            drift_m: if broad && rng.random_bool(0.3) { rng.random_range(0.0..0.3e-6) } else { 0.0 },
+            height_m: if broad {
+                rng.random_range(0.0..0.2e-3)
+            } else {
+                0.0
+            },
+            drift_m: if broad && rng.random_bool(0.3) {
+                rng.random_range(0.0..0.3e-6)
+            } else {
+                0.0
+            },
             tick_s: 0.25e-3,
             sees_angle: broad && rng.random_bool(0.25),
             knows_start: !(broad && rng.random_bool(0.2)),
@@ -64,12 +103,18 @@ impl Lab {
         let grid = match variety {
             Variety::Usual => Grid::paper(),
             Variety::Small => Grid {
-                feeds_m_s: [20., 50., 100., 200., 300., 450., 700.].map(|f: f64| f / 1e3).to_vec(),
+                feeds_m_s: [20., 50., 100., 200., 300., 450., 700.]
+                    .map(|f: f64| f / 1e3)
+                    .to_vec(),
                 samples: 500,
                 ..Grid::paper()
             },
             Variety::Broad => Grid::drawn(&mut rng),
         };
-        Self { machine, grid, instrument }
+        Self {
+            machine,
+            grid,
+            instrument,
+        }
     }
 }

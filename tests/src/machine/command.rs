@@ -14,7 +14,13 @@ impl Command {
     /// A circle of `radius_m` at the signed angular rate `rate_rad_s`, passing the polar angle
     /// `start_rad` at `t = 0`, after a ramp of `ramp_s` and `settle_s` at full feed.
     pub fn new(radius_m: f64, rate_rad_s: f64, start_rad: f64, ramp_s: f64, settle_s: f64) -> Self {
-        Self { radius_m, rate_rad_s, start_rad, ramp_s, settle_s }
+        Self {
+            radius_m,
+            rate_rad_s,
+            start_rad,
+            ramp_s,
+            settle_s,
+        }
     }
 
     /// Time at which the machine leaves its rest, s (negative).
@@ -57,7 +63,13 @@ impl Interpolator {
     /// lap, so the set-points fall anywhere on the circle.
     pub fn new(command: Command, period_s: f64) -> Self {
         let from = command.position_m(command.begin_s());
-        Self { command, period_s, index: i64::MIN, from, to: from }
+        Self {
+            command,
+            period_s,
+            index: i64::MIN,
+            from,
+            to: from,
+        }
     }
 
     /// Interpolated position at `t`, m; `t` must not fall by more than one period between calls.
@@ -65,8 +77,15 @@ impl Interpolator {
         let count = (t - self.command.begin_s()) / self.period_s;
         let index = count.floor();
         if index as i64 != self.index {
-            let at = |k: f64| self.command.position_m(self.command.begin_s() + k * self.period_s);
-            self.from = if index as i64 == self.index + 1 { self.to } else { at(index) };
+            let at = |k: f64| {
+                self.command
+                    .position_m(self.command.begin_s() + k * self.period_s)
+            };
+            self.from = if index as i64 == self.index + 1 {
+                self.to
+            } else {
+                at(index)
+            };
             self.to = at(index + 1.0);
             self.index = index as i64;
         }
@@ -86,8 +105,14 @@ mod tests {
         let rate = |t: f64| (c.angle_rad(t + h) - c.angle_rad(t - h)) / (2.0 * h);
         assert!(rate(-0.7 + 2.0 * h).abs() < 1e-3, "rest at the beginning");
         assert!((rate(-0.5) - 3.0).abs() < 1e-3, "full feed after the ramp");
-        assert!((c.angle_rad(-0.5 - 1e-9) - c.angle_rad(-0.5)).abs() < 1e-7, "no jump");
-        assert!((c.angle_rad(0.0) - 0.3).abs() < 1e-12, "lap begins at the start angle");
+        assert!(
+            (c.angle_rad(-0.5 - 1e-9) - c.angle_rad(-0.5)).abs() < 1e-7,
+            "no jump"
+        );
+        assert!(
+            (c.angle_rad(0.0) - 0.3).abs() < 1e-12,
+            "lap begins at the start angle"
+        );
     }
 
     #[test]

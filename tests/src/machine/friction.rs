@@ -54,7 +54,11 @@ impl FrictionState {
         let before = self.bristle;
         let sense = travel_m.signum();
         let bend = travel_m.abs() / self.presliding_m;
-        self.bristle = if bend > 40.0 { sense } else { sense + (before - sense) * (-bend).exp() };
+        self.bristle = if bend > 40.0 {
+            sense
+        } else {
+            sense + (before - sense) * (-bend).exp()
+        };
         // Two first-order parts in turn: what the integral has not yet taken over, then the rise.
         let force = 0.5 * (before + self.bristle);
         self.integral = force + (self.integral - force) * self.forget_integral;
@@ -87,7 +91,12 @@ pub struct StickState {
 impl StickState {
     /// Sliding, on its command.
     pub fn new(law: &StickSlip, step_s: f64) -> Self {
-        Self { law: *law, forget: (-step_s / law.slip_s).exp(), deviation: 0.0, sticking: false }
+        Self {
+            law: *law,
+            forget: (-step_s / law.slip_s).exp(),
+            deviation: 0.0,
+            sticking: false,
+        }
     }
 
     /// Deviation, m, after the loop has asked for `travel_m` more in `step_s`.
@@ -115,7 +124,12 @@ mod tests {
 
     #[test]
     fn spike_has_its_height_its_side_and_its_decay() {
-        let law = Friction { peak_m: 8e-6, decay_s: 0.04, rise_s: 0.001, presliding_m: 1e-6 };
+        let law = Friction {
+            peak_m: 8e-6,
+            decay_s: 0.04,
+            rise_s: 0.001,
+            presliding_m: 1e-6,
+        };
         let h = 5e-5;
         let mut f = FrictionState::new(&law, h);
         for _ in 0..40_000 {
@@ -123,18 +137,35 @@ mod tests {
         }
         let after: Vec<f64> = (0..4000).map(|_| f.step(-1e-3)).collect();
         let peak = after.iter().copied().fold(f64::MIN, f64::max);
-        assert!((peak / 8e-6 - 1.0).abs() < 0.02, "moving back after moving up: still up, {peak}");
+        assert!(
+            (peak / 8e-6 - 1.0).abs() < 0.02,
+            "moving back after moving up: still up, {peak}"
+        );
         let late = after[2000] / after[1200];
         assert!((late / (-800.0 * h / 0.04).exp() - 1.0).abs() < 0.01);
     }
 
     #[test]
     fn teeth_reach_their_height_only_at_low_speed() {
-        let law = StickSlip { height_m: 5e-6, speed_m_s: 5e-3, slip_s: 1e-3 };
+        let law = StickSlip {
+            height_m: 5e-6,
+            speed_m_s: 5e-3,
+            slip_s: 1e-3,
+        };
         let mut s = StickState::new(&law, 1e-3);
-        let slow = (0..4000).map(|_| s.step(1e-6, 1e-3)).fold(0.0_f64, f64::min);
-        assert!((slow + 5e-6).abs() < 1.5e-6, "it stays behind a rising command: {slow}");
+        let slow = (0..4000)
+            .map(|_| s.step(1e-6, 1e-3))
+            .fold(0.0_f64, f64::min);
+        assert!(
+            (slow + 5e-6).abs() < 1.5e-6,
+            "it stays behind a rising command: {slow}"
+        );
         let mut s = StickState::new(&law, 1e-3);
-        assert_eq!((0..4000).map(|_| s.step(1e-5, 1e-3)).fold(0.0_f64, f64::min), 0.0);
+        assert_eq!(
+            (0..4000)
+                .map(|_| s.step(1e-5, 1e-3))
+                .fold(0.0_f64, f64::min),
+            0.0
+        );
     }
 }

@@ -10,12 +10,17 @@ pub struct Play {
 impl Play {
     /// Table in the middle of the gap at `position_m`.
     pub fn new(gap_m: f64, position_m: f64) -> Self {
-        Self { half_m: gap_m / 2.0, table_m: position_m }
+        Self {
+            half_m: gap_m / 2.0,
+            table_m: position_m,
+        }
     }
 
     /// Table position for the motor position `motor_m`.
     pub fn step(&mut self, motor_m: f64) -> f64 {
-        self.table_m = self.table_m.clamp(motor_m - self.half_m, motor_m + self.half_m);
+        self.table_m = self
+            .table_m
+            .clamp(motor_m - self.half_m, motor_m + self.half_m);
         self.table_m
     }
 }
@@ -30,7 +35,10 @@ pub struct Sense {
 impl Sense {
     /// Changes over in `travel_m`.
     pub fn new(travel_m: f64) -> Self {
-        Self { per_m: 2.0 / travel_m, state: 0.0 }
+        Self {
+            per_m: 2.0 / travel_m,
+            state: 0.0,
+        }
     }
 
     /// After moving by `travel_m` more.

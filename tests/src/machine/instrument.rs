@@ -74,7 +74,12 @@ impl Instrument {
         Self {
             noise_m: 0.0,
             resolution_m: 0.0,
-            spread: Spread { radius_m: 0.0, oval_m: 0.0, lobes_m: 0.0, shape: Shape::Normal },
+            spread: Spread {
+                radius_m: 0.0,
+                oval_m: 0.0,
+                lobes_m: 0.0,
+                shape: Shape::Normal,
+            },
             offset_m: [0.0; 2],
             height_m: 0.0,
             drift_m: 0.0,
@@ -94,11 +99,20 @@ impl Instrument {
                 // A stream a run: leaving runs out does not change the others.
                 let mut rng = ChaCha8Rng::seed_from_u64(seed);
                 rng.set_stream(index as u64 + 1);
-                let lap = simulate(machine, test, plan.length_s, rng.random_range(0.0..2.0 * PI));
+                let lap = simulate(
+                    machine,
+                    test,
+                    plan.length_s,
+                    rng.random_range(0.0..2.0 * PI),
+                );
                 self.record(&lap, test, index, &mut rng)
             })
             .collect();
-        Campaign { name: "hidden".into(), machine: "machine under test".into(), runs }
+        Campaign {
+            name: "hidden".into(),
+            machine: "machine under test".into(),
+            runs,
+        }
     }
 
     fn record(&self, lap: &Lap, test: &Test, index: usize, rng: &mut ChaCha8Rng) -> Run {
@@ -110,14 +124,18 @@ impl Instrument {
             .map(|scale| [0, 1].map(|_| scale * s.shape.draw(rng)))
             .collect();
         let drift = self.drift_m * Shape::Normal.draw(rng);
-        let (mut angle_rad, mut deviation_m, mut time_s) =
-            (Vec::with_capacity(n), Vec::with_capacity(n), Vec::with_capacity(n));
+        let (mut angle_rad, mut deviation_m, mut time_s) = (
+            Vec::with_capacity(n),
+            Vec::with_capacity(n),
+            Vec::with_capacity(n),
+        );
         for (k, p) in lap.position_m.iter().enumerate() {
             let share = k as f64 / n as f64;
             let even = test.start_angle_rad + test.sign() * 2.0 * PI * share;
             let seen = [p[0] - self.offset_m[0], p[1] - self.offset_m[1]];
-            let mut r =
-                seen[0].hypot(seen[1]).hypot(self.height_m) - test.radius_m + size + drift * (share - 0.5);
+            let mut r = seen[0].hypot(seen[1]).hypot(self.height_m) - test.radius_m
+                + size
+                + drift * (share - 0.5);
             for (order, [c, q]) in (2..).zip(&wobble) {
                 let (sin, cos) = (f64::from(order) * even).sin_cos();
                 r += c * cos + q * sin;
@@ -129,7 +147,11 @@ impl Instrument {
             }
             deviation_m.push(r);
             let t = lap.turn_s * share;
-            time_s.push(if self.tick_s > 0.0 { (t / self.tick_s).round() * self.tick_s } else { t });
+            time_s.push(if self.tick_s > 0.0 {
+                (t / self.tick_s).round() * self.tick_s
+            } else {
+                t
+            });
             // A measured angle is that of the measured point, unwrapped along the even one.
             let own = seen[1].atan2(seen[0]);
             let own = own + 2.0 * PI * ((even - own) / (2.0 * PI)).round();

@@ -6,7 +6,11 @@
 /// Factor by which a circle of angular rate `rate_rad_s` shrinks when its samples every `step_s` are joined by lines.
 pub fn line_loss(rate_rad_s: f64, step_s: f64) -> f64 {
     let half = rate_rad_s * step_s / 2.0;
-    if half.abs() < 1e-9 { 1.0 } else { (half.sin() / half).powi(2) }
+    if half.abs() < 1e-9 {
+        1.0
+    } else {
+        (half.sin() / half).powi(2)
+    }
 }
 
 /// First-order lag with feed-forward: (1 + a·sτ)/(1 + sτ), Eq. 13 with τ = 1/kv.
@@ -34,7 +38,8 @@ impl Lag {
 
     /// Advances by one step to the input `u`.
     pub fn step(&mut self, u: f64) -> f64 {
-        self.state = self.keep * self.state + (1.0 - self.keep) * self.input + self.ramp * (u - self.input);
+        self.state =
+            self.keep * self.state + (1.0 - self.keep) * self.input + self.ramp * (u - self.input);
         self.input = u;
         self.ahead * u + (1.0 - self.ahead) * self.state
     }
@@ -59,7 +64,11 @@ impl SecondOrder {
             [0.0, 0.0, 0.0, 1.0],
             [0.0; 4],
         ]);
-        Self { transition, state: [position, 0.0], input: position }
+        Self {
+            transition,
+            state: [position, 0.0],
+            input: position,
+        }
     }
 
     /// Advances by one step to the input `u`.
@@ -86,8 +95,16 @@ impl Average {
     /// At rest at `position`.
     pub fn new(window_s: f64, step_s: f64, position: f64) -> Self {
         let n = (window_s / step_s).ceil() as usize + 2;
-        let integral = (0..n).map(|k| position * step_s * (k as f64 - (n - 1) as f64)).collect();
-        Self { integral, values: vec![position; n], at: n - 1, window_s, step_s }
+        let integral = (0..n)
+            .map(|k| position * step_s * (k as f64 - (n - 1) as f64))
+            .collect();
+        Self {
+            integral,
+            values: vec![position; n],
+            at: n - 1,
+            window_s,
+            step_s,
+        }
     }
 
     /// Advances by one step to the input `u`.

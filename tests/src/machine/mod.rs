@@ -100,7 +100,12 @@ impl AxisChain {
 
     /// κ2 and κ4 of the linear chain (table of `physics`: they add over a cascade), s² and s⁴.
     pub fn cumulants(&self) -> [f64; 2] {
-        let (t, e, l, a) = (self.average_s, self.exponential_s, self.lag_s, self.feed_forward);
+        let (t, e, l, a) = (
+            self.average_s,
+            self.exponential_s,
+            self.lag_s,
+            self.feed_forward,
+        );
         let mut k2 = t * t / 12.0 + e * e + (1.0 - a * a) * l * l;
         let mut k4 = -t.powi(4) / 120.0 + 6.0 * e.powi(4) + 6.0 * (1.0 - a.powi(4)) * l.powi(4);
         if let Some([w, z]) = self.mechanics {

@@ -79,20 +79,36 @@ pub enum Pattern {
 impl Pattern {
     /// Radial error, m.
     pub fn radial_m(&self, h: &Here) -> f64 {
-        let scaled =
-            |reach: &[f64; 2]| (h.feed_m_s / 0.5).powf(reach[0]) * (h.radius_m / 0.15).powf(reach[1]);
+        let scaled = |reach: &[f64; 2]| {
+            (h.feed_m_s / 0.5).powf(reach[0]) * (h.radius_m / 0.15).powf(reach[1])
+        };
         match self {
-            Self::Lobes { order, amplitude_m, phase_rad, odd, reach } => {
+            Self::Lobes {
+                order,
+                amplitude_m,
+                phase_rad,
+                odd,
+                reach,
+            } => {
                 let d = if *odd { h.sign } else { 1.0 };
                 d * amplitude_m * scaled(reach) * (order * h.angle_rad - phase_rad).cos()
             }
-            Self::Bump { height_m, at_rad, width_rad, reach } => {
+            Self::Bump {
+                height_m,
+                at_rad,
+                width_rad,
+                reach,
+            } => {
                 let off = (h.angle_rad - at_rad + PI).rem_euclid(2.0 * PI) - PI;
                 height_m * scaled(reach) * (-0.5 * (off / width_rad).powi(2)).exp()
             }
             Self::Quadrant { shift_m, which } => {
                 let quadrant = (h.angle_rad.rem_euclid(2.0 * PI) / (PI / 2.0)) as u8;
-                if quadrant == *which { h.sign * shift_m } else { 0.0 }
+                if quadrant == *which {
+                    h.sign * shift_m
+                } else {
+                    0.0
+                }
             }
             Self::Step { jump_m, at } => {
                 if h.share > *at {
@@ -101,10 +117,14 @@ impl Pattern {
                     0.0
                 }
             }
-            Self::Sweep { amplitude_m, orders } => {
+            Self::Sweep {
+                amplitude_m,
+                orders,
+            } => {
                 let turn_s = 2.0 * PI * h.radius_m / h.feed_m_s;
                 let u = h.time_s / turn_s;
-                amplitude_m * (2.0 * PI * (orders[0] * u + 0.5 * (orders[1] - orders[0]) * u * u)).sin()
+                amplitude_m
+                    * (2.0 * PI * (orders[0] * u + 0.5 * (orders[1] - orders[0]) * u * u)).sin()
             }
             Self::Transient { height_m, decay_s } => height_m * (-h.time_s / decay_s).exp(),
         }

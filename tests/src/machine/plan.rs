@@ -60,9 +60,11 @@ impl Grid {
     pub fn paper() -> Self {
         Self {
             radii_m: vec![0.1, 0.15, 0.3],
-            feeds_m_s: [20., 50., 100., 150., 200., 250., 300., 350., 400., 450., 500., 600., 700.]
-                .map(|f: f64| f / 1e3)
-                .to_vec(),
+            feeds_m_s: [
+                20., 50., 100., 150., 200., 250., 300., 350., 400., 450., 500., 600., 700.,
+            ]
+            .map(|f: f64| f / 1e3)
+            .to_vec(),
             samples: 1000,
             rate_hz: 1000.0,
             start_angle_rad: 0.0,
@@ -82,7 +84,8 @@ impl Grid {
         let count = rng.random_range(7..=13);
         let (low, high) = (rng.random_range(0.01..0.05), rng.random_range(0.4..0.8));
         let bend = rng.random_range(0.8..1.8);
-        let feeds = (0..count).map(|k| low + (high - low) * (f64::from(k) / f64::from(count - 1)).powf(bend));
+        let feeds = (0..count)
+            .map(|k| low + (high - low) * (f64::from(k) / f64::from(count - 1)).powf(bend));
         Self {
             radii_m: radii[rng.random_range(0..radii.len())].to_vec(),
             // Programmed feeds are round numbers of mm/s.
@@ -122,6 +125,9 @@ impl Grid {
             test.started_s = (clock * 10.0_f64).round() / 10.0;
             clock += 1.5 * 2.0 * PI * test.radius_m / test.feed_m_s + 20.0;
         }
-        Plan { tests, length_s: clock }
+        Plan {
+            tests,
+            length_s: clock,
+        }
     }
 }

@@ -41,7 +41,8 @@ impl Chain {
     fn new(a: &AxisChain, step_s: f64, at: f64) -> Self {
         Self {
             average: (a.average_s > 0.0).then(|| Average::new(a.average_s, step_s, at)),
-            exponential: (a.exponential_s > 0.0).then(|| Lag::new(a.exponential_s, 0.0, step_s, at)),
+            exponential: (a.exponential_s > 0.0)
+                .then(|| Lag::new(a.exponential_s, 0.0, step_s, at)),
             lag: (a.lag_s > 0.0).then(|| Lag::new(a.lag_s, a.feed_forward, step_s, at)),
             mechanics: a.mechanics.map(|[w, z]| SecondOrder::new(w, z, step_s, at)),
             friction: a.friction.as_ref().map(|f| FrictionState::new(f, step_s)),
@@ -55,10 +56,15 @@ impl Chain {
 
     /// Number of elements that see their input as straight pieces.
     fn lines(a: &AxisChain) -> i32 {
-        [a.average_s > 0.0, a.exponential_s > 0.0, a.lag_s > 0.0, a.mechanics.is_some()]
-            .iter()
-            .map(|on| i32::from(*on))
-            .sum()
+        [
+            a.average_s > 0.0,
+            a.exponential_s > 0.0,
+            a.lag_s > 0.0,
+            a.mechanics.is_some(),
+        ]
+        .iter()
+        .map(|on| i32::from(*on))
+        .sum()
     }
 
     fn step(&mut self, command: f64, step_s: f64) -> f64 {
@@ -95,7 +101,8 @@ impl Chain {
 
 /// Feed the controller really drives, m/s.
 pub fn real_feed(machine: &Machine, test: &Test) -> f64 {
-    test.feed_m_s.min((machine.centripetal_limit_m_s2 * test.radius_m).sqrt())
+    test.feed_m_s
+        .min((machine.centripetal_limit_m_s2 * test.radius_m).sqrt())
 }
 
 /// Drives `machine` through `test`; `campaign_s` is the length of the campaign, `vibration_rad` the phase
@@ -107,8 +114,15 @@ pub fn simulate(machine: &Machine, test: &Test, campaign_s: f64, vibration_rad: 
     let n = test.samples;
     let spacing_s = turn_s / n as f64;
     let nonlinear = machine.interpolation_s > 0.0
-        || machine.axes.iter().any(|a| a.friction.is_some() || a.stick_slip.is_some());
-    let largest = if nonlinear { FINE_STEP_S } else { LINEAR_STEP_S };
+        || machine
+            .axes
+            .iter()
+            .any(|a| a.friction.is_some() || a.stick_slip.is_some());
+    let largest = if nonlinear {
+        FINE_STEP_S
+    } else {
+        LINEAR_STEP_S
+    };
     let per_sample = (spacing_s / largest).ceil().max(1.0) as usize;
     let step_s = spacing_s / per_sample as f64;
 
@@ -128,7 +142,11 @@ pub fn simulate(machine: &Machine, test: &Test, campaign_s: f64, vibration_rad: 
     let rest = command.position_m(command.begin_s());
     let loss = line_loss(rate, step_s);
     let gain = [0, 1].map(|i| {
-        if machine.interpolation_s > 0.0 { 1.0 } else { loss.powi(-Chain::lines(&machine.axes[i])) }
+        if machine.interpolation_s > 0.0 {
+            1.0
+        } else {
+            loss.powi(-Chain::lines(&machine.axes[i]))
+        }
     });
     let mut chains = [0, 1].map(|i| Chain::new(&machine.axes[i], step_s, gain[i] * rest[i]));
     let mut senses = [Sense::new(machine.lateral_travel_m); 2];
@@ -143,7 +161,10 @@ pub fn simulate(machine: &Machine, test: &Test, campaign_s: f64, vibration_rad: 
         let wanted = match &mut interpolators {
             Some([x, y]) => [x.position_m(t - dead[0])[0], y.position_m(t - dead[1])[1]],
             None if dead[0] == dead[1] => command.position_m(t - dead[0]),
-            None => [command.position_m(t - dead[0])[0], command.position_m(t - dead[1])[1]],
+            None => [
+                command.position_m(t - dead[0])[0],
+                command.position_m(t - dead[1])[1],
+            ],
         };
         let mut p = [0, 1].map(|i| chains[i].step(gain[i] * wanted[i], step_s));
         let sense = [0, 1].map(|i| senses[i].step(p[i] - last[i]));
@@ -172,11 +193,22 @@ pub fn simulate(machine: &Machine, test: &Test, campaign_s: f64, vibration_rad: 
 fn slowest_s(a: &AxisChain) -> f64 {
     let mechanics = a.mechanics.map_or(0.0, |[w, z]| 1.0 / (w * z.min(1.0 / z)));
     let friction = a.friction.map_or(0.0, |f| f.decay_s);
-    [a.average_s / 10.0, a.exponential_s, a.lag_s, mechanics, friction].into_iter().fold(0.0, f64::max)
+    [
+        a.average_s / 10.0,
+        a.exponential_s,
+        a.lag_s,
+        mechanics,
+        friction,
+    ]
+    .into_iter()
+    .fold(0.0, f64::max)
 }
 
 /// What acts on the finished motion: vibration, heat, ball size and patterns.
-#[allow(clippy::too_many_arguments, reason = "one sample of everything that is known")]
+#[allow(
+    clippy::too_many_arguments,
+    reason = "one sample of everything that is known"
+)]
 fn outside(
     machine: &Machine,
     test: &Test,
@@ -209,7 +241,11 @@ fn outside(
         time_s: t,
         share,
     };
-    radial += machine.patterns.iter().map(|q| q.radial_m(&here)).sum::<f64>();
+    radial += machine
+        .patterns
+        .iter()
+        .map(|q| q.radial_m(&here))
+        .sum::<f64>();
     let longer = 1.0 + radial / p[0].hypot(p[1]);
     p.map(|x| x * longer)
 }

@@ -16,7 +16,10 @@ use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
 
 /// The paper's coefficients (Table 1).
-pub const PAPER: RadiusModel<f64> = RadiusModel { beta1_s2: -23.29e-6, beta2_s4: -0.23e-6 };
+pub const PAPER: RadiusModel<f64> = RadiusModel {
+    beta1_s2: -23.29e-6,
+    beta2_s4: -0.23e-6,
+};
 /// Its radii, m.
 pub const RADII_M: [f64; 3] = [0.1, 0.15, 0.3];
 /// Offsets of the radii, m: the first is Table 1's β0, the others are ours (the paper prints none).
@@ -41,7 +44,12 @@ pub struct Measurement {
 
 impl Default for Measurement {
     fn default() -> Self {
-        Self { samples: 1000, noise_m: 1e-6, spread_m: 0.5e-6, resolution_m: 0.1e-6 }
+        Self {
+            samples: 1000,
+            noise_m: 1e-6,
+            spread_m: 0.5e-6,
+            resolution_m: 0.1e-6,
+        }
     }
 }
 
@@ -73,14 +81,19 @@ pub fn campaign(seed: u64, how: Measurement) -> Vec<Observation> {
                     let across = centre[1] * cos - centre[0] * sin;
                     let form = oval * (2.0 * sin * cos) + how.noise_m * normal();
                     let length = along + (actual * actual - across * across).sqrt() + form;
-                    let shown =
-                        radius_m + ((length - radius_m) / how.resolution_m).round() * how.resolution_m;
+                    let shown = radius_m
+                        + ((length - radius_m) / how.resolution_m).round() * how.resolution_m;
                     (*x, *y) = (shown * cos, shown * sin);
                 }
                 // Cannot fail: the points are a circle up to micrometres.
                 if let Ok(fit) = fit_circle(&x, &y) {
                     let radius_error_m = fit.circle.radius - radius_m;
-                    runs.push(Observation { radius_m, feed_m_s, radius_error_m, out_of_roundness_m: None });
+                    runs.push(Observation {
+                        radius_m,
+                        feed_m_s,
+                        radius_error_m,
+                        out_of_roundness_m: None,
+                    });
                 }
             }
         }
@@ -93,5 +106,11 @@ pub fn campaign(seed: u64, how: Measurement) -> Vec<Observation> {
 /// # Errors
 /// As [`RadiusFit::new`].
 pub fn fit(runs: &[Observation], options: Options) -> Result<RadiusFit, FitError> {
-    RadiusFit::new(runs, Options { train_radius_m: Some(RADII_M[0]), ..options })
+    RadiusFit::new(
+        runs,
+        Options {
+            train_radius_m: Some(RADII_M[0]),
+            ..options
+        },
+    )
 }

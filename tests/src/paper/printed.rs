@@ -39,10 +39,17 @@ pub fn follows() -> Result<Follows, FitError> {
     let feeds: Vec<f64> = feeds_m_s().flat_map(|f| [f, f]).collect();
     let x1: Vec<f64> = feeds.iter().map(|f| f * f / radius).collect();
     let x2: Vec<f64> = x1.iter().map(|x| x * x / radius).collect();
-    let y: Vec<f64> = feeds.iter().map(|f| 1e6 * PAPER.radius_error_m(radius, *f)).collect();
+    let y: Vec<f64> = feeds
+        .iter()
+        .map(|f| 1e6 * PAPER.radius_error_m(radius, *f))
+        .collect();
     let triangle = Triangle::new(&[("f2_r", &x1), ("f4_r3", &x2)], &y, true)?;
     let n = feeds.len() as f64;
-    let (only1, only2, both) = (triangle.solve(&[0])?, triangle.solve(&[1])?, triangle.solve(&[0, 1])?);
+    let (only1, only2, both) = (
+        triangle.solve(&[0])?,
+        triangle.solve(&[1])?,
+        triangle.solve(&[0, 1])?,
+    );
     // Expected sums of squares: what the model leaves, plus σ² for each degree of freedom.
     let f = |rss: f64, variance: f64| (both.total - rss + variance) / (rss / (n - 2.0) + variance);
     let f1_without_scatter = f(only1.rss, 0.0);
@@ -54,6 +61,7 @@ pub fn follows() -> Result<Follows, FitError> {
         f1_without_scatter,
         f2: f(only2.rss, scatter),
         f21: (only1.rss - both.rss + scatter) / scatter,
-        half_width_ratio: (both.unscaled_covariance[(1, 1)] / both.unscaled_covariance[(2, 2)]).sqrt(),
+        half_width_ratio: (both.unscaled_covariance[(1, 1)] / both.unscaled_covariance[(2, 2)])
+            .sqrt(),
     })
 }

@@ -32,12 +32,21 @@ pub struct Summary {
 }
 
 fn one(seed: u64, how: Measurement, offset: Offset) -> Result<Seed, FitError> {
-    let fit = fit(&campaign(seed, how), Options { offset, ..Options::default() })?;
+    let fit = fit(
+        &campaign(seed, how),
+        Options {
+            offset,
+            ..Options::default()
+        },
+    )?;
     let inside = |ci: [f64; 2], truth: f64| ci[0] <= truth && truth <= ci[1];
     let of = |k: usize| fit.heldout_by_radius[k].1;
     Ok(Seed {
         heldout: [of(0), of(1)],
-        covered: [inside(fit.ci95[0], PAPER.beta1_s2), inside(fit.ci95[1], PAPER.beta2_s4)],
+        covered: [
+            inside(fit.ci95[0], PAPER.beta1_s2),
+            inside(fit.ci95[1], PAPER.beta2_s4),
+        ],
         both_entered: fit.entered(0) && fit.entered(1),
     })
 }
@@ -46,13 +55,22 @@ fn one(seed: u64, how: Measurement, offset: Offset) -> Result<Seed, FitError> {
 ///
 /// # Errors
 /// As [`fit`].
-pub fn study(first: u64, seeds: usize, how: Measurement, offset: Offset) -> Result<Summary, FitError> {
-    let all: Vec<Seed> =
-        (0..seeds as u64).into_par_iter().map(|i| one(first + i, how, offset)).collect::<Result<_, _>>()?;
-    let percent =
-        |of: &dyn Fn(&Seed) -> bool| 100.0 * all.iter().filter(|s| of(s)).count() as f64 / seeds as f64;
-    let fold =
-        |of: &dyn Fn(&Seed) -> f64, with: fn(f64, f64) -> f64, from: f64| all.iter().map(of).fold(from, with);
+pub fn study(
+    first: u64,
+    seeds: usize,
+    how: Measurement,
+    offset: Offset,
+) -> Result<Summary, FitError> {
+    let all: Vec<Seed> = (0..seeds as u64)
+        .into_par_iter()
+        .map(|i| one(first + i, how, offset))
+        .collect::<Result<_, _>>()?;
+    let percent = |of: &dyn Fn(&Seed) -> bool| {
+        100.0 * all.iter().filter(|s| of(s)).count() as f64 / seeds as f64
+    };
+    let fold = |of: &dyn Fn(&Seed) -> f64, with: fn(f64, f64) -> f64, from: f64| {
+        all.iter().map(of).fold(from, with)
+    };
     let largest = |of: &dyn Fn(&Seed) -> f64| fold(of, f64::max, 0.0);
     Ok(Summary {
         seeds,
@@ -60,7 +78,10 @@ pub fn study(first: u64, seeds: usize, how: Measurement, offset: Offset) -> Resu
             .map(|k| fold(&|s| s.heldout[k].explained_percent, f64::min, f64::INFINITY)),
         rms_um: [0, 1].map(|k| {
             let rms = |s: &Seed| s.heldout[k].rms_m * 1e6;
-            (largest(&rms), all.iter().map(rms).sum::<f64>() / seeds as f64)
+            (
+                largest(&rms),
+                all.iter().map(rms).sum::<f64>() / seeds as f64,
+            )
         }),
         max_um: largest(&|s| 1e6 * s.heldout[0].max_m.max(s.heldout[1].max_m)),
         coverage_percent: [0, 1].map(|k| percent(&|s| s.covered[k])),

@@ -26,7 +26,10 @@ impl Rate {
         let (n, p, z) = (self.of as f64, self.hits as f64 / self.of as f64, 1.96_f64);
         let centre = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
         let half = z / (1.0 + z * z / n) * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt();
-        [100.0 * (centre - half).max(0.0), 100.0 * (centre + half).min(1.0)]
+        [
+            100.0 * (centre - half).max(0.0),
+            100.0 * (centre + half).min(1.0),
+        ]
     }
 }
 
@@ -36,7 +39,15 @@ impl std::fmt::Display for Rate {
             return write!(f, "–");
         }
         let [low, high] = self.interval();
-        write!(f, "{:.1} % ({}/{}; {:.1}–{:.1})", self.percent(), self.hits, self.of, low, high)
+        write!(
+            f,
+            "{:.1} % ({}/{}; {:.1}–{:.1})",
+            self.percent(),
+            self.hits,
+            self.of,
+            low,
+            high
+        )
     }
 }
 
@@ -49,6 +60,9 @@ mod tests {
         // Known value: 72.2–100 %.
         let [low, high] = Rate { hits: 10, of: 10 }.interval();
         assert!((low - 72.25).abs() < 0.05 && (high - 100.0).abs() < 1e-9);
-        assert!(Rate { hits: 0, of: 1 }.to_string().ends_with("; 0.0–79.3)"), "no share is below nothing");
+        assert!(
+            Rate { hits: 0, of: 1 }.to_string().ends_with("; 0.0–79.3)"),
+            "no share is below nothing"
+        );
     }
 }

@@ -41,16 +41,25 @@ impl Outcome {
     pub fn of(dir: &Path) -> Result<Self, String> {
         let campaign = giotto::campaign::read(dir).map_err(|e| e.to_string())?;
         let model = dir.join("model.toml");
-        let model =
-            if model.exists() { Some(ModelFile::load(&model).map_err(|e| e.to_string())?) } else { None };
-        let diagnosis = diagnose(&campaign, &Options { model, seed: 1 }).map_err(|e| e.to_string())?;
+        let model = if model.exists() {
+            Some(ModelFile::load(&model).map_err(|e| e.to_string())?)
+        } else {
+            None
+        };
+        let diagnosis =
+            diagnose(&campaign, &Options { model, seed: 1 }).map_err(|e| e.to_string())?;
         let json = serde_json::to_value(&diagnosis).map_err(|e| e.to_string())?;
         Self::from_json(&json).ok_or_else(|| format!("not as the contract has it: {json}"))
     }
 
     /// Reads the contract's JSON; `None` where a field is missing or of another kind.
     pub fn from_json(json: &Value) -> Option<Self> {
-        let findings = json.get("findings")?.as_array()?.iter().map(finding).collect::<Option<Vec<_>>>()?;
+        let findings = json
+            .get("findings")?
+            .as_array()?
+            .iter()
+            .map(finding)
+            .collect::<Option<Vec<_>>>()?;
         Some(Self {
             findings,
             unexplained: json.pointer("/unexplained/present")?.as_bool()?,

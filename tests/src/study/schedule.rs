@@ -78,13 +78,15 @@ pub fn schedule(seed: u64, each: usize, only: Option<&str>) -> Vec<Job> {
     let mut jobs = Vec::new();
     let mut add = |group: Group, kind: Kind, strength: f64, count: usize| {
         let name = kind.to_string();
-        if only.is_some_and(|o| !name.contains(o) && !format!("{group:?}").eq_ignore_ascii_case(o)) {
+        if only.is_some_and(|o| !name.contains(o) && !format!("{group:?}").eq_ignore_ascii_case(o))
+        {
             return;
         }
         for k in 0..count {
             // Seeds differ between rows, so that no laboratory is met twice.
-            let row =
-                name.bytes().fold(strength.to_bits(), |h, b| h.wrapping_mul(0x0100_0000_01b3) ^ u64::from(b));
+            let row = name.bytes().fold(strength.to_bits(), |h, b| {
+                h.wrapping_mul(0x0100_0000_01b3) ^ u64::from(b)
+            });
             jobs.push(Job {
                 group,
                 kind: kind.clone(),
@@ -100,7 +102,11 @@ pub fn schedule(seed: u64, each: usize, only: Option<&str>) -> Vec<Job> {
             Group::Null,
             Kind::Null(null),
             0.0,
-            if each < FULL { each.div_ceil(2) } else { 5 * FULL.max(each) },
+            if each < FULL {
+                each.div_ceil(2)
+            } else {
+                5 * FULL.max(each)
+            },
         );
     }
     for name in LISTED {
@@ -121,7 +127,12 @@ pub fn schedule(seed: u64, each: usize, only: Option<&str>) -> Vec<Job> {
     }
     // Only what flips with the direction averages out when it is dealt to other runs.
     for name in ["servo_mismatch", "lateral_play"] {
-        add(Group::Permuted, Kind::Permuted(name.to_owned()), 3.0, each.div_ceil(4));
+        add(
+            Group::Permuted,
+            Kind::Permuted(name.to_owned()),
+            3.0,
+            each.div_ceil(4),
+        );
     }
     jobs
 }

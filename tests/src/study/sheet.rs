@@ -39,8 +39,11 @@ pub fn bars(rows: &[Row]) -> Vec<[String; 3]> {
         row.verdict.covered.iter().for_each(|c| covered.add(c.1));
         row.verdict.axis.iter().for_each(|a| axis.add(*a));
     }
-    let gains: Vec<f64> =
-        rows.iter().filter(|r| r.job.strength >= 3.0).filter_map(|r| r.verdict.gain_share).collect();
+    let gains: Vec<f64> = rows
+        .iter()
+        .filter(|r| r.job.strength >= 3.0)
+        .filter_map(|r| r.verdict.gain_share)
+        .collect();
     let enough = gains.iter().filter(|g| **g >= 0.95).count();
     let null = |r: &Row| !r.verdict.stated.is_empty();
     [
@@ -62,23 +65,43 @@ pub fn bars(rows: &[Row]) -> Vec<[String; 3]> {
         (
             "exact set, pairs and triples at 3×",
             "≥ 90 %",
-            rate(rows.iter().filter(|r| matches!(r.job.group, Group::Pair | Group::Triple)), |r| {
-                r.verdict.exact
-            })
+            rate(
+                rows.iter()
+                    .filter(|r| matches!(r.job.group, Group::Pair | Group::Triple)),
+                |r| r.verdict.exact,
+            )
             .to_string(),
         ),
-        ("– pairs", "–", rate(group(Group::Pair), |r| r.verdict.exact).to_string()),
-        ("– triples", "–", rate(group(Group::Triple), |r| r.verdict.exact).to_string()),
-        ("nulls with any finding", "≤ 2 %", rate(group(Group::Null), null).to_string()),
+        (
+            "– pairs",
+            "–",
+            rate(group(Group::Pair), |r| r.verdict.exact).to_string(),
+        ),
+        (
+            "– triples",
+            "–",
+            rate(group(Group::Triple), |r| r.verdict.exact).to_string(),
+        ),
+        (
+            "nulls with any finding",
+            "≤ 2 %",
+            rate(group(Group::Null), null).to_string(),
+        ),
         (
             "nulls called unexplained",
             "–",
-            rate(group(Group::Null), |r| r.verdict.said.ends_with("unexplained")).to_string(),
+            rate(group(Group::Null), |r| {
+                r.verdict.said.ends_with("unexplained")
+            })
+            .to_string(),
         ),
         (
             "unlisted effect: `unexplained`, nothing named",
             "≥ 90 %",
-            rate(group(Group::Unlisted), |r| r.verdict.exact && r.verdict.stated.is_empty()).to_string(),
+            rate(group(Group::Unlisted), |r| {
+                r.verdict.exact && r.verdict.stated.is_empty()
+            })
+            .to_string(),
         ),
         (
             "residuals dealt to other runs: nothing named",
@@ -86,7 +109,11 @@ pub fn bars(rows: &[Row]) -> Vec<[String; 3]> {
             rate(group(Group::Permuted), |r| !null(r)).to_string(),
         ),
         ("right axis, of those found", "–", axis.to_string()),
-        ("95 % interval covers the truth", "93–97 %", covered.to_string()),
+        (
+            "95 % interval covers the truth",
+            "93–97 %",
+            covered.to_string(),
+        ),
         (
             "gain on runs left out, of the perfect model's (median, ≥ 3×)",
             "≥ 95 %",
@@ -134,8 +161,11 @@ pub fn page(rows: &[Row], seed: u64, command: &str) -> String {
 
 fn causes(rows: &[Row], out: &mut String) {
     out.push_str("\n## By cause\n\nFirst finding right at three strengths; interval covers the truth (all campaigns in which it was found).\n\n| cause | 1× | 3× | 10× | covers |\n|---|---|---|---|---|\n");
-    let mut names: Vec<String> =
-        rows.iter().filter(|r| r.job.group == Group::Single).map(|r| r.job.kind.to_string()).collect();
+    let mut names: Vec<String> = rows
+        .iter()
+        .filter(|r| r.job.group == Group::Single)
+        .map(|r| r.job.kind.to_string())
+        .collect();
     names.dedup();
     for name in names {
         let at = |strength: f64| {
@@ -149,8 +179,17 @@ fn causes(rows: &[Row], out: &mut String) {
             )
         };
         let mut covers = Rate::default();
-        rows.iter().flat_map(|r| &r.verdict.covered).filter(|c| c.0 == name).for_each(|c| covers.add(c.1));
-        let short = |r: Rate| if r.of == 0 { "–".into() } else { format!("{}/{}", r.hits, r.of) };
+        rows.iter()
+            .flat_map(|r| &r.verdict.covered)
+            .filter(|c| c.0 == name)
+            .for_each(|c| covers.add(c.1));
+        let short = |r: Rate| {
+            if r.of == 0 {
+                "–".into()
+            } else {
+                format!("{}/{}", r.hits, r.of)
+            }
+        };
         let _ = writeln!(
             out,
             "| {name} | {} | {} | {} | {covers} |",
@@ -164,11 +203,17 @@ fn causes(rows: &[Row], out: &mut String) {
 fn confusion(rows: &[Row], out: &mut String) {
     out.push_str("\n## Confusion\n\nHidden effect (alone, any strength) and what came first.\n\n| hidden | came first |\n|---|---|\n");
     let mut table: BTreeMap<String, BTreeMap<&str, usize>> = BTreeMap::new();
-    for row in rows
-        .iter()
-        .filter(|r| matches!(r.job.group, Group::Single | Group::Unlisted | Group::Null | Group::Permuted))
-    {
-        *table.entry(row.job.kind.to_string()).or_default().entry(&row.verdict.top).or_default() += 1;
+    for row in rows.iter().filter(|r| {
+        matches!(
+            r.job.group,
+            Group::Single | Group::Unlisted | Group::Null | Group::Permuted
+        )
+    }) {
+        *table
+            .entry(row.job.kind.to_string())
+            .or_default()
+            .entry(&row.verdict.top)
+            .or_default() += 1;
     }
     for (name, said) in table {
         let mut said: Vec<_> = said.into_iter().collect();
@@ -182,13 +227,30 @@ fn reliability(rows: &[Row], out: &mut String) {
     out.push_str(
         "\n## Reliability of the stated probability\n\n| stated | mean stated | there |\n|---|---|---|\n",
     );
-    let all: Vec<(f64, bool)> = rows.iter().flat_map(|r| r.verdict.stated.iter().copied()).collect();
-    for edge in [[0.0, 0.5], [0.5, 0.8], [0.8, 0.9], [0.9, 0.95], [0.95, 0.99], [0.99, 1.01]] {
-        let inside: Vec<_> = all.iter().filter(|s| s.0 >= edge[0] && s.0 < edge[1]).collect();
+    let all: Vec<(f64, bool)> = rows
+        .iter()
+        .flat_map(|r| r.verdict.stated.iter().copied())
+        .collect();
+    for edge in [
+        [0.0, 0.5],
+        [0.5, 0.8],
+        [0.8, 0.9],
+        [0.9, 0.95],
+        [0.95, 0.99],
+        [0.99, 1.01],
+    ] {
+        let inside: Vec<_> = all
+            .iter()
+            .filter(|s| s.0 >= edge[0] && s.0 < edge[1])
+            .collect();
         let mut there = Rate::default();
         inside.iter().for_each(|s| there.add(s.1));
         let mean = 100.0 * inside.iter().map(|s| s.0).sum::<f64>() / inside.len() as f64;
-        let mean = if inside.is_empty() { "–".to_owned() } else { format!("{mean:.1} %") };
+        let mean = if inside.is_empty() {
+            "–".to_owned()
+        } else {
+            format!("{mean:.1} %")
+        };
         let _ = writeln!(
             out,
             "| {:.0}–{:.0} % | {mean} | {there} |",
@@ -203,14 +265,25 @@ fn groups(rows: &[Row], out: &mut String) {
     let mut table: BTreeMap<(Group, String, u64), Rate> = BTreeMap::new();
     for row in rows.iter().filter(|r| r.job.group != Group::Single) {
         table
-            .entry((row.job.group, row.job.kind.to_string(), row.job.strength.to_bits()))
+            .entry((
+                row.job.group,
+                row.job.kind.to_string(),
+                row.job.strength.to_bits(),
+            ))
             .or_default()
             .add(row.verdict.exact);
     }
     // Pairs that always come out right say nothing one by one.
-    for ((group, name, strength), r) in table.iter().filter(|(k, r)| k.0 != Group::Pair || r.hits < r.of) {
+    for ((group, name, strength), r) in table
+        .iter()
+        .filter(|(k, r)| k.0 != Group::Pair || r.hits < r.of)
+    {
         let strength = f64::from_bits(*strength);
-        let strength = if *group == Group::Null { "–".to_owned() } else { format!("{strength}×") };
+        let strength = if *group == Group::Null {
+            "–".to_owned()
+        } else {
+            format!("{strength}×")
+        };
         let _ = writeln!(out, "| {name} | {strength} | {}/{} |", r.hits, r.of);
     }
 }
@@ -218,15 +291,26 @@ fn groups(rows: &[Row], out: &mut String) {
 fn failures(rows: &[Row], out: &mut String) {
     out.push_str("\n## Failures\n\nUp to three a row of the study; `hide --effect NAME --strength K --seed SEED` writes the campaign.\n\n");
     let mut shown: BTreeMap<(String, u64), usize> = BTreeMap::new();
-    for row in
-        rows.iter().filter(|r| !r.verdict.exact || (r.job.group == Group::Single && !r.verdict.top_right))
+    for row in rows
+        .iter()
+        .filter(|r| !r.verdict.exact || (r.job.group == Group::Single && !r.verdict.top_right))
     {
-        let n = shown.entry((row.job.kind.to_string(), row.job.strength.to_bits())).or_default();
+        let n = shown
+            .entry((row.job.kind.to_string(), row.job.strength.to_bits()))
+            .or_default();
         *n += 1;
         if *n > 3 {
             continue;
         }
-        let said = if row.verdict.said.is_empty() { "nothing" } else { &row.verdict.said };
-        let _ = writeln!(out, "- {} at {}×, seed {}: {said}", row.job.kind, row.job.strength, row.job.seed);
+        let said = if row.verdict.said.is_empty() {
+            "nothing"
+        } else {
+            &row.verdict.said
+        };
+        let _ = writeln!(
+            out,
+            "- {} at {}×, seed {}: {said}",
+            row.job.kind, row.job.strength, row.job.seed
+        );
     }
 }

@@ -32,23 +32,48 @@ const SOMETHING: f64 = 0.1;
 
 /// Judges `outcome` against the truth of `case`.
 pub fn judge(case: &Case, outcome: &Outcome) -> Verdict {
-    let must = |cause: &str| case.truth.iter().any(|t| t.accept.iter().any(|a| a == cause));
-    let may =
-        |cause: &str| case.truth.iter().any(|t| t.accept.iter().any(|a| a.strip_prefix('~') == Some(cause)));
+    let must = |cause: &str| {
+        case.truth
+            .iter()
+            .any(|t| t.accept.iter().any(|a| a == cause))
+    };
+    let may = |cause: &str| {
+        case.truth
+            .iter()
+            .any(|t| t.accept.iter().any(|a| a.strip_prefix('~') == Some(cause)))
+    };
     let causes: Vec<&str> = outcome.findings.iter().map(|f| f.cause.as_str()).collect();
     let found = |t: &Truth| t.accept.iter().any(|a| causes.contains(&a.as_str()));
     let unlisted = case.truth.iter().any(|t| t.accept.is_empty());
-    let false_findings: Vec<String> =
-        causes.iter().filter(|c| !must(c) && !may(c)).map(|c| (*c).to_owned()).collect();
-    let listed_found = case.truth.iter().filter(|t| !t.accept.is_empty()).all(found);
+    let false_findings: Vec<String> = causes
+        .iter()
+        .filter(|c| !must(c) && !may(c))
+        .map(|c| (*c).to_owned())
+        .collect();
+    let listed_found = case
+        .truth
+        .iter()
+        .filter(|t| !t.accept.is_empty())
+        .all(found);
     let mut verdict = Verdict {
         top_right: causes.first().is_some_and(|c| must(c)),
         exact: listed_found && false_findings.is_empty() && (!unlisted || outcome.unexplained),
         top: causes
             .first()
-            .map_or(if outcome.unexplained { "unexplained" } else { "nothing" }, |c| *c)
+            .map_or(
+                if outcome.unexplained {
+                    "unexplained"
+                } else {
+                    "nothing"
+                },
+                |c| *c,
+            )
             .to_owned(),
-        stated: outcome.findings.iter().map(|f| (f.probability, must(&f.cause) || may(&f.cause))).collect(),
+        stated: outcome
+            .findings
+            .iter()
+            .map(|f| (f.probability, must(&f.cause) || may(&f.cause)))
+            .collect(),
         ..Verdict::default()
     };
     verdict.said = outcome
@@ -66,12 +91,21 @@ pub fn judge(case: &Case, outcome: &Outcome) -> Verdict {
         .join("; ");
     for truth in &case.truth {
         let name = truth.axis.map(|a| ["x", "y"][a]);
-        let mut same = outcome.findings.iter().filter(|f| truth.accept.contains(&f.cause));
-        let Some(first) = same.clone().next() else { continue };
+        let mut same = outcome
+            .findings
+            .iter()
+            .filter(|f| truth.accept.contains(&f.cause));
+        let Some(first) = same.clone().next() else {
+            continue;
+        };
         if name.is_some() {
-            verdict.axis.push(same.clone().any(|f| f.axis.as_deref() == name));
+            verdict
+                .axis
+                .push(same.clone().any(|f| f.axis.as_deref() == name));
         }
-        let at = same.find(|f| name.is_none() || f.axis.as_deref() == name).unwrap_or(first);
+        let at = same
+            .find(|f| name.is_none() || f.axis.as_deref() == name)
+            .unwrap_or(first);
         let inside = at.ci95[0] <= truth.value && truth.value <= at.ci95[1];
         verdict.covered.push((truth.effect.clone(), inside));
     }
@@ -91,27 +125,46 @@ pub fn judge(case: &Case, outcome: &Outcome) -> Verdict {
 /// a vibration, the places of teeth and where on the circle a polygon has its corners are new in each run: no model
 /// could foretell them, so they count as left (of a polygon all but its mean).
 pub fn perfect_rms_um(case: &Case) -> f64 {
-    let perfect = Instrument { noise_m: 0.0, resolution_m: 0.0, drift_m: 0.0, ..case.instrument };
     let perfect = Instrument {
-        spread: crate::machine::Spread { radius_m: 0.0, oval_m: 0.0, lobes_m: 0.0, ..perfect.spread },
+        noise_m: 0.0,
+        resolution_m: 0.0,
+        drift_m: 0.0,
+        ..case.instrument
+    };
+    let perfect = Instrument {
+        spread: crate::machine::Spread {
+            radius_m: 0.0,
+            oval_m: 0.0,
+            lobes_m: 0.0,
+            ..perfect.spread
+        },
         ..perfect
     };
     let mut machine = case.machine.clone();
     machine.vibration = None;
-    machine.axes.iter_mut().for_each(|axis| axis.stick_slip = None);
+    machine
+        .axes
+        .iter_mut()
+        .for_each(|axis| axis.stick_slip = None);
     let polygon = perfect.measure(&machine, &case.plan, case.measured_with);
     machine.interpolation_s = 0.0;
     let mut clean = perfect.measure(&machine, &case.plan, case.measured_with);
     for (run, polygon) in clean.runs.iter_mut().zip(&polygon.runs) {
-        let mean =
-            |run: &Run| run.samples.deviation_m.iter().sum::<f64>() / run.samples.deviation_m.len() as f64;
+        let mean = |run: &Run| {
+            run.samples.deviation_m.iter().sum::<f64>() / run.samples.deviation_m.len() as f64
+        };
         let shift = mean(polygon) - mean(run);
         run.samples.deviation_m.iter_mut().for_each(|x| *x += shift);
     }
     let (mut sum, mut count) = (0.0, 0.0);
     for (run, truth) in case.campaign.runs.iter().zip(&clean.runs) {
-        let left: Vec<f64> =
-            run.samples.deviation_m.iter().zip(&truth.samples.deviation_m).map(|(a, b)| a - b).collect();
+        let left: Vec<f64> = run
+            .samples
+            .deviation_m
+            .iter()
+            .zip(&truth.samples.deviation_m)
+            .map(|(a, b)| a - b)
+            .collect();
         let n = left.len() as f64;
         let (mut cos, mut sin) = (0.0, 0.0);
         for (x, angle) in left.iter().zip(&run.samples.angle_rad) {
@@ -146,12 +199,22 @@ mod tests {
     }
 
     fn case(names: &[&str]) -> Case {
-        Case::new(&Kind::Effects(names.iter().map(|s| (*s).to_owned()).collect()), 3.0, 5, Variety::Usual)
-            .unwrap()
+        Case::new(
+            &Kind::Effects(names.iter().map(|s| (*s).to_owned()).collect()),
+            3.0,
+            5,
+            Variety::Usual,
+        )
+        .unwrap()
     }
 
     fn answer(findings: Vec<Finding>, unexplained: bool) -> Outcome {
-        Outcome { findings, unexplained, baseline_um: 3.0, extended_um: 1.5 }
+        Outcome {
+            findings,
+            unexplained,
+            baseline_um: 3.0,
+            extended_um: 1.5,
+        }
     }
 
     #[test]
@@ -160,17 +223,42 @@ mod tests {
         let t = case.truth[0].clone();
         let axis = t.axis.map(|a| ["x", "y"][a]);
         let around = [0.9 * t.value, 1.1 * t.value];
-        let v = judge(&case, &answer(vec![finding("reversal_spike", axis, around)], false));
+        let v = judge(
+            &case,
+            &answer(vec![finding("reversal_spike", axis, around)], false),
+        );
         assert!(v.top_right && v.exact && v.covered[0].1);
-        let both =
-            vec![finding("reversal_spike", axis, around), finding("higher_order_dynamics", None, [0.0, 1.0])];
+        let both = vec![
+            finding("reversal_spike", axis, around),
+            finding("higher_order_dynamics", None, [0.0, 1.0]),
+        ];
         let v = judge(&case, &answer(both.clone(), false));
-        assert!(v.top_right && v.exact, "what is physically there may be named beside");
+        assert!(
+            v.top_right && v.exact,
+            "what is physically there may be named beside"
+        );
         let turned = both.into_iter().rev().collect();
-        assert!(!judge(&case, &answer(turned, false)).top_right, "but not first");
-        let v = judge(&case, &answer(vec![finding("backlash", Some("x"), [0.0, 1.0])], false));
-        assert!(!v.top_right && !v.exact && v.false_findings == ["backlash"] && v.stated == [(0.9, false)]);
-        let v = judge(&case, &answer(vec![finding("reversal_spike", axis, [0.0, 0.1 * t.value])], false));
+        assert!(
+            !judge(&case, &answer(turned, false)).top_right,
+            "but not first"
+        );
+        let v = judge(
+            &case,
+            &answer(vec![finding("backlash", Some("x"), [0.0, 1.0])], false),
+        );
+        assert!(
+            !v.top_right
+                && !v.exact
+                && v.false_findings == ["backlash"]
+                && v.stated == [(0.9, false)]
+        );
+        let v = judge(
+            &case,
+            &answer(
+                vec![finding("reversal_spike", axis, [0.0, 0.1 * t.value])],
+                false,
+            ),
+        );
         assert!(v.exact && !v.covered[0].1);
     }
 

@@ -10,7 +10,9 @@ pub struct Bench {
 
 impl Bench {
     pub fn new() -> Self {
-        Self { dir: tempfile::tempdir().unwrap() }
+        Self {
+            dir: tempfile::tempdir().unwrap(),
+        }
     }
 
     pub fn put(&self, name: &str, bytes: &[u8]) -> PathBuf {
@@ -35,8 +37,13 @@ impl Bench {
     }
 
     pub fn analyze(&self) -> Value {
-        let (code, out, err) =
-            outcome(&giotto().args(["analyze", "--json"]).arg(self.campaign()).output().unwrap());
+        let (code, out, err) = outcome(
+            &giotto()
+                .args(["analyze", "--json"])
+                .arg(self.campaign())
+                .output()
+                .unwrap(),
+        );
         assert_eq!(code, 0, "{err}");
         serde_json::from_str(&out).unwrap()
     }
@@ -44,5 +51,8 @@ impl Bench {
 
 pub fn near(value: &Value, expected: f64, tolerance: f64) {
     let found = value.as_f64().unwrap_or(f64::NAN);
-    assert!((found - expected).abs() <= tolerance, "{found} against {expected}");
+    assert!(
+        (found - expected).abs() <= tolerance,
+        "{found} against {expected}"
+    );
 }

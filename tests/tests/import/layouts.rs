@@ -44,7 +44,10 @@ impl Path3 {
             let beyond = (s - s.clamp(0, around)) as f64 * step;
             let a = self.sign * on;
             let (sin, cos) = a.sin_cos();
-            [radius * cos - self.sign * sin * beyond, radius * sin + self.sign * cos * beyond]
+            [
+                radius * cos - self.sign * sin * beyond,
+                radius * sin + self.sign * cos * beyond,
+            ]
         };
         let lift = |[u, v]: [f64; 2]| {
             let (sin, cos) = self.tilt.sin_cos();
@@ -57,7 +60,8 @@ impl Path3 {
             .map(|(k, s)| {
                 let s = s.clamp(-lead, around + lead - 1);
                 let noise = |m: u64| {
-                    ((k as u64 * 2_654_435_761 + m * 40_503).wrapping_mul(0x9E37_79B9) >> 20 & 0xFFF) as f64
+                    ((k as u64 * 2_654_435_761 + m * 40_503).wrapping_mul(0x9E37_79B9) >> 20
+                        & 0xFFF) as f64
                 };
                 let bump = |m| (noise(m) / 4095.0 - 0.5) * 0.0138;
                 let a = s as f64 * step / self.radius_mm;
@@ -70,7 +74,8 @@ impl Path3 {
 }
 
 pub fn leica(path: &Path3) -> Vec<u8> {
-    let mut text = "X  [mm],Y  [mm],Z  [mm],U(95)  [mm],Temperatur [°C],Time Stamp,Name\r\n".to_owned();
+    let mut text =
+        "X  [mm],Y  [mm],Z  [mm],U(95)  [mm],Temperatur [°C],Time Stamp,Name\r\n".to_owned();
     for (t, [x, y, z], _) in path.points() {
         let (minute, second) = (58 + (t / 60.0) as u32, t % 60.0);
         let (hour, minute) = (23 + minute / 60, minute % 60);
@@ -81,7 +86,9 @@ pub fn leica(path: &Path3) -> Vec<u8> {
         )
         .unwrap();
     }
-    text.chars().map(|c| u8::try_from(u32::from(c)).unwrap()).collect() // Latin-1
+    text.chars()
+        .map(|c| u8::try_from(u32::from(c)).unwrap())
+        .collect() // Latin-1
 }
 
 pub fn spatial_analyzer(path: &Path3) -> Vec<u8> {
@@ -98,11 +105,22 @@ pub fn spatial_analyzer(path: &Path3) -> Vec<u8> {
 }
 
 pub fn rtde(path: &Path3) -> Vec<u8> {
-    let names = |who: &str| (0..6).map(|k| format!("{who}_TCP_pose_{k}")).collect::<Vec<_>>().join(" ");
+    let names = |who: &str| {
+        (0..6)
+            .map(|k| format!("{who}_TCP_pose_{k}"))
+            .collect::<Vec<_>>()
+            .join(" ")
+    };
     let mut text = format!("timestamp {} {}\n", names("target"), names("actual"));
     for (t, is, want) in path.points() {
-        let pose =
-            |p: [f64; 3]| format!("{:.7} {:.7} {:.7} 0.01 -3.14 0.02", p[0] / 1e3, p[1] / 1e3, p[2] / 1e3);
+        let pose = |p: [f64; 3]| {
+            format!(
+                "{:.7} {:.7} {:.7} 0.01 -3.14 0.02",
+                p[0] / 1e3,
+                p[1] / 1e3,
+                p[2] / 1e3
+            )
+        };
         writeln!(text, "{:.3} {} {}", 81_234.5 + t, pose(want), pose(is)).unwrap();
     }
     text.into_bytes()
@@ -139,5 +157,10 @@ pub const LAYOUTS: &[(&str, Maker, &str, &[&str])] = &[
     ("rtde.csv", rtde, "UR RTDE recording", &[]),
     ("kflop.csv", kflop, "KFLOP log", &[]),
     ("german.csv", german, "CSV with decimal commas", &[]),
-    ("bare.txt", bare, "columns as given", &["--columns", "time_ms,-,x_m,y_m"]),
+    (
+        "bare.txt",
+        bare,
+        "columns as given",
+        &["--columns", "time_ms,-,x_m,y_m"],
+    ),
 ];

@@ -13,13 +13,21 @@ pub struct Idle {
 
 /// Counts from one value of SysTick, which counts down, to a later one within one period.
 fn since(earlier: u32, later: u32, period: u32) -> u32 {
-    if earlier >= later { earlier - later } else { earlier + period - later }
+    if earlier >= later {
+        earlier - later
+    } else {
+        earlier + period - later
+    }
 }
 
 impl Idle {
     /// Begins to count.
     pub fn new() -> Self {
-        Self { asleep: 0, passed: 0, last: SYST::get_current() }
+        Self {
+            asleep: 0,
+            passed: 0,
+            last: SYST::get_current(),
+        }
     }
 
     /// Sleeps until an interrupt is due. Interrupts are masked meanwhile, so that what they do does not count as sleep;

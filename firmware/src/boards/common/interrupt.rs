@@ -21,7 +21,10 @@ pub extern "C" fn unexpected() {
 }
 
 /// A table of `COUNT` vectors, of which the link's is number `link`.
-pub const fn table<const COUNT: usize>(link: u16, received: extern "C" fn()) -> [extern "C" fn(); COUNT] {
+pub const fn table<const COUNT: usize>(
+    link: u16,
+    received: extern "C" fn(),
+) -> [extern "C" fn(); COUNT] {
     let mut vectors = [unexpected as extern "C" fn(); COUNT];
     vectors[link as usize] = received;
     vectors
@@ -30,7 +33,10 @@ pub const fn table<const COUNT: usize>(link: u16, received: extern "C" fn()) -> 
 /// Lets the link's interrupt through, below the tick.
 pub fn enable<const N: u16>(nvic: &mut NVIC) {
     // SAFETY: its queue is in place, and no critical section is based on priorities.
-    #[allow(unsafe_code, reason = "cortex-m has no safe way to enable an interrupt")]
+    #[allow(
+        unsafe_code,
+        reason = "cortex-m has no safe way to enable an interrupt"
+    )]
     unsafe {
         nvic.set_priority(Number::<N>, LINK_PRIORITY);
         NVIC::unmask(Number::<N>);

@@ -62,7 +62,8 @@ unsafe impl defmt::Logger for Logger {
 /// Sends what waits.
 pub fn drain<W: Write>(port: &mut W) {
     loop {
-        let byte = critical_section::with(|token| BYTES.borrow(token).try_borrow_mut().ok()?.pop_front());
+        let byte =
+            critical_section::with(|token| BYTES.borrow(token).try_borrow_mut().ok()?.pop_front());
         let Some(byte) = byte else { return };
         // A log that cannot be sent is a log that is lost.
         let _ = port.write_all(&[byte]);

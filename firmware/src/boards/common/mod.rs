@@ -43,14 +43,20 @@ pub const TICK_HZ: u32 = if cfg!(feature = "fast") { 8000 } else { 1000 };
 pub const LINK_PRIORITY: u8 = 0x40;
 /// Bytes that arrive while the background is busy: what a host may have on its way, one place always stays free.
 pub const RECEIVED: usize = 1024;
-const _: () = assert!(RECEIVED > IN_FLIGHT + MAX_FRAME, "no room for what a host may have on its way");
+const _: () = assert!(
+    RECEIVED > IN_FLIGHT + MAX_FRAME,
+    "no room for what a host may have on its way"
+);
 
 /// Places in a queue; one always stays free.
 const SEGMENTS: usize = control::SEGMENTS + 1;
 const SET_POINTS: usize = control::SET_POINTS + 1;
 
-type BoardTick =
-    Tick<&'static Shared, Consumer<'static, Job, SEGMENTS>, Producer<'static, TimedSetPoint, SET_POINTS>>;
+type BoardTick = Tick<
+    &'static Shared,
+    Consumer<'static, Job, SEGMENTS>,
+    Producer<'static, TimedSetPoint, SET_POINTS>,
+>;
 type BoardDesk = Desk<
     &'static mut Planner,
     &'static Shared,

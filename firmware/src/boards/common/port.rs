@@ -35,7 +35,10 @@ pub struct Patience {
 impl Patience {
     /// So many looks at the port for each byte; once it was stuck, one, until it takes a byte again.
     pub const fn new(polls: u32) -> Self {
-        Self { polls, stuck: false }
+        Self {
+            polls,
+            stuck: false,
+        }
     }
 
     /// Waits until the port is ready.
@@ -64,7 +67,9 @@ pub fn received(take: impl Fn(&mut dyn FnMut(u8)) -> u32) {
         let mut receiver = RECEIVER.borrow(token).take();
         let mut lost = 0_u32;
         let overrun = take(&mut |byte| {
-            let kept = receiver.as_mut().is_some_and(|queue| queue.enqueue(byte).is_ok());
+            let kept = receiver
+                .as_mut()
+                .is_some_and(|queue| queue.enqueue(byte).is_ok());
             lost += u32::from(!kept);
         });
         LOST.store(LOST.load(Relaxed).wrapping_add(lost + overrun), Relaxed);
@@ -90,7 +95,11 @@ pub struct Port<T> {
 impl<T> Port<T> {
     /// Out only; `polls` as for [`Patience::new`].
     pub fn out(transmitter: T, polls: u32) -> Self {
-        Self { transmitter, received: None, patience: Patience::new(polls) }
+        Self {
+            transmitter,
+            received: None,
+            patience: Patience::new(polls),
+        }
     }
 
     /// The link, both ways; `None` if called twice. To be opened before its interrupt is let through.
@@ -98,7 +107,10 @@ impl<T> Port<T> {
         let queue = singleton!(: Queue<u8, RECEIVED> = Queue::new())?;
         let (producer, consumer) = queue.split();
         critical_section::with(|token| RECEIVER.borrow(token).set(Some(producer)));
-        Some(Self { received: Some(consumer), ..Self::out(transmitter, polls) })
+        Some(Self {
+            received: Some(consumer),
+            ..Self::out(transmitter, polls)
+        })
     }
 }
 

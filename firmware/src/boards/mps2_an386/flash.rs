@@ -1,7 +1,9 @@
 //! The flash stand-in: a window of code memory that programs bits to 0 and erases units to 1, as NOR flash does.
 use super::common::flash::FlashError;
 use core::ptr;
-use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash, check_erase, check_read, check_write};
+use embedded_storage::nor_flash::{
+    ErrorType, NorFlash, ReadNorFlash, check_erase, check_read, check_write,
+};
 use giotto_firmware::store::Layout;
 
 /// First byte of the window, behind the image in SSRAM1.

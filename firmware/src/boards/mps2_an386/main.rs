@@ -38,13 +38,19 @@ mod image {
 
     /// Clock of core and peripherals (DAI0386 2.5).
     const CLOCK_HZ: u32 = 25_000_000;
-    const BOARD: Board = Board { name: "mps2-an386", build: env!("GIOTTO_BUILD"), tick_hz: common::TICK_HZ };
+    const BOARD: Board = Board {
+        name: "mps2-an386",
+        build: env!("GIOTTO_BUILD"),
+        tick_hz: common::TICK_HZ,
+    };
 
     /// Sends back what comes, byte for byte: what the line itself carries (feature `echo`, for `giotto-hil link`).
     fn echo(mut link: impl Read + Write) -> ! {
         let mut bytes = [0; 64];
         loop {
-            let sent = link.read(&mut bytes).map(|count| link.write_all(bytes.get(..count).unwrap_or(&[])));
+            let sent = link
+                .read(&mut bytes)
+                .map(|count| link.write_all(bytes.get(..count).unwrap_or(&[])));
             if !matches!(sent, Ok(Ok(()))) {
                 cortex_m::asm::udf();
             }
@@ -59,7 +65,9 @@ mod image {
             let desk = common::start(&mut core.SYST, &mut core.SCB, CLOCK_HZ)?;
             Some((link, desk, common::buffers()?))
         });
-        let Some((link, desk, buffers)) = started else { cortex_m::asm::udf() };
+        let Some((link, desk, buffers)) = started else {
+            cortex_m::asm::udf()
+        };
         if cfg!(feature = "echo") {
             echo(link)
         }
@@ -71,6 +79,12 @@ mod image {
             feed: watchdog::feed,
             lost: common::port::lost,
         };
-        common::background(BOARD, flash::Window::new(), flash::LAYOUT, (desk, buffers), ports)
+        common::background(
+            BOARD,
+            flash::Window::new(),
+            flash::LAYOUT,
+            (desk, buffers),
+            ports,
+        )
     }
 }

@@ -60,11 +60,25 @@ pub fn start() -> Clock {
     APB1ENR.change(0, 1 << 18); // USART3
     APB2ENR.change(0, 1 << 5); // USART6
     if crystal {
-        Clock { core_hz: CORE_HZ, apb1_hz: CORE_HZ / 4, apb2_hz: CORE_HZ / 2, fell_back: false }
+        Clock {
+            core_hz: CORE_HZ,
+            apb1_hz: CORE_HZ / 4,
+            apb2_hz: CORE_HZ / 2,
+            fell_back: false,
+        }
     } else {
         // The emulator's SysTick counts 168 MHz all the same.
-        let core_hz = if cfg!(feature = "awake") { CORE_HZ } else { HSI_HZ };
-        Clock { core_hz, apb1_hz: HSI_HZ, apb2_hz: HSI_HZ, fell_back: true }
+        let core_hz = if cfg!(feature = "awake") {
+            CORE_HZ
+        } else {
+            HSI_HZ
+        };
+        Clock {
+            core_hz,
+            apb1_hz: HSI_HZ,
+            apb2_hz: HSI_HZ,
+            fell_back: true,
+        }
     }
 }
 

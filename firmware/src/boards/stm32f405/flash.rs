@@ -7,7 +7,9 @@ use super::common::flash::FlashError;
 use super::register::Register;
 use core::ptr;
 use cortex_m::peripheral::SCB;
-use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash, check_erase, check_read, check_write};
+use embedded_storage::nor_flash::{
+    ErrorType, NorFlash, ReadNorFlash, check_erase, check_read, check_write,
+};
 use giotto_firmware::store::Layout;
 
 const FLASH: usize = 0x4002_3c00;
@@ -57,7 +59,11 @@ impl Sectors {
         // SAFETY: as in `word`; a write to flash only starts its controller.
         unsafe { ptr::write_volatile((BASE + at) as *mut u32, word) };
         done()?;
-        if self.word(at) == word { Ok(()) } else { Err(FlashError::ReadBack) }
+        if self.word(at) == word {
+            Ok(())
+        } else {
+            Err(FlashError::ReadBack)
+        }
     }
 
     /// Runs `act` with the controller unlocked and set to `control`, and locks it again.
@@ -84,7 +90,11 @@ impl Sectors {
 /// Waits for the controller.
 fn done() -> Result<(), FlashError> {
     let waited = (0..PATIENCE).any(|_| STATUS.get() & BUSY == 0);
-    if waited && STATUS.get() & ERRORS == 0 { Ok(()) } else { Err(FlashError::Controller) }
+    if waited && STATUS.get() & ERRORS == 0 {
+        Ok(())
+    } else {
+        Err(FlashError::Controller)
+    }
 }
 
 impl ErrorType for Sectors {
@@ -120,9 +130,14 @@ impl NorFlash for Sectors {
                 CONTROL.set(control | BY_WORDS | START);
                 done()?;
                 let first = (sector * SECTOR) as usize;
-                let blank =
-                    (first..first + SECTOR as usize).step_by(WORD).all(|at| flash.word(at) == u32::MAX);
-                if blank { Ok(()) } else { Err(FlashError::ReadBack) }
+                let blank = (first..first + SECTOR as usize)
+                    .step_by(WORD)
+                    .all(|at| flash.word(at) == u32::MAX);
+                if blank {
+                    Ok(())
+                } else {
+                    Err(FlashError::ReadBack)
+                }
             })?;
         }
         Ok(())
@@ -131,7 +146,9 @@ impl NorFlash for Sectors {
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
         check_write(self, offset, bytes.len()).map_err(FlashError::Range)?;
         self.unlocked(PROGRAM, |flash| {
-            let words = bytes.chunks_exact(WORD).filter_map(|word| word.first_chunk().copied());
+            let words = bytes
+                .chunks_exact(WORD)
+                .filter_map(|word| word.first_chunk().copied());
             (offset as usize..)
                 .step_by(WORD)
                 .zip(words)

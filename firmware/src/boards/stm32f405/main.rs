@@ -43,7 +43,11 @@ mod image {
     use cortex_m_rt::entry;
     use giotto_firmware::server::Board;
 
-    const BOARD: Board = Board { name: "stm32f405", build: env!("GIOTTO_BUILD"), tick_hz: common::TICK_HZ };
+    const BOARD: Board = Board {
+        name: "stm32f405",
+        build: env!("GIOTTO_BUILD"),
+        tick_hz: common::TICK_HZ,
+    };
 
     #[entry]
     fn main() -> ! {
@@ -55,7 +59,9 @@ mod image {
             let desk = common::start(&mut core.SYST, &mut core.SCB, clock.core_hz)?;
             Some((link, desk, common::buffers()?))
         });
-        let Some((link, desk, buffers)) = started else { cortex_m::asm::udf() };
+        let Some((link, desk, buffers)) = started else {
+            cortex_m::asm::udf()
+        };
         if clock.fell_back {
             defmt::warn!("clock: no crystal, running on the internal oscillator");
         }
@@ -67,6 +73,12 @@ mod image {
             feed: watchdog::feed,
             lost: common::port::lost,
         };
-        common::background(BOARD, flash::Sectors::new(), flash::LAYOUT, (desk, buffers), ports)
+        common::background(
+            BOARD,
+            flash::Sectors::new(),
+            flash::LAYOUT,
+            (desk, buffers),
+            ports,
+        )
     }
 }

@@ -50,7 +50,10 @@ impl Usart {
     pub fn link(clock: &Clock) -> Option<Port<Self>> {
         connect(GPIOB, 10, 7);
         connect(GPIOB, 11, 7);
-        Port::link(Self::open(USART3, clock.apb1_hz, TX | RX | RX_INTERRUPT), PATIENCE)
+        Port::link(
+            Self::open(USART3, clock.apb1_hz, TX | RX | RX_INTERRUPT),
+            PATIENCE,
+        )
     }
 
     /// USART6, out only.

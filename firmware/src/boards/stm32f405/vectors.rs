@@ -7,7 +7,10 @@ const COUNT: usize = 82;
 pub const LINK: u16 = 39;
 
 /// The vectors behind those of the core.
-#[allow(unsafe_code, reason = "the linker script of cortex-m-rt looks for this name and section")]
+#[allow(
+    unsafe_code,
+    reason = "the linker script of cortex-m-rt looks for this name and section"
+)]
 #[unsafe(link_section = ".vector_table.interrupts")]
 #[unsafe(no_mangle)]
 pub static __INTERRUPTS: [extern "C" fn(); COUNT] = interrupt::table(LINK, usart::received);

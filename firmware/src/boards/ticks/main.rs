@@ -42,7 +42,10 @@ mod image {
     }
 
     /// No interrupt is enabled.
-    #[allow(unsafe_code, reason = "the linker script of cortex-m-rt looks for this name and section")]
+    #[allow(
+        unsafe_code,
+        reason = "the linker script of cortex-m-rt looks for this name and section"
+    )]
     #[unsafe(link_section = ".vector_table.interrupts")]
     #[unsafe(no_mangle)]
     pub static __INTERRUPTS: [extern "C" fn(); 1] = [unexpected];
@@ -180,7 +183,10 @@ mod image {
 
         fn turned(&self, re: f32, im: f32) -> [[f32; 2]; 2] {
             let rotation = nalgebra::Rotation2::new(self.theta);
-            [(rotation * nalgebra::Vector2::x()).into(), (rotation * nalgebra::Vector2::new(re, im)).into()]
+            [
+                (rotation * nalgebra::Vector2::x()).into(),
+                (rotation * nalgebra::Vector2::new(re, im)).into(),
+            ]
         }
     }
 
@@ -224,7 +230,11 @@ mod image {
             core.SYST.clear_current();
             core.SYST.enable_counter();
         }
-        let _ = writeln!(Uart, "{}", if measure().is_some() { "end" } else { "failed" });
+        let _ = writeln!(
+            Uart,
+            "{}",
+            if measure().is_some() { "end" } else { "failed" }
+        );
         loop {
             cortex_m::asm::wfi();
         }

@@ -13,8 +13,11 @@ use heapless_spsc::spsc::{Consumer, Producer, Queue};
 use std::boxed::Box;
 use std::vec::Vec;
 
-type BenchTick =
-    Tick<&'static Shared, Consumer<'static, Job, 4>, Producer<'static, TimedSetPoint, { SET_POINTS + 1 }>>;
+type BenchTick = Tick<
+    &'static Shared,
+    Consumer<'static, Job, 4>,
+    Producer<'static, TimedSetPoint, { SET_POINTS + 1 }>,
+>;
 type BenchDesk = Desk<
     Box<Planner>,
     &'static Shared,
@@ -36,7 +39,8 @@ fn bench() -> Bench {
     // Leaked: the ends of a board's queues live for ever, too.
     let shared: &'static Shared = Box::leak(Box::new(Shared::new()));
     let segments: &'static mut Queue<Job, 4> = Box::leak(Box::new(Queue::new()));
-    let points: &'static mut Queue<TimedSetPoint, { SET_POINTS + 1 }> = Box::leak(Box::new(Queue::new()));
+    let points: &'static mut Queue<TimedSetPoint, { SET_POINTS + 1 }> =
+        Box::leak(Box::new(Queue::new()));
     let (segments_in, segments_out) = segments.split();
     let (points_in, points_out) = points.split();
     let executor = Executor::new([0; 3], config.engage_ticks(), true);
@@ -108,10 +112,16 @@ fn stops_within_limits(bench: &mut Bench) {
     // A position is rounded to 1 nm: 1e-6 m/s a tick.
     let limit = bench.config.motion.acceleration_m_s2 / rate + 4e-6;
     for pair in falling.windows(2) {
-        assert!(pair[1] <= pair[0] + 4e-6 && pair[0] - pair[1] <= limit, "{pair:?}");
+        assert!(
+            pair[1] <= pair[0] + 4e-6 && pair[0] - pair[1] <= limit,
+            "{pair:?}"
+        );
     }
     let ticks_to_half = falling.iter().position(|speed| *speed < top / 2.0).unwrap();
-    assert!(ticks_to_half < bench.config.rate_hz as usize / 2, "{ticks_to_half}");
+    assert!(
+        ticks_to_half < bench.config.rate_hz as usize / 2,
+        "{ticks_to_half}"
+    );
     assert!(falling.last().unwrap() < &1e-5);
 }
 
@@ -124,7 +134,10 @@ fn the_stop_command_acts_in_the_next_tick() {
     bench.desk.stop();
     stops_within_limits(&mut bench);
     let now = bench.now();
-    assert_eq!((now.state, now.stops, now.stop_input), (MotionState::Idle, 1, false));
+    assert_eq!(
+        (now.state, now.stops, now.stop_input),
+        (MotionState::Idle, 1, false)
+    );
     bench.circle(0.1).unwrap();
 }
 
@@ -229,11 +242,20 @@ fn append(bench: &mut Bench, at: &mut [i32; 3], segment: Segment) {
 }
 
 fn line(to_m: [f64; 3]) -> Segment {
-    Segment::Line { to_m, feed_m_s: 0.2 }
+    Segment::Line {
+        to_m,
+        feed_m_s: 0.2,
+    }
 }
 
 fn quarter(centre_m: [f64; 3]) -> Segment {
-    Segment::Arc { centre_m, normal: [0.0, 0.0, 1.0], sweep_rad: PI / 2.0, rise_m: 0.01, feed_m_s: 0.2 }
+    Segment::Arc {
+        centre_m,
+        normal: [0.0, 0.0, 1.0],
+        sweep_rad: PI / 2.0,
+        rise_m: 0.01,
+        feed_m_s: 0.2,
+    }
 }
 
 type Stop = fn(&mut Bench);

@@ -21,7 +21,11 @@ struct Source {
 
 impl Source {
     fn new(place_nm: [i32; 3]) -> Self {
-        Self { steps: Steps::from(place_nm), sent: 0, ended: false }
+        Self {
+            steps: Steps::from(place_nm),
+            sent: 0,
+            ended: false,
+        }
     }
 
     fn feed(&mut self, bench: &mut Bench, up_to: usize) {
@@ -56,12 +60,18 @@ fn a_stream_is_followed_to_its_end_and_a_program_goes_on_from_there() {
     bench.desk.begin_stream(1.0, 60).unwrap();
     assert_eq!(bench.desk.begin(), Err(MotionRefusal::Busy));
     let nothing = line([0.1; 3]).exact([0; 3]).unwrap();
-    assert_eq!(bench.desk.append(&nothing, 0), Err(MotionRefusal::NoProgram));
+    assert_eq!(
+        bench.desk.append(&nothing, 0),
+        Err(MotionRefusal::NoProgram)
+    );
     let mut source = Source::new([0; 3]);
     // Not yet so many as were asked for: nothing moves.
     source.feed(&mut bench, 50);
     bench.ticks(100);
-    assert_eq!((bench.now().state, bench.now().missing_set_points), (MotionState::Running, 0));
+    assert_eq!(
+        (bench.now().state, bench.now().missing_set_points),
+        (MotionState::Running, 0)
+    );
     let mut begun = None;
     while bench.now().state == MotionState::Running {
         source.feed(&mut bench, STREAMED);
@@ -71,10 +81,24 @@ fn a_stream_is_followed_to_its_end_and_a_program_goes_on_from_there() {
     }
     bench.until_at_rest();
     let now = bench.now();
-    assert_eq!((now.state, now.raw_nm), (MotionState::Idle, streamed(STREAMED)));
-    assert_eq!((now.missing_set_points, now.late_set_points, now.rejected_set_points), (0, 0, 0));
+    assert_eq!(
+        (now.state, now.raw_nm),
+        (MotionState::Idle, streamed(STREAMED))
+    );
+    assert_eq!(
+        (
+            now.missing_set_points,
+            now.late_set_points,
+            now.rejected_set_points
+        ),
+        (0, 0, 0)
+    );
     // The set-points themselves, one a tick.
-    let first = bench.path.iter().position(|place| *place != [0; 3]).unwrap();
+    let first = bench
+        .path
+        .iter()
+        .position(|place| *place != [0; 3])
+        .unwrap();
     let offset = (0..STREAMED).position(|n| streamed(n) != [0; 3]).unwrap();
     for n in 0..STREAMED - offset {
         assert_eq!(bench.path[first + n], streamed(offset + n));
@@ -84,13 +108,21 @@ fn a_stream_is_followed_to_its_end_and_a_program_goes_on_from_there() {
     append(&mut bench, &mut at, line([0.01, 0.0, 0.0]));
     bench.desk.end().unwrap();
     bench.until_at_rest();
-    assert_eq!((bench.now().state, bench.now().raw_nm), (MotionState::Idle, [10_000_000, 0, 0]));
+    assert_eq!(
+        (bench.now().state, bench.now().raw_nm),
+        (MotionState::Idle, [10_000_000, 0, 0])
+    );
 }
 
 /// Largest change of speed between ticks, m/s².
 fn roughest(bench: &Bench) -> f64 {
     let velocity = |i: usize, n: usize| f64::from(bench.path[n + 1][i] - bench.path[n][i]) * 1e-6;
-    let change = |n: usize| (0..3).map(|i| (velocity(i, n + 1) - velocity(i, n)).powi(2)).sum::<f64>().sqrt();
+    let change = |n: usize| {
+        (0..3)
+            .map(|i| (velocity(i, n + 1) - velocity(i, n)).powi(2))
+            .sum::<f64>()
+            .sqrt()
+    };
     (0..bench.path.len() - 2).map(change).fold(0.0, f64::max) * 1e3
 }
 
@@ -108,8 +140,14 @@ fn a_stream_that_dries_up_comes_to_rest_and_faults() {
     assert_eq!(bench.now().state, MotionState::Stopping);
     bench.until_at_rest();
     let now = bench.now();
-    assert_eq!((now.state, now.fault), (MotionState::Fault, Some(FaultCause::Starved)));
-    assert_eq!((now.missing_set_points, now.late_set_points, now.raw_nm), (6, 0, now.corrected_nm));
+    assert_eq!(
+        (now.state, now.fault),
+        (MotionState::Fault, Some(FaultCause::Starved))
+    );
+    assert_eq!(
+        (now.missing_set_points, now.late_set_points, now.raw_nm),
+        (6, 0, now.corrected_nm)
+    );
     assert!(roughest(&bench) < 6.0, "{}", roughest(&bench));
     assert_eq!(bench.desk.begin(), Err(MotionRefusal::Fault));
 }
@@ -142,7 +180,10 @@ fn a_fault_ends_a_stream_and_what_comes_behind_it_is_refused() {
         bench.ticks(1);
         assert_eq!(bench.desk.points(&[]), Err(MotionRefusal::NoProgram));
         let later = bench.now();
-        assert_eq!((later.state, later.dropped_segments), (MotionState::Fault, now.dropped_segments));
+        assert_eq!(
+            (later.state, later.dropped_segments),
+            (MotionState::Fault, now.dropped_segments)
+        );
     }
 }
 
@@ -165,9 +206,19 @@ fn set_points_that_come_late_are_left_out_and_the_stream_keeps_its_time() {
     }
     bench.until_at_rest();
     let now = bench.now();
-    assert_eq!((now.state, now.raw_nm), (MotionState::Idle, streamed(STREAMED)));
+    assert_eq!(
+        (now.state, now.raw_nm),
+        (MotionState::Idle, streamed(STREAMED))
+    );
     // They came in batches, and one that holds any that is still to come is used from there on.
-    assert_eq!((now.missing_set_points, now.late_set_points, now.rejected_set_points), (4, 0, 0));
+    assert_eq!(
+        (
+            now.missing_set_points,
+            now.late_set_points,
+            now.rejected_set_points
+        ),
+        (4, 0, 0)
+    );
     assert!(roughest(&bench) < 6.0, "{}", roughest(&bench));
 }
 
@@ -189,7 +240,11 @@ fn whatever_stops_a_stream_slows_it_down_within_limits() {
         }
         stop(&mut bench);
         bench.ticks(1);
-        assert_eq!(bench.desk.points(&[]), Err(MotionRefusal::NoProgram), "{name}");
+        assert_eq!(
+            bench.desk.points(&[]),
+            Err(MotionRefusal::NoProgram),
+            "{name}"
+        );
         bench.until_at_rest();
         let now = bench.now();
         // A dead link sends nothing: what has come is followed, and then there is no more.
@@ -204,14 +259,21 @@ fn whatever_stops_a_stream_slows_it_down_within_limits() {
         // What was still in the queue moves nothing.
         let stood = now.raw_nm;
         bench.ticks(200);
-        assert_eq!((bench.now().raw_nm, bench.now().queued), (stood, 0), "{name}");
+        assert_eq!(
+            (bench.now().raw_nm, bench.now().queued),
+            (stood, 0),
+            "{name}"
+        );
         if fault.is_none() {
             bench.shared.set_stop_input(false);
             bench.ticks(1);
             bench.desk.begin_stream(1.0, 1).unwrap();
             bench.desk.end().unwrap();
             bench.until_at_rest();
-            assert_eq!((bench.now().state, bench.now().raw_nm), (MotionState::Idle, stood));
+            assert_eq!(
+                (bench.now().state, bench.now().raw_nm),
+                (MotionState::Idle, stood)
+            );
         }
     }
 }
@@ -221,8 +283,18 @@ fn bytes_that_are_no_set_points_are_refused_and_the_stream_goes_on() {
     let mut bench = bench();
     bench.desk.begin_stream(1.0, 1000).unwrap();
     let far = [0xfe, 0xff, 0xff, 0xff, 0x0f, 0, 0];
-    for bytes in [&[1][..], &[1, 2, 0x80], &[0; 3 * BATCH + 3], &[0xff; 6], &far] {
-        assert_eq!(bench.desk.points(bytes), Err(MotionRefusal::Path(Quantity::Position)), "{bytes:02x?}");
+    for bytes in [
+        &[1][..],
+        &[1, 2, 0x80],
+        &[0; 3 * BATCH + 3],
+        &[0xff; 6],
+        &far,
+    ] {
+        assert_eq!(
+            bench.desk.points(bytes),
+            Err(MotionRefusal::Path(Quantity::Position)),
+            "{bytes:02x?}"
+        );
     }
     let mut source = Source::new([0; 3]);
     while bench.now().state == MotionState::Running {
@@ -230,5 +302,8 @@ fn bytes_that_are_no_set_points_are_refused_and_the_stream_goes_on() {
         bench.ticks(5);
     }
     bench.until_at_rest();
-    assert_eq!((bench.now().state, bench.now().raw_nm), (MotionState::Idle, streamed(STREAMED)));
+    assert_eq!(
+        (bench.now().state, bench.now().raw_nm),
+        (MotionState::Idle, streamed(STREAMED))
+    );
 }

@@ -32,21 +32,37 @@ impl Executor {
 
     #[inline(always)]
     pub(super) fn arc_ramp<const TERMS: bool, const FALLING: bool>(&mut self) -> Output {
-        let (x, end) = if FALLING { self.clock.fall() } else { self.clock.rise() };
+        let (x, end) = if FALLING {
+            self.clock.fall()
+        } else {
+            self.clock.rise()
+        };
         if end {
-            return if FALLING { self.arc_standstill() } else { self.top() };
+            return if FALLING {
+                self.arc_standstill()
+            } else {
+                self.top()
+            };
         }
         let shape = shapes(&self.ramp, x);
         let step = scaled(self.segment.timing.step_q1, shape.s_q31);
         self.phase = self.phase.wrapping_add(step);
         // The phase is put away before the law is begun: both at once do not fit into the registers.
         compiler_fence(Ordering::AcqRel);
-        let law = if FALLING { &self.fall } else { &self.segment.rise };
+        let law = if FALLING {
+            &self.fall
+        } else {
+            &self.segment.rise
+        };
         let phase_q32 = ramp_phase(self.phase, step, law.end_term(&shape));
         let (radial, tangential) = law.gain(&shape);
         let (c, s) = sincos_with(self.sincos, phase_q32);
         if TERMS {
-            let turning = if FALLING { shape.w4_q31.wrapping_neg() } else { shape.w4_q31 };
+            let turning = if FALLING {
+                shape.w4_q31.wrapping_neg()
+            } else {
+                shape.w4_q31
+            };
             let moving = &self.segment.extra.moving;
             let radial = radial.wrapping_add(moving.outward);
             let (re, im) = turn(radial, tangential, c, s);
@@ -61,13 +77,21 @@ impl Executor {
             let [[xc, xs], [yc, ys]] = segment.extra.moving.place;
             let [re, im, along, outward] = self.shares;
             let wanted = mulh_add(mulh_add(x.turned(re, im), xc, c), xs, s);
-            let (wanted, arm) = (mulh_add(wanted, along, x.turned(s.wrapping_neg(), c)), x.turned(c, s));
-            (self.at_nm[0], self.wanted_nm[0]) = (x.base.wrapping_add(arm), mulh_add(wanted, outward, arm));
+            let (wanted, arm) = (
+                mulh_add(wanted, along, x.turned(s.wrapping_neg(), c)),
+                x.turned(c, s),
+            );
+            (self.at_nm[0], self.wanted_nm[0]) =
+                (x.base.wrapping_add(arm), mulh_add(wanted, outward, arm));
             compiler_fence(Ordering::AcqRel);
             let [re, im, along, outward] = self.shares;
             let wanted = mulh_add(mulh_add(y.turned(re, im), yc, c), ys, s);
-            let (wanted, arm) = (mulh_sub(wanted, along, y.turned(s.wrapping_neg(), c)), y.turned(c, s));
-            (self.at_nm[1], self.wanted_nm[1]) = (y.base.wrapping_add(arm), mulh_sub(wanted, outward, arm));
+            let (wanted, arm) = (
+                mulh_sub(wanted, along, y.turned(s.wrapping_neg(), c)),
+                y.turned(c, s),
+            );
+            (self.at_nm[1], self.wanted_nm[1]) =
+                (y.base.wrapping_add(arm), mulh_sub(wanted, outward, arm));
             compiler_fence(Ordering::AcqRel);
             let [re, im, ..] = self.shares;
             (self.at_nm[2], self.wanted_nm[2]) = (z.on_arc(c, s), z.turned(re, im));
@@ -88,7 +112,11 @@ impl Executor {
         if !self.guard.small([wx, wy, wz]) {
             return self.arc_out_with_care(c, s, wx, wy, wz, flags);
         }
-        Output::new([x.on_arc(c, s), y.on_arc(c, s), z.on_arc(c, s)], [wx, wy, wz], flags)
+        Output::new(
+            [x.on_arc(c, s), y.on_arc(c, s), z.on_arc(c, s)],
+            [wx, wy, wz],
+            flags,
+        )
     }
 
     /// Adds to what was put away the profile terms that are not linear.
@@ -98,7 +126,10 @@ impl Executor {
         let [nx, ny, nz] = self.at_nm;
         let [wx, wy, wz] = self.wanted_nm;
         let (wx, wy) = (wx.wrapping_add(sx), wy.wrapping_add(sy));
-        let [wx, wy] = self.segment.extra.by_place(&self.sincos, [nx, ny], || self.arm_here(), [wx, wy]);
+        let [wx, wy] =
+            self.segment
+                .extra
+                .by_place(&self.sincos, [nx, ny], || self.arm_here(), [wx, wy]);
         if !self.guard.small([wx, wy, wz]) {
             return self.term_out_with_care(wx, wy, wz, flags);
         }
@@ -118,9 +149,21 @@ impl Executor {
     }
 
     #[inline(never)]
-    fn arc_out_with_care(&mut self, c: i32, s: i32, wx: i32, wy: i32, wz: i32, flags: u16) -> Output {
+    fn arc_out_with_care(
+        &mut self,
+        c: i32,
+        s: i32,
+        wx: i32,
+        wy: i32,
+        wz: i32,
+        flags: u16,
+    ) -> Output {
         let axes = &self.segment.axes;
-        let nominal = [axes[0].on_arc(c, s), axes[1].on_arc(c, s), axes[2].on_arc(c, s)];
+        let nominal = [
+            axes[0].on_arc(c, s),
+            axes[1].on_arc(c, s),
+            axes[2].on_arc(c, s),
+        ];
         self.finish(nominal, [wx, wy, wz], flags)
     }
 

@@ -92,7 +92,11 @@ impl Executor {
             if self.segment.extended {
                 let extra = &self.segment.extra;
                 // A line moves from its first tick on as it does at its end.
-                let ahead = if self.segment.kind == Kind::Line { (i32::MAX, 0) } else { (c, s) };
+                let ahead = if self.segment.kind == Kind::Line {
+                    (i32::MAX, 0)
+                } else {
+                    (c, s)
+                };
                 self.sides.begin(extra, extra.ahead_at(ahead.0, ahead.1));
             }
             self.target_nm = self.standing_offset(c, s);
@@ -112,7 +116,9 @@ impl Executor {
         }
         let mut offset = self.rest_offset_nm;
         for (o, t) in offset.iter_mut().zip(target) {
-            let way = i64::from(t).wrapping_sub(i64::from(*o)).wrapping_mul(i64::from(share));
+            let way = i64::from(t)
+                .wrapping_sub(i64::from(*o))
+                .wrapping_mul(i64::from(share));
             *o = o.wrapping_add((way >> 31) as i32);
         }
         self.finish(self.rest_nm, offset, flag::SETTLING)

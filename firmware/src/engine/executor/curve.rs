@@ -57,9 +57,17 @@ impl Executor {
 
     #[inline(never)]
     pub(super) fn any_ramp(&mut self, falling: bool) -> Output {
-        let (x, end) = if falling { self.clock.fall() } else { self.clock.rise() };
+        let (x, end) = if falling {
+            self.clock.fall()
+        } else {
+            self.clock.rise()
+        };
         if end {
-            return if falling { self.standstill() } else { self.top() };
+            return if falling {
+                self.standstill()
+            } else {
+                self.top()
+            };
         }
         self.ramp_at(&shapes(&self.ramp, x), falling)
     }
@@ -75,7 +83,10 @@ impl Executor {
             let shape = shapes(&self.ramp, self.clock.here());
             return self.ramp_at(&shape, true);
         }
-        self.ramp_at(&shapes(&self.ramp, x).minus(shapes(&self.ramp, later)), false)
+        self.ramp_at(
+            &shapes(&self.ramp, x).minus(shapes(&self.ramp, later)),
+            false,
+        )
     }
 
     /// One tick of a ramp on any curve.
@@ -83,7 +94,11 @@ impl Executor {
     fn ramp_at(&mut self, shape: &Shapes, falling: bool) -> Output {
         let step = scaled(self.segment.timing.step_q1, shape.s_q31);
         self.advance(step);
-        let law = if falling { &self.fall } else { &self.segment.rise };
+        let law = if falling {
+            &self.fall
+        } else {
+            &self.segment.rise
+        };
         let phase_q32 = ramp_phase(self.phase, step, law.end_term(shape));
         let (c, s) = self.weights(phase_q32);
         let nominal = self.place(c, s, phase_q32);
@@ -97,7 +112,11 @@ impl Executor {
             [x.turned(re, im), y.turned(re, im), z.turned(re, im)]
         };
         if self.segment.extended {
-            let turning = if falling { shape.w4_q31.wrapping_neg() } else { shape.w4_q31 };
+            let turning = if falling {
+                shape.w4_q31.wrapping_neg()
+            } else {
+                shape.w4_q31
+            };
             wanted = self.with_linear(c, s, shape.s_q31, turning, wanted);
             wanted = self.with_terms(c, s, nominal, wanted);
         }
@@ -114,8 +133,15 @@ impl Executor {
             return [wx.wrapping_add(ex), wy.wrapping_add(ey), wz];
         }
         let rate2 = mulh(rate, rate).wrapping_mul(2);
-        let (ex, ey) = (x.on_arc(rate, rate2, turning, c, s), y.on_arc(rate, rate2, turning, c, s));
-        [wx.wrapping_add(ex), wy.wrapping_add(ey), wz.wrapping_add(z.at_rest(c, s))]
+        let (ex, ey) = (
+            x.on_arc(rate, rate2, turning, c, s),
+            y.on_arc(rate, rate2, turning, c, s),
+        );
+        [
+            wx.wrapping_add(ex),
+            wy.wrapping_add(ey),
+            wz.wrapping_add(z.at_rest(c, s)),
+        ]
     }
 
     /// Weights of a curve's two vectors, Q31: cosine and sine, or the share of a line.
@@ -139,7 +165,9 @@ impl Executor {
                 [x.on_line(share), y.on_line(share), z.on_line(share)]
             }
             Kind::Arc => [x.on_arc(c, s), y.on_arc(c, s), z.on_arc(c, s)],
-            Kind::Helix => self.on_helix([x.on_arc(c, s), y.on_arc(c, s), z.on_arc(c, s)], phase_q32),
+            Kind::Helix => {
+                self.on_helix([x.on_arc(c, s), y.on_arc(c, s), z.on_arc(c, s)], phase_q32)
+            }
         }
     }
 
@@ -151,9 +179,14 @@ impl Executor {
         let ahead = sum_q32.wrapping_sub(phase_q32) as i32;
         let early = ahead > 0 && sum_q32 < phase_q32;
         let late = ahead < 0 && sum_q32 > phase_q32;
-        let turns = self.turns.wrapping_add(i32::from(late)).wrapping_sub(i32::from(early));
+        let turns = self
+            .turns
+            .wrapping_add(i32::from(late))
+            .wrapping_sub(i32::from(early));
         let [x, y, z] = self.segment.risen(turns, phase_q32);
-        let [bx, by, bz] = self.segment.risen(0, (self.segment.timing.start >> 32) as u32);
+        let [bx, by, bz] = self
+            .segment
+            .risen(0, (self.segment.timing.start >> 32) as u32);
         let [fx, fy, fz] = flat;
         let add = |f: i32, r: i32, b: i32| f.wrapping_add(r).wrapping_sub(b);
         [add(fx, x, bx), add(fy, y, by), add(fz, z, bz)]
@@ -166,7 +199,10 @@ impl Executor {
         }
         let [nx, ny, _] = self.rest_nm;
         let offset = self.sides.standing();
-        let [wx, wy] = self.segment.extra.by_place(&self.sincos, [nx, ny], || self.arm(c, s), offset);
+        let [wx, wy] =
+            self.segment
+                .extra
+                .by_place(&self.sincos, [nx, ny], || self.arm(c, s), offset);
         self.with_linear(c, s, 0, 0, [wx, wy, 0])
     }
 }

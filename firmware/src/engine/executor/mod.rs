@@ -258,7 +258,9 @@ impl Executor {
             Mode::ArcRise | Mode::TermRise | Mode::Rise => {
                 // ∫ of the two ramps together: one step for each tick between their starts.
                 let apart = self.clock.elapsed();
-                self.end = timing.start.wrapping_add(timing.step.wrapping_mul(u64::from(apart)));
+                self.end = timing
+                    .start
+                    .wrapping_add(timing.step.wrapping_mul(u64::from(apart)));
                 self.second = Clock::rising(timing.clock_step);
                 self.mode = if apart == 0 { Mode::Rest } else { Mode::Both };
             }
@@ -272,7 +274,9 @@ impl Executor {
     pub(crate) fn skip_cruise(&mut self, but: u32) -> u32 {
         let skipped = self.left.saturating_sub(but);
         self.left -= skipped;
-        self.phase = self.phase.wrapping_add(self.segment.timing.step.wrapping_mul(u64::from(skipped)));
+        self.phase = self
+            .phase
+            .wrapping_add(self.segment.timing.step.wrapping_mul(u64::from(skipped)));
         skipped
     }
 
@@ -316,8 +320,14 @@ impl Executor {
         }
         let mut flags = flags;
         if verdict.offset_cut | verdict.slew_cut {
-            self.counters.offset_cuts = self.counters.offset_cuts.wrapping_add(u32::from(verdict.offset_cut));
-            self.counters.slew_cuts = self.counters.slew_cuts.wrapping_add(u32::from(verdict.slew_cut));
+            self.counters.offset_cuts = self
+                .counters
+                .offset_cuts
+                .wrapping_add(u32::from(verdict.offset_cut));
+            self.counters.slew_cuts = self
+                .counters
+                .slew_cuts
+                .wrapping_add(u32::from(verdict.slew_cut));
             flags |= flag::CUT;
         }
         Output::new(nominal, offset, flags)

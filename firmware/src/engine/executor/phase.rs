@@ -11,7 +11,8 @@ impl Executor {
     /// Replaces the phase by an exact value close to it, whole turns included.
     pub(super) fn set_phase(&mut self, exact: u64) {
         let ahead = exact.wrapping_sub(self.phase) as i64 > 0;
-        let wrapped = i32::from(ahead && exact < self.phase) - i32::from(!ahead && exact > self.phase);
+        let wrapped =
+            i32::from(ahead && exact < self.phase) - i32::from(!ahead && exact > self.phase);
         self.phase = exact;
         self.turns = self.turns.wrapping_add(wrapped);
     }
@@ -21,7 +22,9 @@ impl Executor {
 /// (Euler–Maclaurin); the next term is below 1e-5 of a step from 32 ticks up.
 #[inline(always)]
 pub(super) fn ramp_phase(sum: u64, step: u64, end_term: i32) -> u32 {
-    ((sum >> 32) as u32).wrapping_sub((step >> 33) as u32).wrapping_sub(end_term as u32)
+    ((sum >> 32) as u32)
+        .wrapping_sub((step >> 33) as u32)
+        .wrapping_sub(end_term as u32)
 }
 
 /// step·share, step doubled, share in Q31.

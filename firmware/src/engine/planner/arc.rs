@@ -6,7 +6,9 @@ use super::timing::{TURNS_PER_UNIT, Way};
 use super::{Planner, Refused};
 use crate::engine::planned::Planned;
 use core::f32::consts::TAU;
-use giotto_shared::path::{ExactArc, MAX_RADIUS_M, MAX_TURNS, MIN_FRACTION, MIN_RADIUS_M, Quantity};
+use giotto_shared::path::{
+    ExactArc, MAX_RADIUS_M, MAX_TURNS, MIN_FRACTION, MIN_RADIUS_M, Quantity,
+};
 
 /// Vectors of a plane may be so far from square or equally long, m and of the radius: what rounding them leaves.
 const SLACK: [f32; 2] = [1.5e-9, 1e-6];
@@ -47,7 +49,11 @@ impl Planner {
         // As whole nanometres the end may have wrapped: its last turn is looked at before.
         let ([cx, cy, cz], [rx, ry, rz]) = (to_m(arc.centre_nm), rise.map(|rise| rise * turns));
         self.check_reach([cx + rx, cy + ry, cz + rz], radius)?;
-        if arc.gap_nm(self.position_nm).iter().any(|gap| gap.unsigned_abs() > MAX_GAP_NM) {
+        if arc
+            .gap_nm(self.position_nm)
+            .iter()
+            .any(|gap| gap.unsigned_abs() > MAX_GAP_NM)
+        {
             return Err(Refused::OutOfBounds(Quantity::Gap));
         }
         let end = arc.end_nm(self.position_nm);
@@ -64,7 +70,10 @@ impl Planner {
             ccw: ux * vy - uy * vx >= -1e-6 * radius * radius,
             steep: libm::sqrtf(1.0 + slope * slope),
         };
-        let way = Way { turns: arc.turns, fraction: arc.fraction };
+        let way = Way {
+            turns: arc.turns,
+            fraction: arc.fraction,
+        };
         // Centripetal acceleration, with what the correction adds, takes at most nine tenths of the limit.
         let limit = self.machine.acceleration_m_s2;
         let feed = feed.min(libm::sqrtf(0.9 / (1.0 + MAX_GAIN) * limit * radius));
@@ -72,7 +81,8 @@ impl Planner {
         let feed = feed.min(self.machine.feed_m_s / slope.max(1e-9));
         let timing = |stretch: f32| {
             let (ramp_ticks, cruise_ticks) = self.profile(turns * TAU * radius, feed, stretch)?;
-            way.share_out(ramp_ticks, cruise_ticks).ok_or(Refused::OutOfBounds(Quantity::Feed))
+            way.share_out(ramp_ticks, cruise_ticks)
+                .ok_or(Refused::OutOfBounds(Quantity::Feed))
         };
         self.round(&round, limit, &timing, segment)?;
         // Rounding of centre and radius must not show as a gap at the start: the arc moves by that nm or two.

@@ -40,7 +40,11 @@ impl Planner {
         self.check_feed(feed_m_s)?;
         inside(&run.centre_nm, Quantity::Centre)?;
         let ccw = run.direction == Direction::Ccw;
-        let start = if ccw { run.start } else { run.start.wrapping_neg() };
+        let start = if ccw {
+            run.start
+        } else {
+            run.start.wrapping_neg()
+        };
         let round = Round {
             centre_nm: run.centre_nm,
             u: [arm, 0, 0],
@@ -57,19 +61,34 @@ impl Planner {
         if cruise_ticks == u32::MAX {
             return Err(Refused::OutOfBounds(Quantity::Time));
         }
-        let turns = Way { turns: run.laps, fraction: 0 };
-        let step = turns.per_tick(cruise_ticks).ok_or(Refused::OutOfBounds(Quantity::Radius))?;
+        let turns = Way {
+            turns: run.laps,
+            fraction: 0,
+        };
+        let step = turns
+            .per_tick(cruise_ticks)
+            .ok_or(Refused::OutOfBounds(Quantity::Radius))?;
         let timing = |stretch: f32| {
             let ramp_ticks = self.machine.ramp_ticks(feed_m_s, stretch);
             let entry = (step >> 1).wrapping_mul(u64::from(ramp_ticks));
             let up = u64::from(start) << 32;
             let down = up.wrapping_add(step.wrapping_mul(u64::from(cruise_ticks)));
             let (start, end) = (up.wrapping_sub(entry), down.wrapping_add(entry));
-            Ok(Timing { start, up, end, ..at_rate(step, ramp_ticks, cruise_ticks) })
+            Ok(Timing {
+                start,
+                up,
+                end,
+                ..at_rate(step, ramp_ticks, cruise_ticks)
+            })
         };
         // The feed is what is to be measured, whatever its centripetal acceleration: only the ramps keep to the limit.
         let cruise = 1.03 * (1.0 + MAX_GAIN) * feed_m_s * feed_m_s / radius_m;
-        self.round(&round, self.machine.acceleration_m_s2.max(cruise), &timing, circle)?;
+        self.round(
+            &round,
+            self.machine.acceleration_m_s2.max(cruise),
+            &timing,
+            circle,
+        )?;
         let at = |phase: u64| {
             let (c, s) = sincos((phase >> 32) as u32);
             circle.axes.map(|axis| axis.on_arc(c, s))

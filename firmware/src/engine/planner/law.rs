@@ -22,7 +22,13 @@ impl Shape {
         let (w2, w3) = (w * w, w * w * w);
         let w4 = w2 * w2;
         let slope = 1.0 + w / 2.0 + w2 * (3.0 / 8.0) + w3 * (5.0 / 16.0) + w4 * (35.0 / 128.0);
-        Self { s: 0.5 + 0.5 * x * slope, w2, w3, w4, xw3: x * w3 }
+        Self {
+            s: 0.5 + 0.5 * x * slope,
+            w2,
+            w3,
+            w4,
+            xw3: x * w3,
+        }
     }
 }
 
@@ -68,7 +74,8 @@ impl ArcLaw {
     pub(super) fn gain(&self, f: &Shape, sense: f32) -> [f32; 2] {
         let [k1, k2, k3, k4, k5, k6, k7, k8, k9] = self.0;
         let rate2 = f.s * f.s;
-        let radial = rate2 * (k1 + k2 * rate2) + k3 * f.s * f.xw3 + (k4 * f.w4 + sense * k9 * f.s) * f.w4;
+        let radial =
+            rate2 * (k1 + k2 * rate2) + k3 * f.s * f.xw3 + (k4 * f.w4 + sense * k9 * f.s) * f.w4;
         [radial, f.w4 * (k5 + k6 * rate2) + k7 * f.w2 + k8 * f.w3]
     }
 
@@ -80,7 +87,10 @@ impl ArcLaw {
 
     /// The largest coefficient, of what the integers can hold.
     pub(super) fn load(&self) -> f32 {
-        self.0.iter().zip(SCALE).fold(0.0, |most, (k, scale)| (k * scale / MOST).abs().max(most))
+        self.0
+            .iter()
+            .zip(SCALE)
+            .fold(0.0, |most, (k, scale)| (k * scale / MOST).abs().max(most))
     }
 
     /// Rounded; saturates beyond a load of 1.
@@ -90,7 +100,18 @@ impl ArcLaw {
             *k *= scale;
         }
         let [k1, k2, k3, k4, k5, k6, k7, k8, k9] = scaled.map(|k| single_to_fixed(k, 0));
-        Law { k1, k2, k3, k4, k5, k6, k7, k8, k9, end_term_q1: 0 }
+        Law {
+            k1,
+            k2,
+            k3,
+            k4,
+            k5,
+            k6,
+            k7,
+            k8,
+            k9,
+            end_term_q1: 0,
+        }
     }
 }
 
@@ -102,7 +123,11 @@ impl LineLaw {
     /// Up to `speed` m/s.
     pub(super) fn new(zone: &Built, speed: f32, ramp_s: f32) -> Self {
         let snap = zone.operator.fourth_s4 * speed * THIRD / (ramp_s * ramp_s * ramp_s);
-        Self([zone.operator.second_s2 * speed * FIRST / ramp_s, snap, -7.0 / 6.0 * snap])
+        Self([
+            zone.operator.second_s2 * speed * FIRST / ramp_s,
+            snap,
+            -7.0 / 6.0 * snap,
+        ])
     }
 
     /// Offset along the line, m.
@@ -115,6 +140,11 @@ impl LineLaw {
     pub(super) fn rounded(&self) -> Law {
         let nm = |metres: f32, bits: u32| single_to_fixed(metres * 1e9, bits);
         let [k5, k7, k8] = self.0;
-        Law { k5: nm(k5, 2), k7: nm(k7, 2), k8: nm(k8, 3), ..Law::default() }
+        Law {
+            k5: nm(k5, 2),
+            k7: nm(k7, 2),
+            k8: nm(k8, 3),
+            ..Law::default()
+        }
     }
 }

@@ -11,12 +11,19 @@ use giotto_shared::path::Quantity;
 
 impl Planner {
     /// To a place, at no more than a feed.
-    pub(super) fn line_to(&mut self, to: [i32; 3], feed: f32, segment: &mut Planned) -> Result<(), Refused> {
+    pub(super) fn line_to(
+        &mut self,
+        to: [i32; 3],
+        feed: f32,
+        segment: &mut Planned,
+    ) -> Result<(), Refused> {
         self.check_feed(feed)?;
         let from = self.position_nm;
         let mut span_nm = [0; 3];
         for ((span, to), from) in span_nm.iter_mut().zip(to).zip(from) {
-            *span = to.checked_sub(from).ok_or(Refused::OutOfBounds(Quantity::Length))?;
+            *span = to
+                .checked_sub(from)
+                .ok_or(Refused::OutOfBounds(Quantity::Length))?;
         }
         if span_nm == [0; 3] {
             self.dwell(1, segment);
@@ -26,13 +33,19 @@ impl Planner {
         let whole = length(span);
         let [x, y, z] = start;
         let place_m = [x + 0.5 * span[0], y + 0.5 * span[1], z + 0.5 * span[2]];
-        let zone = self.zones.choose(&Asked { place_m, radius_m: None, feed_m_s: feed, ccw: None });
+        let zone = self.zones.choose(&Asked {
+            place_m,
+            radius_m: None,
+            feed_m_s: feed,
+            ccw: None,
+        });
         let bounds = self.bounds(zone.is_some());
         let mut stretch = 1.0;
         let (timing, law) = loop {
             let (ramp_ticks, cruise_ticks) = self.profile(whole, feed, stretch)?;
-            let timing =
-                Way::LINE.share_out(ramp_ticks, cruise_ticks).ok_or(Refused::OutOfBounds(Quantity::Feed))?;
+            let timing = Way::LINE
+                .share_out(ramp_ticks, cruise_ticks)
+                .ok_or(Refused::OutOfBounds(Quantity::Feed))?;
             let speed = turns_per_tick(&timing) / Way::LINE_TURNS * whole * self.machine.rate_hz;
             let ramp_s = ramp_ticks as f32 * self.machine.tick_s;
             let law = zone.as_ref().map(|zone| LineLaw::new(zone, speed, ramp_s));
@@ -42,7 +55,9 @@ impl Planner {
                 slew_m_s: worst.slew_per_s,
                 acceleration_m_s2: worst.acceleration_per_s2,
             };
-            let over = demand.correction(&bounds).max(demand.acceleration(self.machine.acceleration_m_s2));
+            let over = demand
+                .correction(&bounds)
+                .max(demand.acceleration(self.machine.acceleration_m_s2));
             match longer(stretch, over) {
                 Some(longer) => stretch = longer,
                 None => break (timing, law),
@@ -50,15 +65,25 @@ impl Planner {
         };
         self.blank(segment);
         segment.kind = Kind::Line;
-        for (((axis, from), span_nm), span) in segment.axes.iter_mut().zip(from).zip(span_nm).zip(span) {
-            *axis = Axis { base: from, u: span_nm, v: single_to_fixed(span / whole, 31), a: 0, b: 0 };
+        for (((axis, from), span_nm), span) in
+            segment.axes.iter_mut().zip(from).zip(span_nm).zip(span)
+        {
+            *axis = Axis {
+                base: from,
+                u: span_nm,
+                v: single_to_fixed(span / whole, 31),
+                a: 0,
+                b: 0,
+            };
         }
         if let (Some(zone), Some(law)) = (&zone, law) {
             self.bound(segment, &bounds);
             segment.rise = law.rounded();
             if let Some(profile) = &zone.profile {
                 // Without a place there is no point that errors of position could be counted from.
-                let seen = zone.reference_m.map(|reference| seen_from(start, reference));
+                let seen = zone
+                    .reference_m
+                    .map(|reference| seen_from(start, reference));
                 let motion = self.motion(&timing, 1.0 / Way::LINE_TURNS);
                 terms::on_line(profile, &motion, span, seen, &mut segment.extra);
                 segment.extended = true;

@@ -24,8 +24,10 @@ pub(super) struct Machine {
 impl Machine {
     pub(super) fn new(config: &Config) -> Self {
         let rate_hz = config.rate_hz as f32;
-        let (acceleration_m_s2, jerk_m_s3) =
-            (config.motion.acceleration_m_s2 as f32, config.motion.jerk_m_s3 as f32);
+        let (acceleration_m_s2, jerk_m_s3) = (
+            config.motion.acceleration_m_s2 as f32,
+            config.motion.jerk_m_s3 as f32,
+        );
         Self {
             rate_hz,
             tick_s: 1.0 / rate_hz,
@@ -38,7 +40,10 @@ impl Machine {
             engage_ticks: config.engage_ticks(),
             stream_window_s: config.stream_window_s as f32,
             stream_hold_ticks: config.stream_hold_ticks,
-            ramp: [STEEPEST[0] as f32 / acceleration_m_s2, STEEPEST[1] as f32 / jerk_m_s3],
+            ramp: [
+                STEEPEST[0] as f32 / acceleration_m_s2,
+                STEEPEST[1] as f32 / jerk_m_s3,
+            ],
         }
     }
 
@@ -51,6 +56,9 @@ impl Machine {
 
     /// Bounds on an offset (nm) and on its change (nm per tick).
     pub(super) fn bounds_nm(&self, offset_m: f32, slew_m_s: f32) -> [i32; 2] {
-        [single_to_fixed(offset_m * 1e9, 0), single_to_fixed(slew_m_s * self.tick_s * 1e9, 0)]
+        [
+            single_to_fixed(offset_m * 1e9, 0),
+            single_to_fixed(slew_m_s * self.tick_s * 1e9, 0),
+        ]
     }
 }

@@ -70,7 +70,12 @@ pub struct Planner {
 impl Planner {
     /// Plans from a position on.
     pub fn new(config: &Config, position_nm: [i32; 3]) -> Self {
-        Self { machine: Machine::new(config), zones: Zones::default(), position_nm, epoch: 0 }
+        Self {
+            machine: Machine::new(config),
+            zones: Zones::default(),
+            position_nm,
+            epoch: 0,
+        }
     }
 
     /// The table used for segments planned from now on; `None`: no correction. On an error the old one stays.
@@ -111,7 +116,11 @@ impl Planner {
 
     /// One segment from where the last one ends, written in place: it is large.
     #[inline(never)]
-    pub fn segment(&mut self, segment: &ExactSegment, planned: &mut Planned) -> Result<(), Refused> {
+    pub fn segment(
+        &mut self,
+        segment: &ExactSegment,
+        planned: &mut Planned,
+    ) -> Result<(), Refused> {
         match segment {
             ExactSegment::Line { to_nm, feed_m_s } => {
                 inside(to_nm, Quantity::Position)?;
@@ -142,7 +151,12 @@ impl Planner {
         let feed_m_s = positive(feed_m_s, Quantity::Feed)?;
         self.check_feed(feed_m_s)?;
         let place_m = to_m(self.position_nm);
-        let zone = self.zones.choose(&Asked { place_m, radius_m: None, feed_m_s, ccw: None });
+        let zone = self.zones.choose(&Asked {
+            place_m,
+            radius_m: None,
+            feed_m_s,
+            ccw: None,
+        });
         let bounds = self.bounds(zone.is_some());
         let needs = StreamNeeds {
             epoch: self.epoch,
@@ -199,12 +213,17 @@ impl Planner {
 
     /// The bounds of the image; where a zone applies those of the table, if they are tighter.
     fn bounds(&self, zone: bool) -> Bounds {
-        let Machine { offset_m, slew_m_s, .. } = self.machine;
+        let Machine {
+            offset_m, slew_m_s, ..
+        } = self.machine;
         if !zone {
             return Bounds { offset_m, slew_m_s };
         }
         let limits = self.zones.limits();
-        Bounds { offset_m: offset_m.min(limits.offset_m), slew_m_s: slew_m_s.min(limits.slew_m_s) }
+        Bounds {
+            offset_m: offset_m.min(limits.offset_m),
+            slew_m_s: slew_m_s.min(limits.slew_m_s),
+        }
     }
 
     /// A zone applies, with its bounds.
@@ -225,6 +244,10 @@ impl Planner {
     }
 
     fn check_feed(&self, feed: f32) -> Result<(), Refused> {
-        if feed > self.machine.feed_m_s { Err(Refused::OutOfBounds(Quantity::Feed)) } else { Ok(()) }
+        if feed > self.machine.feed_m_s {
+            Err(Refused::OutOfBounds(Quantity::Feed))
+        } else {
+            Ok(())
+        }
     }
 }

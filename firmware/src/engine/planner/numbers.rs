@@ -7,13 +7,23 @@ const MAX_POSITION_NM: u32 = (MAX_POSITION_M * 1e9) as u32;
 
 /// Finite and above 0.
 pub(super) fn positive(value: f32, quantity: Quantity) -> Result<f32, Refused> {
-    if value.is_finite() && value > 0.0 { Ok(value) } else { Err(Refused::NotANumber(quantity)) }
+    if value.is_finite() && value > 0.0 {
+        Ok(value)
+    } else {
+        Err(Refused::NotANumber(quantity))
+    }
 }
 
 /// Every coordinate is one that the engine can hold.
 pub(super) fn inside(place_nm: &[i32; 3], quantity: Quantity) -> Result<(), Refused> {
-    let inside = place_nm.iter().all(|nm| nm.unsigned_abs() <= MAX_POSITION_NM);
-    if inside { Ok(()) } else { Err(Refused::OutOfBounds(quantity)) }
+    let inside = place_nm
+        .iter()
+        .all(|nm| nm.unsigned_abs() <= MAX_POSITION_NM);
+    if inside {
+        Ok(())
+    } else {
+        Err(Refused::OutOfBounds(quantity))
+    }
 }
 
 /// Metres from nanometres, to 24 bits.

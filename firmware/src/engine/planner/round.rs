@@ -53,9 +53,17 @@ impl Planner {
         let place_m = to_m(round.centre_nm);
         self.check_reach(place_m, round.radius_m)?;
         let radius_m = Some(round.radius_m);
-        let asked = Asked { place_m, radius_m, feed_m_s: round.feed_m_s, ccw: Some(round.ccw) };
+        let asked = Asked {
+            place_m,
+            radius_m,
+            feed_m_s: round.feed_m_s,
+            ccw: Some(round.ccw),
+        };
         // Out of the numbers of the law at constant rate: not corrected, and counted so.
-        let endless = Motion { ramp_s: ENDLESS_S, ..self.around(&timing(1.0)?) };
+        let endless = Motion {
+            ramp_s: ENDLESS_S,
+            ..self.around(&timing(1.0)?)
+        };
         let zone = self.zones.choose(&asked);
         let zone = zone.as_ref().filter(|zone| {
             let law = ArcLaw::new(zone, &endless);
@@ -63,7 +71,12 @@ impl Planner {
         });
         let bounds = self.bounds(zone.is_some());
         let law = zone.map(|zone| ArcLaw::new(zone, &endless));
-        let steady = demand(round, zone, &endless, &worst::on_arc(law.as_ref(), &endless));
+        let steady = demand(
+            round,
+            zone,
+            &endless,
+            &worst::on_arc(law.as_ref(), &endless),
+        );
         let curable = steady.correction(&bounds) <= 1.0;
         let mut stretch = 1.0;
         let (timing, motion, law, within) = loop {
@@ -72,20 +85,43 @@ impl Planner {
             let law = zone.map(|zone| ArcLaw::new(zone, &motion));
             let worst = worst::on_arc(law.as_ref(), &motion);
             let demand = demand(round, zone, &motion, &worst);
-            let numbers = law.as_ref().map_or(0.0, |law| law.load().max(worst.gain / MAX_GAIN));
+            let numbers = law
+                .as_ref()
+                .map_or(0.0, |law| law.load().max(worst.gain / MAX_GAIN));
             let correction = demand.correction(&bounds);
-            let over = if curable { correction.max(numbers) } else { numbers };
+            let over = if curable {
+                correction.max(numbers)
+            } else {
+                numbers
+            };
             match super::demand::longer(stretch, over.max(demand.acceleration(limit_m_s2))) {
                 Some(longer) => stretch = longer,
-                None => break (timing, motion, law.filter(|_| numbers <= 1.0), correction <= 1.0),
+                None => {
+                    break (
+                        timing,
+                        motion,
+                        law.filter(|_| numbers <= 1.0),
+                        correction <= 1.0,
+                    );
+                }
             }
         };
         self.blank(segment);
-        segment.kind = if round.rise_nm == [0; 3] { Kind::Arc } else { Kind::Helix };
+        segment.kind = if round.rise_nm == [0; 3] {
+            Kind::Arc
+        } else {
+            Kind::Helix
+        };
         (segment.rise_nm, segment.timing) = (round.rise_nm, timing);
         let vectors = round.centre_nm.into_iter().zip(round.u).zip(round.v);
         for (axis, ((base, u), v)) in segment.axes.iter_mut().zip(vectors) {
-            *axis = Axis { base, u, v, a: 0, b: 0 };
+            *axis = Axis {
+                base,
+                u,
+                v,
+                a: 0,
+                b: 0,
+            };
         }
         segment.proven = true;
         if let (Some(zone), Some(law)) = (zone, law) {
@@ -101,7 +137,11 @@ impl Planner {
     /// Every point of a circle is one that the engine can hold.
     pub(super) fn check_reach(&self, centre_m: [f32; 3], radius_m: f32) -> Result<(), Refused> {
         let inside = radius_m + length(centre_m) <= MAX_POSITION_M as f32;
-        if inside { Ok(()) } else { Err(Refused::OutOfBounds(Quantity::Position)) }
+        if inside {
+            Ok(())
+        } else {
+            Err(Refused::OutOfBounds(Quantity::Position))
+        }
     }
 
     fn around(&self, timing: &Timing) -> Motion {
@@ -121,9 +161,17 @@ fn correct(
         let share = |vector: i32| single_to_fixed(radial * vector as f32, 0);
         (axis.a, axis.b) = (share(axis.u), share(axis.v));
     }
-    let Some(profile) = &zone.profile else { return Ok(()) };
+    let Some(profile) = &zone.profile else {
+        return Ok(());
+    };
     let extra = &mut segment.extra;
-    terms::on_arc(profile, motion, [arm(round.u), arm(round.v)], round.seen(zone), extra);
+    terms::on_arc(
+        profile,
+        motion,
+        [arm(round.u), arm(round.v)],
+        round.seen(zone),
+        extra,
+    );
     if !extra.within_numbers() {
         return Err(Refused::OutOfBounds(Quantity::Terms));
     }
@@ -138,8 +186,9 @@ fn correct(
 /// What law and terms ask for together.
 fn demand(round: &Round, zone: Option<&Built>, motion: &Motion, worst: &Worst) -> Demand {
     let terms = zone.and_then(|zone| Some((zone.profile.as_ref()?, round.seen(zone))));
-    let [offset_m, slew_m_s] =
-        terms.map_or([0.0; 2], |(profile, seen)| terms::worst_on_arc(profile, motion, round.radius_m, seen));
+    let [offset_m, slew_m_s] = terms.map_or([0.0; 2], |(profile, seen)| {
+        terms::worst_on_arc(profile, motion, round.radius_m, seen)
+    });
     Demand {
         offset_m: offset_m + round.radius_m * worst.gain,
         slew_m_s: slew_m_s + round.radius_m * worst.slew_per_s,

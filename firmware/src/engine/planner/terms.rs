@@ -47,17 +47,30 @@ pub(super) fn on_arc(
         }
     };
     let ([px, py], [dx, dy], [sx, sy]) = (p.position, p.velocity_s, p.acceleration_s2);
-    let still = Linear { a: [nm2(outward * uz), 0, 0, 0], b: [nm2(outward * vz), 0, 0, 0] };
-    extra.linear = [axis([px, dx, sx], ux, vx), axis([py, dy, sy], uy, vy), still];
+    let still = Linear {
+        a: [nm2(outward * uz), 0, 0, 0],
+        b: [nm2(outward * vz), 0, 0, 0],
+    };
+    extra.linear = [
+        axis([px, dx, sx], ux, vx),
+        axis([py, dy, sy], uy, vy),
+        still,
+    ];
     extra.constant_fine = [px, py].map(|row| fine(-by(row, centre)));
     let (cos, sin) = lead(m);
-    extra.ahead = [(ux, vx), (uy, vy)].map(|(u, v)| [nm2(v * cos - u * sin), nm2(-u * cos - v * sin)]);
+    extra.ahead =
+        [(ux, vx), (uy, vy)].map(|(u, v)| [nm2(v * cos - u * sin), nm2(-u * cos - v * sin)]);
     // u²/2³¹ in nm² times this over 2³² is c·u² in nm.
     const PER_NM: f32 = 4_294_967_296.0 * 1e-9;
     extra.bow = p.bow_per_m.map(|c| single_to_fixed(-c * PER_NM, 31));
     extra.bowed = extra.bow != [0; 2];
     let ([[slow, _], _], [[second, _], _]) = (p.velocity_s, p.acceleration_s2);
-    let shares = [-slow * m.rate, -second * change, second * m.rate * m.rate, 0.5 * outward];
+    let shares = [
+        -slow * m.rate,
+        -second * change,
+        second * m.rate * m.rate,
+        0.5 * outward,
+    ];
     let [by_rate, by_change, radial, _] = shares.map(|share| single_to_fixed(share, 33));
     extra.moving = Moving {
         place: [px, py].map(|row| [nm2(-by(row, [ux, uy])), nm2(-by(row, [vx, vy]))]),
@@ -86,8 +99,16 @@ pub(super) fn on_line(
     let along = [sx, sy];
     let change = m.rate * FIRST / m.ramp_s;
     let axis = |place: [f32; 2], velocity: [f32; 2], second: [f32; 2]| {
-        let a = [-by(place, along), -m.rate * by(velocity, along), 0.0, -change * by(second, along)];
-        Linear { a: a.map(nm2), b: [0; 4] }
+        let a = [
+            -by(place, along),
+            -m.rate * by(velocity, along),
+            0.0,
+            -change * by(second, along),
+        ];
+        Linear {
+            a: a.map(nm2),
+            b: [0; 4],
+        }
     };
     let position = start.map_or([[0.0; 2]; 2], |_| p.position);
     let ([px, py], [dx, dy], [ax, ay]) = (position, p.velocity_s, p.acceleration_s2);
@@ -114,7 +135,11 @@ fn unsteady(p: &Profile<f32>, m: &Motion, extra: &mut Extra) {
         jump: sides.map(|axis| axis.map(|b| fine(b * share))),
         spike: p.spike.map(|spike| fine(spike.peak_m)),
         fade: p.spike.map(|spike| {
-            if spike.peak_m == 0.0 { 0 } else { single_to_fixed(decay(m.tick_s / spike.decay_s), 32) }
+            if spike.peak_m == 0.0 {
+                0
+            } else {
+                single_to_fixed(decay(m.tick_s / spike.decay_s), 32)
+            }
         }),
     };
     let cyclic = p.cyclic.iter().filter(|c| c.amplitude_m != 0.0);
@@ -165,7 +190,12 @@ fn decay(y: f32) -> f32 {
 }
 
 /// Offset (m) and slew (m/s) that all terms together ask for on an arc at most: the sum of each one's own largest.
-pub(super) fn worst_on_arc(p: &Profile<f32>, m: &Motion, radius: f32, [cx, cy]: [f32; 2]) -> [f32; 2] {
+pub(super) fn worst_on_arc(
+    p: &Profile<f32>,
+    m: &Motion,
+    radius: f32,
+    [cx, cy]: [f32; 2],
+) -> [f32; 2] {
     let row = |matrix: [[f32; 2]; 2]| {
         let [x, y] = matrix.map(|[a, b]| a.abs() + b.abs());
         x.max(y)
@@ -218,12 +248,24 @@ mod tests {
     #[test]
     fn a_periodic_error_keeps_its_phase_over_a_metre() {
         for pitch_m in [1e-4f32, 3e-4, 0.0025, 0.01, 0.37, 10.0] {
-            let c = CyclicError { axis: 0, amplitude_m: 1e-6, pitch_m, phase_rad: 0.0 };
-            let Cyclic { per_nm: [whole, _], rest_q32: [rest, _], .. } = periodic(&c);
+            let c = CyclicError {
+                axis: 0,
+                amplitude_m: 1e-6,
+                pitch_m,
+                phase_rad: 0.0,
+            };
+            let Cyclic {
+                per_nm: [whole, _],
+                rest_q32: [rest, _],
+                ..
+            } = periodic(&c);
             let exact = 4.294_967_296 / f64::from(pitch_m);
             let got = f64::from(whole) + f64::from(rest) / 4_294_967_296.0;
             // Turns after a metre.
-            assert!((got - exact).abs() * 1e9 / 4_294_967_296.0 < 2e-8, "{pitch_m}: {got} {exact}");
+            assert!(
+                (got - exact).abs() * 1e9 / 4_294_967_296.0 < 2e-8,
+                "{pitch_m}: {got} {exact}"
+            );
         }
     }
 }

@@ -30,7 +30,10 @@ pub(super) struct Way {
 
 impl Way {
     /// A whole line, in units of phase.
-    pub(super) const LINE: Self = Self { turns: 0, fraction: 1 << 62 };
+    pub(super) const LINE: Self = Self {
+        turns: 0,
+        fraction: 1 << 62,
+    };
     /// The part of a turn that a line takes.
     pub(super) const LINE_TURNS: f32 = 0.25;
 
@@ -50,7 +53,11 @@ impl Way {
     pub(super) fn share_out(self, ramp_ticks: u32, cruise_ticks: u32) -> Option<Timing> {
         let step = self.per_tick(ramp_ticks.saturating_add(cruise_ticks))?;
         let up = (step >> 1).wrapping_mul(u64::from(ramp_ticks));
-        Some(Timing { up, end: self.fraction, ..at_rate(step, ramp_ticks, cruise_ticks) })
+        Some(Timing {
+            up,
+            end: self.fraction,
+            ..at_rate(step, ramp_ticks, cruise_ticks)
+        })
     }
 }
 

@@ -52,8 +52,16 @@ struct Place {
 impl Place {
     fn at(law: Option<&ArcLaw>, motion: &Motion, f: &Shape, sense: f32) -> Self {
         let [radial, tangential] = law.map_or([0.0; 2], |law| law.gain(f, sense));
-        let (rate, acceleration) = (motion.rate * f.s, motion.rate * FIRST / motion.ramp_s * f.w4);
-        Self { radial, tangential, rate, acceleration }
+        let (rate, acceleration) = (
+            motion.rate * f.s,
+            motion.rate * FIRST / motion.ramp_s * f.w4,
+        );
+        Self {
+            radial,
+            tangential,
+            rate,
+            acceleration,
+        }
     }
 }
 
@@ -62,7 +70,10 @@ impl Worst {
         let (w, a) = (here.rate, here.acceleration);
         let (re, im) = (here.radial, here.tangential);
         let first = |b: f32, a: f32| (a - b) / (2.0 * h);
-        let (re1, im1) = (first(before.radial, after.radial), first(before.tangential, after.tangential));
+        let (re1, im1) = (
+            first(before.radial, after.radial),
+            first(before.tangential, after.tangential),
+        );
         let second = |b: f32, c: f32, a: f32| ((b - c) + (a - c)) / (h * h);
         let re2 = second(before.radial, re, after.radial);
         let im2 = second(before.tangential, im, after.tangential);
@@ -83,7 +94,10 @@ pub(super) fn on_line(law: Option<&LineLaw>, speed: f32, ramp_s: f32) -> Worst {
     let h = ramp_s / f32::from(STEPS);
     let (mut before, mut here) = (0.0f32, [0.0; 2]);
     for f in sweep() {
-        let after = [speed * FIRST / ramp_s * f.w4, law.map_or(0.0, |law| law.along(&f))];
+        let after = [
+            speed * FIRST / ramp_s * f.w4,
+            law.map_or(0.0, |law| law.along(&f)),
+        ];
         let second = ((before - here[1]) + (after[1] - here[1])) / (h * h);
         worst.gain = worst.gain.max(after[1].abs());
         worst.slew_per_s = worst.slew_per_s.max((after[1] - here[1]).abs() / h);

@@ -11,7 +11,10 @@ const KAPPA: [f64; 2] = [4e-4 + 1.6e-3 / 12.0, 6.0 * 1.6e-7 - 2.56e-6 / 120.0];
 
 fn plan() -> StreamPlan {
     let fourth_s4 = KAPPA[0] * KAPPA[0] / 8.0 - KAPPA[1] / 24.0;
-    let operator = Operator { second_s2: (-KAPPA[0] / 2.0) as f32, fourth_s4: fourth_s4 as f32 };
+    let operator = Operator {
+        second_s2: (-KAPPA[0] / 2.0) as f32,
+        fourth_s4: fourth_s4 as f32,
+    };
     StreamPlan::build(&StreamNeeds {
         epoch: 0,
         longest: PLACES as u32,
@@ -31,11 +34,18 @@ fn plan() -> StreamPlan {
 fn ellipse(n: i32) -> [i32; 3] {
     let (t, rate, start) = ((f64::from(n) * DT).max(0.0), 6.0, 0.5);
     let theta = rate * (start * smoothstep(t / start).integral + (t - start).max(0.0));
-    [(0.05 * theta.cos() * 1e9).round() as i32, (0.03 * theta.sin() * 1e9).round() as i32, 7]
+    [
+        (0.05 * theta.cos() * 1e9).round() as i32,
+        (0.03 * theta.sin() * 1e9).round() as i32,
+        7,
+    ]
 }
 
 fn sample(n: i32) -> StreamSample {
-    StreamSample { sequence: n as u16, position_nm: ellipse(n) }
+    StreamSample {
+        sequence: n as u16,
+        position_nm: ellipse(n),
+    }
 }
 
 #[test]
@@ -49,7 +59,10 @@ fn nominal_is_the_input_late_and_so_is_bypass_bit_for_bit() {
     for n in 0..3000 {
         let (a, b) = (active.tick(Some(sample(n))), bypass.tick(Some(sample(n))));
         assert_eq!(a.nominal_nm, ellipse(n - latency));
-        assert_eq!((b.nominal_nm, b.corrected_nm), (ellipse(n - latency), ellipse(n - latency)));
+        assert_eq!(
+            (b.nominal_nm, b.corrected_nm),
+            (ellipse(n - latency), ellipse(n - latency))
+        );
         moved += i32::from(a.corrected_nm != a.nominal_nm);
     }
     assert!(moved > 2000);
@@ -64,7 +77,8 @@ fn the_correction_is_the_operator() {
         let out = stream.tick(Some(sample(n)));
         if n > 700 {
             // Constant rate 6 rad/s: p″ = −36 p, p⁗ = 1296 p.
-            let gain = KAPPA[0] / 2.0 * 36.0 + (KAPPA[0] * KAPPA[0] / 8.0 - KAPPA[1] / 24.0) * 1296.0;
+            let gain =
+                KAPPA[0] / 2.0 * 36.0 + (KAPPA[0] * KAPPA[0] / 8.0 - KAPPA[1] / 24.0) * 1296.0;
             for axis in 0..2 {
                 let offset = f64::from(out.corrected_nm[axis] - out.nominal_nm[axis]);
                 worst = worst.max((offset - gain * f64::from(out.nominal_nm[axis])).abs());
@@ -87,7 +101,10 @@ fn noise_comes_out_as_often_as_stated() {
     for n in 0..100_000u32 {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         let x = (state >> 16) as i32 - (1 << 15);
-        let out = stream.tick(Some(StreamSample { sequence: n as u16, position_nm: [x, 0, 0] }));
+        let out = stream.tick(Some(StreamSample {
+            sequence: n as u16,
+            position_nm: [x, 0, 0],
+        }));
         noise += f64::from(x).powi(2);
         offset += f64::from(out.corrected_nm[0] - out.nominal_nm[0]).powi(2);
     }
@@ -114,7 +131,9 @@ fn a_short_gap_is_bridged_and_joined_without_a_jump() {
     let plan = plan();
     let run = |lost: &dyn Fn(i32) -> bool| {
         let mut stream: Stream = Stream::new(&plan, ellipse(0), 0, false);
-        let out: Vec<Output> = (0..3000).map(|n| stream.tick((!lost(n)).then(|| sample(n)))).collect();
+        let out: Vec<Output> = (0..3000)
+            .map(|n| stream.tick((!lost(n)).then(|| sample(n))))
+            .collect();
         (out, *stream.counters(), stream.state())
     };
     let (whole, _, _) = run(&|_| false);
@@ -136,8 +155,14 @@ fn late_doubled_and_wild_set_points_are_counted_and_do_no_harm() {
     for n in 0..3000 {
         let given = match n {
             1500 => sample(1499),
-            1600 => StreamSample { position_nm: [900_000_000, 0, 0], ..sample(n) },
-            1700 => StreamSample { position_nm: [i32::MIN; 3], ..sample(n) },
+            1600 => StreamSample {
+                position_nm: [900_000_000, 0, 0],
+                ..sample(n)
+            },
+            1700 => StreamSample {
+                position_nm: [i32::MIN; 3],
+                ..sample(n)
+            },
             _ => sample(n),
         };
         out.push(stream.tick(Some(given)));
@@ -154,7 +179,10 @@ fn a_set_point_may_be_as_far_as_the_feed_and_no_farther() {
     for (share, rejected) in [(1.0, 0), (1.04, 0), (1.06, 1), (2.0, 1)] {
         let mut stream: Stream = Stream::new(&plan(), [0; 3], 0, false);
         for (sequence, x) in [(0, 0.0), (1, share * 1e6)] {
-            stream.tick(Some(StreamSample { sequence, position_nm: [x as i32, 0, 0] }));
+            stream.tick(Some(StreamSample {
+                sequence,
+                position_nm: [x as i32, 0, 0],
+            }));
         }
         assert_eq!(stream.counters().rejected, rejected, "{share} of the feed");
     }
@@ -190,7 +218,10 @@ fn finishing_keeps_the_machine_where_it_was_going() {
     let plan = plan();
     let mut stream: Stream = Stream::new(&plan, [5, 6, 7], 9, false);
     for n in 0..50 {
-        stream.tick(Some(StreamSample { sequence: 9 + n, position_nm: [5, 6, 7] }));
+        stream.tick(Some(StreamSample {
+            sequence: 9 + n,
+            position_nm: [5, 6, 7],
+        }));
     }
     stream.finish();
     assert_eq!(stream.tick(None).corrected_nm, [5, 6, 7]);
@@ -213,7 +244,10 @@ fn a_stop_slows_down_along_the_tangent_and_is_over_when_nothing_moves() {
     let (v, a) = largest_steps(&out);
     assert!(v < 0.4 && a < 6.0, "{v} {a}");
     let end = *out.last().unwrap();
-    assert_eq!((end.nominal_nm, end.corrected_nm), (stream.last_nm(), stream.last_nm()));
+    assert_eq!(
+        (end.nominal_nm, end.corrected_nm),
+        (stream.last_nm(), stream.last_nm())
+    );
     // A second one, from there.
     stream.start(&plan, end.nominal_nm, 7, false);
     assert_eq!((stream.expected(), stream.takes()), (7, true));

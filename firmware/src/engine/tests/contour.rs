@@ -26,7 +26,10 @@ const AVERAGE_TICKS: usize = 40;
 fn kappa(lags_s: &[f64]) -> [f32; 2] {
     let t = AVERAGE_TICKS as f64 * DT;
     let sum = |n: i32| lags_s.iter().map(|lag| lag.powi(n)).sum::<f64>();
-    [(sum(2) + t * t / 12.0) as f32, (6.0 * sum(4) - t.powi(4) / 120.0) as f32]
+    [
+        (sum(2) + t * t / 12.0) as f32,
+        (6.0 * sum(4) - t.powi(4) / 120.0) as f32,
+    ]
 }
 
 /// The path of the machine with these lags, m, for set-points joined by straight lines.
@@ -83,7 +86,10 @@ fn contour_error(
     from: usize,
     to: usize,
 ) -> f64 {
-    machine(set_points, lags_s)[from..to].iter().map(|&p| distance(p).abs()).fold(0.0, f64::max)
+    machine(set_points, lags_s)[from..to]
+        .iter()
+        .map(|&p| distance(p).abs())
+        .fold(0.0, f64::max)
 }
 
 /// (corrected, not corrected), each an error in m.
@@ -127,7 +133,8 @@ fn from_polyline(points: &[[f64; 2]], p: [f64; 2]) -> f64 {
         .map(|w| {
             let (a, b) = (w[0], [w[1][0] - w[0][0], w[1][1] - w[0][1]]);
             let length2 = b[0] * b[0] + b[1] * b[1];
-            let t = (((p[0] - a[0]) * b[0] + (p[1] - a[1]) * b[1]) / length2.max(1e-30)).clamp(0.0, 1.0);
+            let t = (((p[0] - a[0]) * b[0] + (p[1] - a[1]) * b[1]) / length2.max(1e-30))
+                .clamp(0.0, 1.0);
             (p[0] - a[0] - t * b[0]).hypot(p[1] - a[1] - t * b[1])
         })
         .fold(f64::INFINITY, f64::min)
@@ -148,19 +155,41 @@ fn circle_with_entry_and_exit() {
     };
     engine.run_circle(&run).unwrap();
     let out = run_out(&mut engine);
-    let first = out.iter().rposition(|o| o.flags & flag::SETTLING != 0).unwrap();
+    let first = out
+        .iter()
+        .rposition(|o| o.flags & flag::SETTLING != 0)
+        .unwrap();
     let distance = |p: [f64; 2]| (p[0] - 0.05).hypot(p[1]) - 0.05;
-    report("circle R50 f300, ramps and all", both(&out[first..], &LAG_S, &distance), 1.0);
+    report(
+        "circle R50 f300, ramps and all",
+        both(&out[first..], &LAG_S, &distance),
+        1.0,
+    );
     // The machine has forgotten the entry when its longest memory has passed ten times.
-    let begin =
-        out.iter().rposition(|o| o.flags & flag::CRUISE == 0 && o.flags & flag::SETTLING != 0).unwrap();
-    let cruise: Vec<usize> = (begin..out.len()).filter(|&n| out[n].flags & flag::CRUISE != 0).collect();
+    let begin = out
+        .iter()
+        .rposition(|o| o.flags & flag::CRUISE == 0 && o.flags & flag::SETTLING != 0)
+        .unwrap();
+    let cruise: Vec<usize> = (begin..out.len())
+        .filter(|&n| out[n].flags & flag::CRUISE != 0)
+        .collect();
     let path = |pick: &dyn Fn(&Output) -> [i32; 3]| -> Vec<[f64; 2]> {
-        out[begin..].iter().map(pick).map(|p| [f64::from(p[0]) * 1e-9, f64::from(p[1]) * 1e-9]).collect()
+        out[begin..]
+            .iter()
+            .map(pick)
+            .map(|p| [f64::from(p[0]) * 1e-9, f64::from(p[1]) * 1e-9])
+            .collect()
     };
     let (from, to) = (cruise[0] - begin + 400, cruise[cruise.len() - 1] - begin);
     let error = |set_points: &[[f64; 2]]| contour_error(set_points, &LAG_S, &distance, from, to);
-    report("circle R50 f300", (error(&path(&|o| o.corrected_nm)), error(&path(&|o| o.nominal_nm))), 0.01);
+    report(
+        "circle R50 f300",
+        (
+            error(&path(&|o| o.corrected_nm)),
+            error(&path(&|o| o.nominal_nm)),
+        ),
+        0.01,
+    );
 }
 
 #[test]
@@ -184,7 +213,10 @@ fn arcs_with_joints(lags_s: &[f64], bar: f64) {
         rise_m: 0.0,
         feed_m_s,
     };
-    let line = |to: [f64; 2]| Segment::Line { to_m: [to[0], to[1], 0.0], feed_m_s };
+    let line = |to: [f64; 2]| Segment::Line {
+        to_m: [to[0], to[1], 0.0],
+        feed_m_s,
+    };
     let mut out = Vec::new();
     for segment in [line([0.08, 0.0]), quarter([0.08, 0.03]), line([0.11, 0.09])] {
         engine.push(&segment).unwrap();
@@ -223,7 +255,11 @@ fn arcs_with_joints(lags_s: &[f64], bar: f64) {
     let distance = |p: [f64; 2]| {
         let dx = (p[0] - w / 2.0).abs() - (w / 2.0 - r);
         let dy = (p[1] - h / 2.0).abs() - (h / 2.0 - r);
-        if dx > 0.0 && dy > 0.0 { dx.hypot(dy) - r } else { dx.max(dy) - r }
+        if dx > 0.0 && dy > 0.0 {
+            dx.hypot(dy) - r
+        } else {
+            dx.max(dy) - r
+        }
     };
     report("rounded rectangle", both(&out, lags_s, &distance), bar);
 }
@@ -248,7 +284,12 @@ fn streamed(curve: &dyn Fn(f64) -> [f64; 2], rate: f64) -> Vec<Output> {
     let mut stream: Stream = Stream::new(&plan, nm(at(0)), 0, false);
     let ticks = ((laps + start) / DT) as usize + 300;
     (0..ticks)
-        .map(|n| stream.tick(Some(StreamSample { sequence: n as u16, position_nm: nm(at(n)) })))
+        .map(|n| {
+            stream.tick(Some(StreamSample {
+                sequence: n as u16,
+                position_nm: nm(at(n)),
+            }))
+        })
         .collect()
 }
 
@@ -257,11 +298,19 @@ fn streamed_ellipse_and_figure_of_eight() {
     let ellipse = |u: f64| [0.05 * u.cos(), 0.03 * u.sin()];
     let eight = |u: f64| [0.05 * u.sin(), 0.03 * (2.0 * u).sin()];
     #[allow(clippy::type_complexity, reason = "a table of curves, read once")]
-    let shapes: [(&str, &dyn Fn(f64) -> [f64; 2], f64, f64); 2] =
-        [("ellipse", &ellipse, 5.0, 0.02), ("figure of eight", &eight, 4.0, 0.05)];
+    let shapes: [(&str, &dyn Fn(f64) -> [f64; 2], f64, f64); 2] = [
+        ("ellipse", &ellipse, 5.0, 0.02),
+        ("figure of eight", &eight, 4.0, 0.05),
+    ];
     for (name, curve, rate, bar) in shapes {
         let out = streamed(curve, rate);
-        let points: Vec<[f64; 2]> = (0..=1500).map(|i| curve(2.0 * PI * f64::from(i) / 1500.0)).collect();
-        report(name, both(&out, &LAG_S, &|p| from_polyline(&points, p)), bar);
+        let points: Vec<[f64; 2]> = (0..=1500)
+            .map(|i| curve(2.0 * PI * f64::from(i) / 1500.0))
+            .collect();
+        report(
+            name,
+            both(&out, &LAG_S, &|p| from_polyline(&points, p)),
+            bar,
+        );
     }
 }

@@ -41,8 +41,15 @@ impl Random {
 fn table(random: &mut Random) -> Table {
     // Lag and average, or the source paper's robot.
     let (lag, average) = (random.within(0.0, 0.015), random.within(0.0, 0.04));
-    let chain = [lag * lag + average * average / 12.0, 6.0 * lag.powi(4) - average.powi(4) / 120.0];
-    let [k2, k4] = if random.once_in(2) { chain } else { [46.58e-6, -5.5265e-6] };
+    let chain = [
+        lag * lag + average * average / 12.0,
+        6.0 * lag.powi(4) - average.powi(4) / 120.0,
+    ];
+    let [k2, k4] = if random.once_in(2) {
+        chain
+    } else {
+        [46.58e-6, -5.5265e-6]
+    };
     let mut terms = heapless::Vec::new();
     let mut term = |term| {
         if random.once_in(2) {
@@ -51,40 +58,83 @@ fn table(random: &mut Random) -> Table {
     };
     term(Term::ScaleMismatch { relative: 100e-6 });
     term(Term::Squareness { shear_rad: -80e-6 });
-    term(Term::ServoMismatch { delta_tau_s: 100e-6 });
-    term(Term::Backlash { axis: Axis::X, step_m: 12e-6 });
-    term(Term::LateralPlay { axis: Axis::Y, shift_m: 7e-6 });
-    term(Term::ReversalSpike { axis: Axis::X, peak_m: 8e-6, decay_s: 0.05 });
-    term(Term::Cyclic { axis: Axis::Y, amplitude_m: 3e-6, pitch_m: 0.01, phase_rad: 0.5 });
-    term(Term::Straightness { axis: Axis::X, curvature_per_m: 1e-4 });
+    term(Term::ServoMismatch {
+        delta_tau_s: 100e-6,
+    });
+    term(Term::Backlash {
+        axis: Axis::X,
+        step_m: 12e-6,
+    });
+    term(Term::LateralPlay {
+        axis: Axis::Y,
+        shift_m: 7e-6,
+    });
+    term(Term::ReversalSpike {
+        axis: Axis::X,
+        peak_m: 8e-6,
+        decay_s: 0.05,
+    });
+    term(Term::Cyclic {
+        axis: Axis::Y,
+        amplitude_m: 3e-6,
+        pitch_m: 0.01,
+        phase_rad: 0.5,
+    });
+    term(Term::Straightness {
+        axis: Axis::X,
+        curvature_per_m: 1e-4,
+    });
     let zone = Zone {
         place_m: None,
         radius_m: [0.001, 2.0],
         feed_m_s: [0.001, 5.0],
         travel: Travel::Both,
-        cumulants: Cumulants { kappa2_s2: k2 as f32, kappa4_s4: k4 as f32 },
+        cumulants: Cumulants {
+            kappa2_s2: k2 as f32,
+            kappa4_s4: k4 as f32,
+        },
         terms,
     };
     Table {
         machine: heapless::String::new(),
         zones: [zone].into_iter().collect(),
-        limits: Limits { offset_m: 0.02, slew_m_s: 0.2 },
+        limits: Limits {
+            offset_m: 0.02,
+            slew_m_s: 0.2,
+        },
     }
 }
 
 pub(super) fn segment(random: &mut Random, from_m: [f64; 3]) -> Segment {
     let feed_m_s = random.within(0.01, 0.9);
     match random.bits() % 4 {
-        0 => Segment::Line { to_m: random.point(), feed_m_s },
-        1 => Segment::Dwell { time_s: random.within(0.001, 0.2) },
+        0 => Segment::Line {
+            to_m: random.point(),
+            feed_m_s,
+        },
+        1 => Segment::Dwell {
+            time_s: random.within(0.001, 0.2),
+        },
         _ => {
             let radius = random.within(0.01, 0.2);
             let angle = random.within(0.0, TAU);
-            let centre_m = [from_m[0] + radius * angle.cos(), from_m[1] + radius * angle.sin(), from_m[2]];
-            let tilt = if random.once_in(2) { random.within(-0.5, 0.5) } else { 0.0 };
+            let centre_m = [
+                from_m[0] + radius * angle.cos(),
+                from_m[1] + radius * angle.sin(),
+                from_m[2],
+            ];
+            let tilt = if random.once_in(2) {
+                random.within(-0.5, 0.5)
+            } else {
+                0.0
+            };
             // Across the arm, so that the radius stays what it was meant to be.
             let normal = [-tilt * angle.sin(), tilt * angle.cos(), 1.0];
-            let rise_m = if random.once_in(3) { random.within(-0.05, 0.05) } else { 0.0 };
+            let rise_m = if random.once_in(3) {
+                random.within(-0.05, 0.05)
+            } else {
+                0.0
+            };
             Segment::Arc {
                 centre_m,
                 normal,
@@ -130,7 +180,11 @@ fn endure(ticks: u64, seed: u64) -> Tally {
 fn program(random: &mut Random, engine: &mut Engine, config: &Config, tally: &mut Tally) {
     let from_m = engine.executor.rest_nm().map(|nm| f64::from(nm) * 1e-9);
     let accepted = if random.once_in(3) {
-        let direction = if random.once_in(2) { Direction::Ccw } else { Direction::Cw };
+        let direction = if random.once_in(2) {
+            Direction::Ccw
+        } else {
+            Direction::Cw
+        };
         let radius_m = random.within(0.02, 0.3);
         // Within what the acceleration allows, so that the check below holds.
         let feed_m_s = random.within(0.01, 0.9f64.min((3.0 * radius_m).sqrt()));
@@ -146,7 +200,10 @@ fn program(random: &mut Random, engine: &mut Engine, config: &Config, tally: &mu
     } else {
         let first = engine.push(&segment(random, from_m));
         if first.is_ok() && random.once_in(2) {
-            let _ = engine.push(&Segment::Line { to_m: random.point(), feed_m_s: random.within(0.05, 0.9) });
+            let _ = engine.push(&Segment::Line {
+                to_m: random.point(),
+                feed_m_s: random.within(0.05, 0.9),
+            });
         }
         first
     };
@@ -163,7 +220,11 @@ fn program(random: &mut Random, engine: &mut Engine, config: &Config, tally: &mu
     while !engine.idle() {
         if disturb && n == stop_at {
             (disturbed, overrun) = (true, random.once_in(2));
-            if overrun { engine.overrun() } else { engine.stop() }
+            if overrun {
+                engine.overrun()
+            } else {
+                engine.stop()
+            }
         }
         if disturb && n == bypass_at {
             engine.set_bypass(!engine.bypass());
@@ -178,38 +239,57 @@ fn program(random: &mut Random, engine: &mut Engine, config: &Config, tally: &mu
             }
         }
         let cause = overrun.then_some(Fault::Overrun);
-        assert_eq!(engine.fault(), cause, "a fault without its cause at tick {}", tally.ticks);
+        assert_eq!(
+            engine.fault(),
+            cause,
+            "a fault without its cause at tick {}",
+            tally.ticks
+        );
         before = Some(out);
         n += 1;
         tally.ticks += 1;
     }
-    tally.cuts += u64::from(engine.counters().offset_cuts + engine.counters().slew_cuts - cuts_before);
+    tally.cuts +=
+        u64::from(engine.counters().offset_cuts + engine.counters().slew_cuts - cuts_before);
     if disturbed {
         tally.stopped += u64::from(!overrun);
         tally.overruns += u64::from(overrun);
         assert!(engine.clear_fault());
     } else {
-        assert_eq!(engine.executor.rest_nm(), planned_nm, "the phase at the end is that of the plan");
+        assert_eq!(
+            engine.executor.rest_nm(),
+            planned_nm,
+            "the phase at the end is that of the plan"
+        );
         tally.exact += 1;
     }
     assert!(before.is_none_or(|o| o.flags & flag::CRUISE == 0));
 }
 
 fn wanted(name: &str, otherwise: u64) -> u64 {
-    std::env::var(name).ok().and_then(|value| value.parse().ok()).unwrap_or(otherwise)
+    std::env::var(name)
+        .ok()
+        .and_then(|value| value.parse().ok())
+        .unwrap_or(otherwise)
 }
 
 #[test]
 fn endurance_in_short() {
     let tally = endure(1_000_000, 1);
     std::println!("seed 1: {tally:?}");
-    assert!(tally.exact > 100 && tally.stopped > 10 && tally.overruns > 10, "{tally:?}");
+    assert!(
+        tally.exact > 100 && tally.stopped > 10 && tally.overruns > 10,
+        "{tally:?}"
+    );
 }
 
 #[test]
 #[ignore = "minutes"]
 fn endurance() {
-    let (ticks, seed) = (wanted("GIOTTO_TICKS", 1_000_000_000), wanted("GIOTTO_SEED", 1));
+    let (ticks, seed) = (
+        wanted("GIOTTO_TICKS", 1_000_000_000),
+        wanted("GIOTTO_SEED", 1),
+    );
     let tally = endure(ticks, seed);
     std::println!("seed {seed}: {tally:?}");
     assert!(tally.ticks >= ticks && tally.exact > 0);

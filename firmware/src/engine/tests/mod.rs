@@ -18,13 +18,19 @@ pub(crate) fn table(kappa2_s2: f32, kappa4_s4: f32) -> Table {
         radius_m: [0.001, 2.0],
         feed_m_s: [0.001, 5.0],
         travel: Travel::Both,
-        cumulants: Cumulants { kappa2_s2, kappa4_s4 },
+        cumulants: Cumulants {
+            kappa2_s2,
+            kappa4_s4,
+        },
         terms: heapless::Vec::new(),
     };
     Table {
         machine: heapless::String::new(),
         zones: [zone].into_iter().collect(),
-        limits: Limits { offset_m: 0.05, slew_m_s: 1.0 },
+        limits: Limits {
+            offset_m: 0.05,
+            slew_m_s: 1.0,
+        },
     }
 }
 
@@ -50,15 +56,28 @@ fn deviation_from_law(
     (config.offset_m, config.slew_m_s) = (0.05, 1.0);
     let mut engine = Engine::new(config).unwrap();
     engine.load(Some(&table(kappa[0], kappa[1]))).unwrap();
-    let run =
-        CircleRun { centre_m: [0.01, -0.02, 0.5], radius_m, feed_m_s, direction, laps: 2, start_rad: 0.3 };
+    let run = CircleRun {
+        centre_m: [0.01, -0.02, 0.5],
+        radius_m,
+        feed_m_s,
+        direction,
+        laps: 2,
+        start_rad: 0.3,
+    };
     engine.run_circle(&run).unwrap();
     let out = run_out(&mut engine);
     // The circle is what follows the last settling.
-    let first = out.iter().rposition(|o| o.flags & flag::SETTLING != 0).unwrap() + 1;
+    let first = out
+        .iter()
+        .rposition(|o| o.flags & flag::SETTLING != 0)
+        .unwrap()
+        + 1;
     let ticks = &out[first..];
     let cruise = ticks.iter().filter(|o| o.flags & flag::CRUISE != 0).count();
-    let ramp = ticks.iter().position(|o| o.flags & flag::CRUISE != 0).unwrap();
+    let ramp = ticks
+        .iter()
+        .position(|o| o.flags & flag::CRUISE != 0)
+        .unwrap();
     let dt = 1e-3;
     let (t_ramp, t_cruise) = (ramp as f64 * dt, cruise as f64 * dt);
     let d = f64::from(direction.sign());
@@ -77,7 +96,10 @@ fn deviation_from_law(
             let left = 2.0 * t_ramp + t_cruise - t;
             let (i, s) = ramp_taylor(left / t_ramp, t_ramp);
             let mirrored = [s[0], -s[1], s[2], -s[3]];
-            (rate * (t_cruise + t_ramp / 2.0 - t_ramp * i), mirrored.map(|s| s * rate))
+            (
+                rate * (t_cruise + t_ramp / 2.0 - t_ramp * i),
+                mirrored.map(|s| s * rate),
+            )
         };
         let theta = theta + 0.3;
         let mut q = [(theta.cos(), theta.sin()); 5];
@@ -90,7 +112,11 @@ fn deviation_from_law(
             q[n + 1] = (sum.0 / (n + 1) as f64, sum.1 / (n + 1) as f64);
         }
         // κ3 of lag and average, as far as it points outward; none where there is no such chain.
-        let third = if k4 > 0.0 { 2.0 * 0.02f64.powi(3) / 6.0 } else { 0.0 };
+        let third = if k4 > 0.0 {
+            2.0 * 0.02f64.powi(3) / 6.0
+        } else {
+            0.0
+        };
         let radial = third * 6.0 * (q[3].0 * q[0].0 + q[3].1 * q[0].1);
         let law = |p: f64, p2: f64, p4: f64| p - k2 / 2.0 * p2 + (k2 * k2 / 8.0 - k4 / 24.0) * p4;
         let expected = [
@@ -105,7 +131,10 @@ fn deviation_from_law(
         }
         assert_eq!(o.corrected_nm[2], 500_000_000);
     }
-    assert_eq!(engine.counters().offset_cuts + engine.counters().slew_cuts, 0);
+    assert_eq!(
+        engine.counters().offset_cuts + engine.counters().slew_cuts,
+        0
+    );
     (worst_nominal, worst_corrected, ticks.len())
 }
 
@@ -151,7 +180,8 @@ fn set_points_are_the_law_to_a_tenth_of_a_micrometre() {
 fn no_jump(out: &[Output], most_m: f64) {
     for pair in out.windows(2) {
         for axis in 0..3 {
-            let jump = f64::from(pair[1].corrected_nm[axis] - pair[0].corrected_nm[axis]).abs() * 1e-9;
+            let jump =
+                f64::from(pair[1].corrected_nm[axis] - pair[0].corrected_nm[axis]).abs() * 1e-9;
             assert!(jump <= most_m, "{jump} m in one tick: {pair:?}");
         }
     }

@@ -19,7 +19,14 @@ fn engine() -> Engine {
 
 fn circle(feed_m_s: f64) -> CircleRun {
     let centre_m = [0.05, 0.0, 0.0];
-    CircleRun { centre_m, radius_m: 0.05, feed_m_s, direction: Direction::Ccw, laps: 1, start_rad: PI }
+    CircleRun {
+        centre_m,
+        radius_m: 0.05,
+        feed_m_s,
+        direction: Direction::Ccw,
+        laps: 1,
+        start_rad: PI,
+    }
 }
 
 /// Largest rate of change, in any axis, of the programmed and the commanded velocity, m/s².
@@ -49,11 +56,24 @@ fn ramps_are_long_enough_for_the_bounds_of_the_table() {
         engine.load(Some(&table)).unwrap();
         engine.run_circle(&circle(0.3)).unwrap();
         let out = run_out(&mut engine);
-        let size = |o: &Output| (0..3).map(|i| (o.corrected_nm[i] - o.nominal_nm[i]).abs()).max().unwrap();
+        let size = |o: &Output| {
+            (0..3)
+                .map(|i| (o.corrected_nm[i] - o.nominal_nm[i]).abs())
+                .max()
+                .unwrap()
+        };
         let cuts = engine.counters().offset_cuts + engine.counters().slew_cuts;
         // The circle is what follows the last settling.
-        let circle = out.iter().rev().position(|o| o.flags & flag::SETTLING != 0).unwrap();
-        (circle, cuts, f64::from(out.iter().map(size).max().unwrap()) * 1e-9)
+        let circle = out
+            .iter()
+            .rev()
+            .position(|o| o.flags & flag::SETTLING != 0)
+            .unwrap();
+        (
+            circle,
+            cuts,
+            f64::from(out.iter().map(size).max().unwrap()) * 1e-9,
+        )
     };
     let (quick, cuts, asked_m) = run(0.05, 1.0);
     std::println!("without bounds: {quick} ticks, {asked_m} m at most");
@@ -62,22 +82,37 @@ fn ramps_are_long_enough_for_the_bounds_of_the_table() {
         let (ticks, cuts, largest_m) = run(offset_m, slew_m_s);
         std::println!("{offset_m} m, {slew_m_s} m/s: {ticks} ticks, {largest_m} m at most");
         assert_eq!(cuts, 0, "{offset_m} {slew_m_s}");
-        assert!(ticks > quick && largest_m <= f64::from(offset_m), "{ticks} {largest_m}");
+        assert!(
+            ticks > quick && largest_m <= f64::from(offset_m),
+            "{ticks} {largest_m}"
+        );
     }
     // Beyond the bounds at constant rate: no ramp can help, and none is made longer than it has to be.
     let (ticks, cuts, largest_m) = run(0.3e-3, 1.0);
-    assert!(ticks == quick && cuts > 0 && largest_m <= 0.3e-3 + 1e-9, "{ticks} {cuts} {largest_m}");
+    assert!(
+        ticks == quick && cuts > 0 && largest_m <= 0.3e-3 + 1e-9,
+        "{ticks} {cuts} {largest_m}"
+    );
 }
 
 /// A rounded rectangle in the plane, 100 × 60 mm with corners of 10 mm, exact stops between its pieces.
 fn rounded_rectangle(engine: &mut Engine, feed_m_s: f64) -> Vec<Output> {
     let (w, h, r) = (0.1, 0.06, 0.01);
     let mut out = Vec::new();
-    let pieces =
-        [([w - r, 0.0], [w - r, r]), ([w, h - r], [w - r, h - r]), ([r, h], [r, h - r]), ([0.0, r], [r, r])];
+    let pieces = [
+        ([w - r, 0.0], [w - r, r]),
+        ([w, h - r], [w - r, h - r]),
+        ([r, h], [r, h - r]),
+        ([0.0, r], [r, r]),
+    ];
     engine.set_position([10_000_000, 0, 0]).unwrap();
     for (to, centre) in pieces {
-        engine.push(&Segment::Line { to_m: [to[0], to[1], 0.0], feed_m_s }).unwrap();
+        engine
+            .push(&Segment::Line {
+                to_m: [to[0], to[1], 0.0],
+                feed_m_s,
+            })
+            .unwrap();
         let arc = Segment::Arc {
             centre_m: [centre[0], centre[1], 0.0],
             normal: [0.0, 0.0, 1.0],
@@ -97,14 +132,27 @@ fn pieces_join_exactly_and_the_path_closes() {
     let out = rounded_rectangle(&mut engine, 0.2);
     let last = out.last().unwrap();
     for (axis, end) in [10_000_000, 0, 0].into_iter().enumerate() {
-        assert!((last.nominal_nm[axis] - end).abs() <= 20, "{:?}", last.nominal_nm);
+        assert!(
+            (last.nominal_nm[axis] - end).abs() <= 20,
+            "{:?}",
+            last.nominal_nm
+        );
     }
     assert_eq!(last.nominal_nm, last.corrected_nm);
-    assert_eq!((engine.counters().dropped, engine.counters().segments, engine.fault()), (0, 8, None));
+    assert_eq!(
+        (
+            engine.counters().dropped,
+            engine.counters().segments,
+            engine.fault()
+        ),
+        (0, 8, None)
+    );
     // The operator adds κ2/2 times the jerk to the velocity.
     no_jump(&out, 0.24 * DT);
     let (nominal, corrected) = accelerations(&out);
-    std::println!("rounded rectangle, 0.2 m/s: programmed {nominal:.3} m/s², commanded {corrected:.3} m/s²");
+    std::println!(
+        "rounded rectangle, 0.2 m/s: programmed {nominal:.3} m/s², commanded {corrected:.3} m/s²"
+    );
     // 0.2²/0.01 = 4 m/s² in the corners; the limit is 5 m/s².
     assert!(nominal <= 5.0 && corrected <= 5.0, "{nominal} {corrected}");
 }
@@ -117,20 +165,34 @@ fn random_programs_keep_the_configured_acceleration_on_the_commanded_path() {
     let (mut worst, mut closest) = (0.0f64, 0);
     for _ in 0..150 {
         let from_m = engine.planner.position_nm().map(|nm| f64::from(nm) * 1e-9);
-        let pieces = [segment(&mut random, from_m), Segment::Line { to_m: random.point(), feed_m_s: 0.9 }];
+        let pieces = [
+            segment(&mut random, from_m),
+            Segment::Line {
+                to_m: random.point(),
+                feed_m_s: 0.9,
+            },
+        ];
         for piece in pieces {
             // Helices too steep are refused.
             let refused = engine.push(&piece).err();
-            assert!(refused.is_none_or(|why| why == Refused::OutOfBounds(Quantity::Rise)), "{refused:?}");
+            assert!(
+                refused.is_none_or(|why| why == Refused::OutOfBounds(Quantity::Rise)),
+                "{refused:?}"
+            );
         }
         let out = run_out(&mut engine);
         let (nominal, corrected) = accelerations(&out);
         // Second differences of whole nanometres at 1 kHz: 0.004 m/s².
-        assert!(nominal <= 5.004 && corrected <= 5.004, "{nominal} {corrected} {pieces:?}");
+        assert!(
+            nominal <= 5.004 && corrected <= 5.004,
+            "{nominal} {corrected} {pieces:?}"
+        );
         worst = worst.max(corrected);
         closest += i32::from(corrected > 4.5);
     }
-    std::println!("largest commanded acceleration {worst:.3} m/s², above 4.5 in {closest} of 150 programs");
+    std::println!(
+        "largest commanded acceleration {worst:.3} m/s², above 4.5 in {closest} of 150 programs"
+    );
     // It is used, too.
     assert!(closest > 30);
 }
@@ -139,7 +201,9 @@ fn random_programs_keep_the_configured_acceleration_on_the_commanded_path() {
 fn a_helix_rises_evenly_and_ends_where_it_should() {
     for (sweep, rise) in [(5.0 * PI, 0.04), (-3.3 * PI, -0.03), (0.7, 0.001)] {
         let mut engine = engine();
-        engine.set_position([60_000_000, 5_000_000, 1_000_000]).unwrap();
+        engine
+            .set_position([60_000_000, 5_000_000, 1_000_000])
+            .unwrap();
         let normal = [0.0, 0.0, 2.0];
         let helix = Segment::Arc {
             centre_m: [0.01, 0.005, 0.3],
@@ -154,19 +218,32 @@ fn a_helix_rises_evenly_and_ends_where_it_should() {
         let mut before = 0.0;
         for o in &out {
             // Height belongs to the angle travelled, unwrapped from one set-point to the next.
-            let (x, y) =
-                (f64::from(o.nominal_nm[0]) * 1e-9 - 0.01, f64::from(o.nominal_nm[1]) * 1e-9 - 0.005);
+            let (x, y) = (
+                f64::from(o.nominal_nm[0]) * 1e-9 - 0.01,
+                f64::from(o.nominal_nm[1]) * 1e-9 - 0.005,
+            );
             assert!((x.hypot(y) - 0.05).abs() < 3e-9);
             let turns = ((y.atan2(x) - before) / (2.0 * PI)).round();
             let angle = y.atan2(x) - 2.0 * PI * turns;
             before = angle;
             let height = f64::from(o.nominal_nm[2]) * 1e-9 - 0.001;
-            assert!((height - angle / sweep * rise).abs() < 5e-9, "{height} at {angle}");
+            assert!(
+                (height - angle / sweep * rise).abs() < 5e-9,
+                "{height} at {angle}"
+            );
         }
         let end = out.last().unwrap().nominal_nm;
-        let expected = [0.01 + 0.05 * sweep.cos(), 0.005 + 0.05 * sweep.sin(), 0.001 + rise].map(|m| m * 1e9);
+        let expected = [
+            0.01 + 0.05 * sweep.cos(),
+            0.005 + 0.05 * sweep.sin(),
+            0.001 + rise,
+        ]
+        .map(|m| m * 1e9);
         for axis in 0..3 {
-            assert!((f64::from(end[axis]) - expected[axis]).abs() < 5.0, "{end:?} {expected:?}");
+            assert!(
+                (f64::from(end[axis]) - expected[axis]).abs() < 5.0,
+                "{end:?} {expected:?}"
+            );
         }
     }
 }
@@ -188,7 +265,12 @@ fn a_stop_at_any_tick_keeps_the_limits_and_leaves_a_usable_engine() {
     for at in (0..whole).step_by(13) {
         let mut engine = engine();
         engine.run_circle(&run).unwrap();
-        engine.push(&Segment::Line { to_m: [0.2, 0.2, 0.2], feed_m_s: 0.1 }).unwrap();
+        engine
+            .push(&Segment::Line {
+                to_m: [0.2, 0.2, 0.2],
+                feed_m_s: 0.1,
+            })
+            .unwrap();
         let mut out: Vec<Output> = (0..at).map(|_| engine.tick()).collect();
         engine.stop();
         let rest = run_out(&mut engine);
@@ -206,7 +288,12 @@ fn a_stop_at_any_tick_keeps_the_limits_and_leaves_a_usable_engine() {
         assert_eq!(last.nominal_nm, last.corrected_nm, "at {at}");
         assert!(engine.counters().stops == 1 && engine.counters().segments <= 2);
         // It goes on from there.
-        engine.push(&Segment::Line { to_m: [0.1, 0.1, 0.1], feed_m_s: 0.2 }).unwrap();
+        engine
+            .push(&Segment::Line {
+                to_m: [0.1, 0.1, 0.1],
+                feed_m_s: 0.2,
+            })
+            .unwrap();
         let on = run_out(&mut engine);
         assert_eq!(on.last().unwrap().nominal_nm, [100_000_000; 3], "at {at}");
         no_jump(&on, 0.25 * DT);
@@ -223,8 +310,17 @@ fn bypass_comes_and_goes_without_a_step_and_equals_the_program_bit_for_bit() {
         engine.tick();
     }
     engine.run_circle(&circle(0.3)).unwrap();
-    assert!(run_out(&mut engine).iter().all(|o| o.nominal_nm == o.corrected_nm));
-    engine.run_circle(&CircleRun { laps: 4, ..circle(0.3) }).unwrap();
+    assert!(
+        run_out(&mut engine)
+            .iter()
+            .all(|o| o.nominal_nm == o.corrected_nm)
+    );
+    engine
+        .run_circle(&CircleRun {
+            laps: 4,
+            ..circle(0.3)
+        })
+        .unwrap();
     let mut out: Vec<Output> = Vec::new();
     while !engine.idle() {
         match out.len() % 1100 {
@@ -237,7 +333,10 @@ fn bypass_comes_and_goes_without_a_step_and_equals_the_program_bit_for_bit() {
         }
         out.push(engine.tick());
     }
-    let corrected = out.iter().filter(|o| o.nominal_nm != o.corrected_nm).count();
+    let corrected = out
+        .iter()
+        .filter(|o| o.nominal_nm != o.corrected_nm)
+        .count();
     assert!(corrected > 1000 && corrected + 1000 < out.len());
     no_jump(&out, 0.54 * DT);
     let (nominal, commanded) = accelerations(&out);
@@ -277,7 +376,11 @@ fn nothing_outside_its_zone_is_corrected_and_that_is_counted() {
     table.zones[0].feed_m_s = [0.6, 1.0];
     engine.load(Some(&table)).unwrap();
     engine.run_circle(&circle(0.3)).unwrap();
-    assert!(run_out(&mut engine).iter().all(|o| o.nominal_nm == o.corrected_nm));
+    assert!(
+        run_out(&mut engine)
+            .iter()
+            .all(|o| o.nominal_nm == o.corrected_nm)
+    );
     // The approach and the circle.
     assert_eq!(engine.counters().uncorrected, 2);
 }
@@ -286,18 +389,45 @@ fn nothing_outside_its_zone_is_corrected_and_that_is_counted() {
 fn numbers_that_are_none_and_programs_out_of_bounds_are_refused() {
     let mut engine = engine();
     let bad = [
-        CircleRun { radius_m: f64::NAN, ..circle(0.3) },
-        CircleRun { radius_m: -0.1, ..circle(0.3) },
-        CircleRun { radius_m: 3.0, ..circle(0.3) },
-        CircleRun { feed_m_s: f64::INFINITY, ..circle(0.3) },
-        CircleRun { laps: 0, ..circle(0.3) },
-        CircleRun { feed_m_s: 1.1, ..circle(0.3) },
-        CircleRun { centre_m: [2.09, 0.0, 0.0], ..circle(0.3) },
-        CircleRun { start_rad: f64::NAN, ..circle(0.3) },
+        CircleRun {
+            radius_m: f64::NAN,
+            ..circle(0.3)
+        },
+        CircleRun {
+            radius_m: -0.1,
+            ..circle(0.3)
+        },
+        CircleRun {
+            radius_m: 3.0,
+            ..circle(0.3)
+        },
+        CircleRun {
+            feed_m_s: f64::INFINITY,
+            ..circle(0.3)
+        },
+        CircleRun {
+            laps: 0,
+            ..circle(0.3)
+        },
+        CircleRun {
+            feed_m_s: 1.1,
+            ..circle(0.3)
+        },
+        CircleRun {
+            centre_m: [2.09, 0.0, 0.0],
+            ..circle(0.3)
+        },
+        CircleRun {
+            start_rad: f64::NAN,
+            ..circle(0.3)
+        },
     ];
     for run in bad {
         assert!(
-            matches!(engine.run_circle(&run), Err(Refused::NotANumber(_) | Refused::OutOfBounds(_))),
+            matches!(
+                engine.run_circle(&run),
+                Err(Refused::NotANumber(_) | Refused::OutOfBounds(_))
+            ),
             "{run:?}"
         );
     }
@@ -307,11 +437,21 @@ fn numbers_that_are_none_and_programs_out_of_bounds_are_refused() {
         match change {
             0 => table.zones[0].cumulants.kappa2_s2 = f32::NAN,
             1 => table.limits.offset_m = f32::INFINITY,
-            _ => table.zones[0].terms.push(Term::Squareness { shear_rad: f32::NAN }).unwrap(),
+            _ => table.zones[0]
+                .terms
+                .push(Term::Squareness {
+                    shear_rad: f32::NAN,
+                })
+                .unwrap(),
         }
         assert!(engine.load(Some(&table)).is_err(), "{name}");
     }
-    let cyclic = Term::Cyclic { axis: Axis::X, amplitude_m: 1e-6, pitch_m: 0.01, phase_rad: 0.0 };
+    let cyclic = Term::Cyclic {
+        axis: Axis::X,
+        amplitude_m: 1e-6,
+        pitch_m: 0.01,
+        phase_rad: 0.0,
+    };
     let mut table = table(KAPPA[0], KAPPA[1]);
     table.zones[0].terms.extend([cyclic; 3]);
     assert!(engine.load(Some(&table)).is_err());
@@ -330,7 +470,10 @@ fn an_overrun_stops_and_latches_until_cleared() {
     assert!(engine.clear_fault());
     engine.run_circle(&circle(0.3)).unwrap();
     run_out(&mut engine);
-    assert_eq!((engine.counters().overruns, engine.counters().segments > 0), (1, true));
+    assert_eq!(
+        (engine.counters().overruns, engine.counters().segments > 0),
+        (1, true)
+    );
 }
 
 /// Twelve days at 1 kHz on one circle: the phase at the end is that of the plan, to the nanometre.
@@ -338,7 +481,13 @@ fn an_overrun_stops_and_latches_until_cleared() {
 fn a_billion_ticks_do_not_drift() {
     let mut engine = engine();
     let laps = 910_000;
-    engine.run_circle(&CircleRun { laps, feed_m_s: 0.283, ..circle(0.3) }).unwrap();
+    engine
+        .run_circle(&CircleRun {
+            laps,
+            feed_m_s: 0.283,
+            ..circle(0.3)
+        })
+        .unwrap();
     let mut first = engine.tick();
     // The approach is the first segment.
     while engine.counters().segments == 0 || first.flags & flag::CRUISE == 0 {
@@ -352,7 +501,10 @@ fn a_billion_ticks_do_not_drift() {
     let rest = run_out(&mut engine);
     let laps_done = rest.iter().filter(|o| o.flags & flag::CRUISE != 0).count();
     assert_eq!(laps_done, 1_000_000);
-    let last_cruise = rest.iter().rposition(|o| o.flags & flag::CRUISE != 0).unwrap();
+    let last_cruise = rest
+        .iter()
+        .rposition(|o| o.flags & flag::CRUISE != 0)
+        .unwrap();
     // One step before the first cruise tick the lap began; the last cruise tick ends the last lap.
     let end = rest[last_cruise].nominal_nm;
     let step = 0.283 * DT;

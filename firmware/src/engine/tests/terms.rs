@@ -16,11 +16,17 @@ fn error(term: &Term<f32>, path: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut turned = [0usize; 2];
     (0..path.len())
         .map(|n| {
-            let (before, here, after) =
-                (path[n.saturating_sub(1)], path[n], path[(n + 1).min(path.len() - 1)]);
+            let (before, here, after) = (
+                path[n.saturating_sub(1)],
+                path[n],
+                path[(n + 1).min(path.len() - 1)],
+            );
             let velocity = |i: usize| (after[i] - before[i]) / (2.0 * DT);
             // Ten ticks apart: the set-points' nanometre would be 1e-3 m/s² from one tick to the next.
-            let (early, late) = (path[n.saturating_sub(10)], path[(n + 10).min(path.len() - 1)]);
+            let (early, late) = (
+                path[n.saturating_sub(10)],
+                path[(n + 10).min(path.len() - 1)],
+            );
             let acceleration = |i: usize| (late[i] - 2.0 * here[i] + early[i]) / (100.0 * DT * DT);
             let rel = |i: usize| here[i] - CENTRE[i];
             for i in 0..2 {
@@ -42,7 +48,10 @@ fn error(term: &Term<f32>, path: &[[f64; 2]]) -> Vec<[f64; 2]> {
                     e = [0.5 * w(shear_rad) * rel(1), 0.5 * w(shear_rad) * rel(0)]
                 }
                 Term::ServoMismatch { delta_tau_s } => {
-                    e = [-0.5 * w(delta_tau_s) * velocity(0), 0.5 * w(delta_tau_s) * velocity(1)];
+                    e = [
+                        -0.5 * w(delta_tau_s) * velocity(0),
+                        0.5 * w(delta_tau_s) * velocity(1),
+                    ];
                 }
                 Term::BandwidthMismatch { delta_kappa2_s2 } => {
                     let k = 0.25 * w(delta_kappa2_s2);
@@ -52,22 +61,37 @@ fn error(term: &Term<f32>, path: &[[f64; 2]]) -> Vec<[f64; 2]> {
                     let i = axis.index();
                     e[i] = -0.5 * w(step_m) * velocity(i).signum();
                 }
-                Term::LateralPlay { axis: Axis::X, shift_m } => {
-                    e[1] = 0.5 * w(shift_m) * velocity(0).signum()
-                }
-                Term::LateralPlay { axis: Axis::Y, shift_m } => {
-                    e[0] = -0.5 * w(shift_m) * velocity(1).signum()
-                }
-                Term::ReversalSpike { axis, peak_m, decay_s } => {
+                Term::LateralPlay {
+                    axis: Axis::X,
+                    shift_m,
+                } => e[1] = 0.5 * w(shift_m) * velocity(0).signum(),
+                Term::LateralPlay {
+                    axis: Axis::Y,
+                    shift_m,
+                } => e[0] = -0.5 * w(shift_m) * velocity(1).signum(),
+                Term::ReversalSpike {
+                    axis,
+                    peak_m,
+                    decay_s,
+                } => {
                     let i = axis.index();
                     let since = (n - turned[i]) as f64 * DT;
                     e[i] = -w(peak_m) * (-since / w(decay_s)).exp() * velocity(i).signum();
                 }
-                Term::Cyclic { axis, amplitude_m, pitch_m, phase_rad } => {
-                    let at = core::f64::consts::TAU * here[axis.index()] / w(pitch_m) + w(phase_rad);
+                Term::Cyclic {
+                    axis,
+                    amplitude_m,
+                    pitch_m,
+                    phase_rad,
+                } => {
+                    let at =
+                        core::f64::consts::TAU * here[axis.index()] / w(pitch_m) + w(phase_rad);
                     e[axis.index()] = w(amplitude_m) * at.sin();
                 }
-                Term::Straightness { axis, curvature_per_m } => {
+                Term::Straightness {
+                    axis,
+                    curvature_per_m,
+                } => {
                     let i = axis.index();
                     e[1 - i] = w(curvature_per_m) * rel(i) * rel(i);
                 }
@@ -89,18 +113,35 @@ fn residual(term: Term<f32>, feed_m_s: f64, direction: Direction) -> (f64, f64) 
             table.zones[0].terms.push(term).unwrap();
         }
         engine.load(Some(&table)).unwrap();
-        let run =
-            CircleRun { centre_m: CENTRE, radius_m: RADIUS, feed_m_s, direction, laps: 2, start_rad: 0.4 };
+        let run = CircleRun {
+            centre_m: CENTRE,
+            radius_m: RADIUS,
+            feed_m_s,
+            direction,
+            laps: 2,
+            start_rad: 0.4,
+        };
         engine.run_circle(&run).unwrap();
         let out = run_out(&mut engine);
-        assert_eq!(engine.counters().offset_cuts + engine.counters().slew_cuts, 0);
+        assert_eq!(
+            engine.counters().offset_cuts + engine.counters().slew_cuts,
+            0
+        );
         super::no_jump(&out, 1.01 * feed_m_s.max(0.5) * DT + 20e-6);
         let metres = |p: [i32; 3]| [f64::from(p[0]) * 1e-9, f64::from(p[1]) * 1e-9];
-        let path: Vec<[f64; 2]> = out.iter().map(|o: &Output| metres(o.corrected_nm)).collect();
+        let path: Vec<[f64; 2]> = out
+            .iter()
+            .map(|o: &Output| metres(o.corrected_nm))
+            .collect();
         let error = error(&term, &path);
-        let first = out.iter().rposition(|o| o.flags & flag::SETTLING != 0).unwrap();
+        let first = out
+            .iter()
+            .rposition(|o| o.flags & flag::SETTLING != 0)
+            .unwrap();
         // The second lap: by then each axis has turned.
-        let cruise: Vec<usize> = (first..out.len()).filter(|&n| out[n].flags & flag::CRUISE != 0).collect();
+        let cruise: Vec<usize> = (first..out.len())
+            .filter(|&n| out[n].flags & flag::CRUISE != 0)
+            .collect();
         let deviations: Vec<f64> = cruise[cruise.len() / 2..]
             .iter()
             .map(|&n| {
@@ -123,24 +164,106 @@ fn each_term_is_undone() {
         (Term::ScaleError { relative: 200e-6 }, 0.001),
         (Term::ScaleMismatch { relative: 200e-6 }, 0.001),
         (Term::Squareness { shear_rad: 200e-6 }, 0.001),
-        (Term::ServoMismatch { delta_tau_s: 200e-6 }, 0.002),
-        (Term::BandwidthMismatch { delta_kappa2_s2: 500e-6 }, 0.01),
-        (Term::Backlash { axis: x, step_m: 20e-6 }, 0.1),
-        (Term::Backlash { axis: y, step_m: -20e-6 }, 0.1),
-        (Term::LateralPlay { axis: x, shift_m: 20e-6 }, 0.05),
-        (Term::LateralPlay { axis: y, shift_m: 20e-6 }, 0.05),
-        (Term::ReversalSpike { axis: x, peak_m: 15e-6, decay_s: 0.1 }, 0.2),
-        (Term::ReversalSpike { axis: y, peak_m: 15e-6, decay_s: 0.1 }, 0.2),
-        (Term::Cyclic { axis: x, amplitude_m: 5e-6, pitch_m: 0.01, phase_rad: 0.7 }, 0.005),
-        (Term::Cyclic { axis: y, amplitude_m: 5e-6, pitch_m: 0.007, phase_rad: -2.0 }, 0.005),
-        (Term::Straightness { axis: x, curvature_per_m: 1e-3 }, 0.002),
-        (Term::Straightness { axis: y, curvature_per_m: -1e-3 }, 0.002),
+        (
+            Term::ServoMismatch {
+                delta_tau_s: 200e-6,
+            },
+            0.002,
+        ),
+        (
+            Term::BandwidthMismatch {
+                delta_kappa2_s2: 500e-6,
+            },
+            0.01,
+        ),
+        (
+            Term::Backlash {
+                axis: x,
+                step_m: 20e-6,
+            },
+            0.1,
+        ),
+        (
+            Term::Backlash {
+                axis: y,
+                step_m: -20e-6,
+            },
+            0.1,
+        ),
+        (
+            Term::LateralPlay {
+                axis: x,
+                shift_m: 20e-6,
+            },
+            0.05,
+        ),
+        (
+            Term::LateralPlay {
+                axis: y,
+                shift_m: 20e-6,
+            },
+            0.05,
+        ),
+        (
+            Term::ReversalSpike {
+                axis: x,
+                peak_m: 15e-6,
+                decay_s: 0.1,
+            },
+            0.2,
+        ),
+        (
+            Term::ReversalSpike {
+                axis: y,
+                peak_m: 15e-6,
+                decay_s: 0.1,
+            },
+            0.2,
+        ),
+        (
+            Term::Cyclic {
+                axis: x,
+                amplitude_m: 5e-6,
+                pitch_m: 0.01,
+                phase_rad: 0.7,
+            },
+            0.005,
+        ),
+        (
+            Term::Cyclic {
+                axis: y,
+                amplitude_m: 5e-6,
+                pitch_m: 0.007,
+                phase_rad: -2.0,
+            },
+            0.005,
+        ),
+        (
+            Term::Straightness {
+                axis: x,
+                curvature_per_m: 1e-3,
+            },
+            0.002,
+        ),
+        (
+            Term::Straightness {
+                axis: y,
+                curvature_per_m: -1e-3,
+            },
+            0.002,
+        ),
     ];
     for (term, bar) in cases {
         for direction in [Direction::Ccw, Direction::Cw] {
             let (without, with) = residual(term, 0.1, direction);
-            std::println!("{:.4} of {without:.3} µm left: {term:?} {direction:?}", with / without);
-            assert!(without > 1.0 && with <= bar * without, "{term:?} {direction:?}: {with} of {without} µm");
+            std::println!(
+                "{:.4} of {without:.3} µm left: {term:?} {direction:?}",
+                with / without
+            );
+            assert!(
+                without > 1.0 && with <= bar * without,
+                "{term:?} {direction:?}: {with} of {without} µm"
+            );
         }
     }
 }

@@ -18,7 +18,11 @@ const SLOT: usize = 2048;
 const ERASE: usize = 512;
 const CELLS: usize = 2 * SLOT + ERASE;
 const LAYOUT: Layout = Layout::new([0, SLOT as u32], SLOT as u32).with_key(2 * SLOT as u32);
-const BOARD: Board = Board { name: "bench", build: "0", tick_hz: 1000 };
+const BOARD: Board = Board {
+    name: "bench",
+    build: "0",
+    tick_hz: 1000,
+};
 
 type Cells = RamFlash<CELLS, ERASE>;
 type Flash = PowerCut<CELLS, ERASE>;
@@ -36,7 +40,14 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        Self { table: None, bypass: true, state: MotionState::Idle, runs: 0, tick: 0, held: 0 }
+        Self {
+            table: None,
+            bypass: true,
+            state: MotionState::Idle,
+            runs: 0,
+            tick: 0,
+            held: 0,
+        }
     }
 }
 
@@ -136,21 +147,43 @@ struct Desk {
 
 /// Boots a controller whose flash has these cells.
 fn boot(cells: Cells, after: Option<u32>, tear: Tear) -> Desk {
-    let server = Server::boot(BOARD, Flash::new(cells, after, tear), LAYOUT, Bench::new(), Box::default());
+    let server = Server::boot(
+        BOARD,
+        Flash::new(cells, after, tear),
+        LAYOUT,
+        Bench::new(),
+        Box::default(),
+    );
     let mut desk = Desk { server, seq: 0 };
     assert!(matches!(desk.ask(Command::Hello), Some(Reply::Identity(_))));
     desk
 }
 
 fn frame(session: u16, seq: u16, command: Command) -> Vec<u8> {
-    wire::encode(&Request { session, seq, command }, &mut [0; MAX_FRAME]).unwrap().to_vec()
+    wire::encode(
+        &Request {
+            session,
+            seq,
+            command,
+        },
+        &mut [0; MAX_FRAME],
+    )
+    .unwrap()
+    .to_vec()
 }
 
 fn reply_in(frame: &[u8]) -> (u16, u16, Reply) {
     let mut accumulator = Accumulator::new();
-    let payload = frame.iter().find_map(|&byte| accumulator.push(byte).map(<[u8]>::to_vec)).unwrap();
+    let payload = frame
+        .iter()
+        .find_map(|&byte| accumulator.push(byte).map(<[u8]>::to_vec))
+        .unwrap();
     match postcard::from_bytes(&payload).unwrap() {
-        FromController::Reply { session, seq, reply } => (session, seq, reply),
+        FromController::Reply {
+            session,
+            seq,
+            reply,
+        } => (session, seq, reply),
         other => panic!("{other:?}"),
     }
 }
@@ -178,11 +211,16 @@ impl Desk {
     fn upload(&mut self, image: &[u8]) -> bool {
         let crc = wire::crc32(image);
         let chunks = image.chunks(CHUNK).enumerate();
-        self.done(Command::WriteBegin { length: image.len() as u16, crc })
-            && chunks.into_iter().all(|(index, data)| {
-                let offset = (index * CHUNK) as u16;
-                self.done(Command::WriteChunk { offset, data: Chunk::from_slice(data).unwrap() })
+        self.done(Command::WriteBegin {
+            length: image.len() as u16,
+            crc,
+        }) && chunks.into_iter().all(|(index, data)| {
+            let offset = (index * CHUNK) as u16;
+            self.done(Command::WriteChunk {
+                offset,
+                data: Chunk::from_slice(data).unwrap(),
             })
+        })
     }
 
     fn write(&mut self, image: &[u8]) -> bool {
@@ -222,13 +260,19 @@ fn image(name: &str) -> Vec<u8> {
         radius_m: [0.05, 0.3],
         feed_m_s: [0.02, 0.7],
         travel: Travel::Both,
-        cumulants: Cumulants { kappa2_s2: 4e-5, kappa4_s4: -5e-6 },
+        cumulants: Cumulants {
+            kappa2_s2: 4e-5,
+            kappa4_s4: -5e-6,
+        },
         terms: heapless::Vec::new(),
     };
     let table = Table {
         machine: name.try_into().unwrap(),
         zones: heapless::Vec::from_slice(&[zone]).unwrap(),
-        limits: Limits { offset_m: 1e-3, slew_m_s: 0.05 },
+        limits: Limits {
+            offset_m: 1e-3,
+            slew_m_s: 0.05,
+        },
     };
     let mut out = [0; MAX_IMAGE_BYTES];
     let length = table::encode(&table, &mut out).unwrap();

@@ -7,8 +7,16 @@ type Scenario = (&'static str, fn(&mut Desk) -> bool, Option<&'static str>);
 
 const SCENARIOS: [Scenario; 4] = [
     ("flash", |desk| desk.flash("new"), Some("new")),
-    ("write and commit, never confirm", |desk| desk.write(&image("new")) && desk.done(Command::Commit), None),
-    ("rollback", |desk| desk.done(Command::Rollback), Some("older")),
+    (
+        "write and commit, never confirm",
+        |desk| desk.write(&image("new")) && desk.done(Command::Commit),
+        None,
+    ),
+    (
+        "rollback",
+        |desk| desk.done(Command::Rollback),
+        Some("older"),
+    ),
     (
         "flash, then roll back",
         |desk| desk.flash("new") && desk.done(Command::Rollback),
@@ -25,7 +33,12 @@ fn starts() -> [(&'static str, Cells); 4] {
     assert!(two.flash("older") && two.flash("old"));
     let mut rolled = boot(Cells::new(), None, Tear::Untouched);
     assert!(rolled.flash("old") && rolled.flash("older") && rolled.done(Command::Rollback));
-    [("empty", empty.cells()), ("one", one.cells()), ("two", two.cells()), ("rolled", rolled.cells())]
+    [
+        ("empty", empty.cells()),
+        ("one", one.cells()),
+        ("two", two.cells()),
+        ("rolled", rolled.cells()),
+    ]
 }
 
 /// Boots and says which table corrects; panics if it is not one of those that were flashed.
@@ -60,18 +73,30 @@ fn any_cut_leaves_the_old_or_the_new_table() {
             let steps = whole.server.store_mut().flash_mut().steps();
             let new = promised.map(str::to_string);
             let finally = booted(whole.cells());
-            assert_eq!(finally, if new.is_some() { new.clone() } else { old.clone() }, "{start}: {what}");
+            assert_eq!(
+                finally,
+                if new.is_some() {
+                    new.clone()
+                } else {
+                    old.clone()
+                },
+                "{start}: {what}"
+            );
             for tear in Tear::ALL {
                 for after in 1..=steps {
                     let mut desk = boot(cells.clone(), Some(after), tear);
                     let promise = act(&mut desk);
                     let found = booted(desk.cells());
                     boots += 1;
-                    let case = std::format!("{start}: {what}, cut in step {after} of {steps}, {tear:?}");
+                    let case =
+                        std::format!("{start}: {what}, cut in step {after} of {steps}, {tear:?}");
                     if promise {
                         assert_eq!(found, finally, "{case}: promised, not kept");
                     } else if what == "flash, then roll back" {
-                        assert!(found == old || found.as_deref() == Some("new"), "{case}: {found:?}");
+                        assert!(
+                            found == old || found.as_deref() == Some("new"),
+                            "{case}: {found:?}"
+                        );
                     } else {
                         assert!(found == old || found == new, "{case}: {found:?}");
                     }
@@ -124,15 +149,27 @@ fn any_cut_can_be_repaired() {
 fn flash_that_does_not_read_back_is_never_committed() {
     let mut desk = boot(Cells::new(), None, Tear::Untouched);
     assert!(desk.flash("old"));
-    let mut desk = Desk { server: stuck(desk.cells()), seq: 0 };
+    let mut desk = Desk {
+        server: stuck(desk.cells()),
+        seq: 0,
+    };
     assert!(desk.ask(Command::Hello).is_some() && desk.upload(&image("new")));
     let reply = desk.ask(Command::WriteEnd);
-    assert!(matches!(reply, Some(Reply::Refused(Refusal::Flash(_)))), "{reply:?}");
+    assert!(
+        matches!(reply, Some(Reply::Refused(Refusal::Flash(_)))),
+        "{reply:?}"
+    );
     assert!(!desk.done(Command::Commit));
     assert_eq!(booted(desk.cells()).as_deref(), Some("old"));
 }
 
 /// A controller whose flash went dead during its second erase unit.
 fn stuck(cells: Cells) -> Server<Flash, Bench, Box<Buffers>> {
-    Server::boot(BOARD, Flash::new(cells, Some(2), Tear::Partly), LAYOUT, Bench::new(), Box::default())
+    Server::boot(
+        BOARD,
+        Flash::new(cells, Some(2), Tear::Partly),
+        LAYOUT,
+        Bench::new(),
+        Box::default(),
+    )
 }

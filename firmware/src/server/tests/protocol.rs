@@ -21,10 +21,19 @@ fn boots_in_bypass_without_a_table() {
     let status = desk.status();
     assert!(status.bypass);
     assert_eq!((status.active, status.slots), (None, [SlotState::Empty; 2]));
-    assert_eq!(refused(desk.ask(Command::Bypass { on: false })), Refusal::NoTable);
+    assert_eq!(
+        refused(desk.ask(Command::Bypass { on: false })),
+        Refusal::NoTable
+    );
     assert_eq!(refused(desk.ask(Command::Commit)), Refusal::NothingToCommit);
-    assert_eq!(refused(desk.ask(Command::Confirm)), Refusal::NothingToConfirm);
-    assert_eq!(refused(desk.ask(Command::Rollback)), Refusal::NothingToRollBack);
+    assert_eq!(
+        refused(desk.ask(Command::Confirm)),
+        Refusal::NothingToConfirm
+    );
+    assert_eq!(
+        refused(desk.ask(Command::Rollback)),
+        Refusal::NothingToRollBack
+    );
 }
 
 #[test]
@@ -34,10 +43,17 @@ fn flashed_table_survives_a_reset_and_bypass_does_not() {
     assert!(desk.status().bypass);
     let mut desk = desk.reboot();
     let status = desk.status();
-    assert_eq!((status.bypass, status.active, status.probation), (false, Some(0), Probation::None));
+    assert_eq!(
+        (status.bypass, status.active, status.probation),
+        (false, Some(0), Probation::None)
+    );
     assert_eq!(desk.correcting().as_deref(), Some("a"));
     let crc = table::Header::read(&image("a")).unwrap().crc;
-    let info = TableInfo { length: image("a").len() as u16, crc, generation: Some(1) };
+    let info = TableInfo {
+        length: image("a").len() as u16,
+        crc,
+        generation: Some(1),
+    };
     assert_eq!(status.slots, [SlotState::Table(info), SlotState::Empty]);
 }
 
@@ -88,7 +104,10 @@ fn rollback_on_probation_returns_at_once() {
     assert!(desk.flash("a") && desk.write(&image("b")) && desk.done(Command::Commit));
     assert!(desk.done(Command::Rollback));
     assert_eq!(desk.correcting().as_deref(), Some("a"));
-    assert_eq!(refused(desk.ask(Command::Rollback)), Refusal::NothingToRollBack);
+    assert_eq!(
+        refused(desk.ask(Command::Rollback)),
+        Refusal::NothingToRollBack
+    );
 }
 
 #[test]
@@ -110,7 +129,10 @@ fn a_bad_table_never_touches_the_flash() {
     let end = out_of_bounds.len();
     out_of_bounds[end - 8..end - 4].copy_from_slice(&1.0_f32.to_le_bytes());
     assert!(desk.upload(&out_of_bounds));
-    assert!(matches!(refused(desk.ask(Command::WriteEnd)), Refusal::Table(TableError::BadCrc { .. })));
+    assert!(matches!(
+        refused(desk.ask(Command::WriteEnd)),
+        Refusal::Table(TableError::BadCrc { .. })
+    ));
     let crc = {
         let mut bytes = out_of_bounds[..12].to_vec();
         bytes.extend(&out_of_bounds[16..]);
@@ -119,7 +141,10 @@ fn a_bad_table_never_touches_the_flash() {
     out_of_bounds[12..16].copy_from_slice(&crc.to_le_bytes());
     assert!(desk.upload(&out_of_bounds));
     let refusal = refused(desk.ask(Command::WriteEnd));
-    assert!(matches!(refusal, Refusal::Table(TableError::OutOfBounds { .. })), "{refusal}");
+    assert!(
+        matches!(refusal, Refusal::Table(TableError::OutOfBounds { .. })),
+        "{refusal}"
+    );
     assert_eq!(refused(desk.ask(Command::WriteEnd)), Refusal::NoUpload);
     assert_eq!(refused(desk.ask(Command::Commit)), Refusal::NothingToCommit);
     assert_eq!(desk.server.store_mut().flash_mut().steps(), steps);
@@ -134,12 +159,34 @@ fn uploads_are_in_order_and_whole() {
         data: Chunk::from_slice(&[0; CHUNK][..count]).unwrap(),
     };
     assert_eq!(refused(desk.ask(chunk(0, 1))), Refusal::NoUpload);
-    let too_long = Command::WriteBegin { length: u16::MAX, crc: 0 };
-    assert_eq!(refused(desk.ask(too_long)), Refusal::UploadTooLong { max: MAX_IMAGE_BYTES as u16 });
-    assert!(desk.done(Command::WriteBegin { length: 100, crc: 0 }) && desk.done(chunk(0, 60)));
-    assert_eq!(refused(desk.ask(chunk(50, 10))), Refusal::OutOfOrder { expected: 60 });
-    assert_eq!(refused(desk.ask(chunk(60, 41))), Refusal::UploadTooLong { max: 100 });
-    assert_eq!(refused(desk.ask(Command::WriteEnd)), Refusal::UploadIncomplete);
+    let too_long = Command::WriteBegin {
+        length: u16::MAX,
+        crc: 0,
+    };
+    assert_eq!(
+        refused(desk.ask(too_long)),
+        Refusal::UploadTooLong {
+            max: MAX_IMAGE_BYTES as u16
+        }
+    );
+    assert!(
+        desk.done(Command::WriteBegin {
+            length: 100,
+            crc: 0
+        }) && desk.done(chunk(0, 60))
+    );
+    assert_eq!(
+        refused(desk.ask(chunk(50, 10))),
+        Refusal::OutOfOrder { expected: 60 }
+    );
+    assert_eq!(
+        refused(desk.ask(chunk(60, 41))),
+        Refusal::UploadTooLong { max: 100 }
+    );
+    assert_eq!(
+        refused(desk.ask(Command::WriteEnd)),
+        Refusal::UploadIncomplete
+    );
 }
 
 #[test]
@@ -166,51 +213,105 @@ fn a_gap_in_a_series_is_closed_under_new_numbers() {
     let image = image("a");
     let piece = |seq, from: usize, to: usize| {
         let data = Chunk::from_slice(&image[from..to]).unwrap();
-        frame(1, seq, Command::WriteChunk { offset: from as u16, data })
+        frame(
+            1,
+            seq,
+            Command::WriteChunk {
+                offset: from as u16,
+                data,
+            },
+        )
     };
     let (first, second, third) = (20, 40, image.len());
-    assert!(desk.done(Command::WriteBegin { length: third as u16, crc: wire::crc32(&image) }));
+    assert!(desk.done(Command::WriteBegin {
+        length: third as u16,
+        crc: wire::crc32(&image)
+    }));
     assert_eq!(desk.send(&piece(11, 0, first)), Some(Reply::Done));
     // 12 is lost.
-    assert_eq!(refused(desk.send(&piece(13, second, third))), Refusal::OutOfOrder { expected: first as u16 });
+    assert_eq!(
+        refused(desk.send(&piece(13, second, third))),
+        Refusal::OutOfOrder {
+            expected: first as u16
+        }
+    );
     assert_eq!(desk.send(&piece(12, first, second)), None);
     assert_eq!(desk.send(&piece(14, first, second)), Some(Reply::Done));
     assert_eq!(desk.send(&piece(15, second, third)), Some(Reply::Done));
     // Its answer is lost: what is expected next tells.
-    assert_eq!(refused(desk.send(&piece(16, second, third))), Refusal::OutOfOrder { expected: third as u16 });
+    assert_eq!(
+        refused(desk.send(&piece(16, second, third))),
+        Refusal::OutOfOrder {
+            expected: third as u16
+        }
+    );
     assert_eq!(desk.send(&piece(11, 0, first)), None);
     desk.seq = 16;
-    assert!(desk.done(Command::WriteEnd) && desk.done(Command::Commit) && desk.done(Command::Confirm));
+    assert!(
+        desk.done(Command::WriteEnd) && desk.done(Command::Commit) && desk.done(Command::Confirm)
+    );
     assert_eq!(desk.reboot().correcting().as_deref(), Some("a"));
 }
 
 #[test]
 fn strangers_and_newer_hosts_are_told() {
     let mut desk = fresh();
-    assert_eq!(refused(desk.send(&frame(2, 1, Command::Rollback))), Refusal::NoSession);
+    assert_eq!(
+        refused(desk.send(&frame(2, 1, Command::Rollback))),
+        Refusal::NoSession
+    );
     assert!(matches!(desk.ask(Command::Status), Some(Reply::Status(_))));
-    assert!(matches!(desk.send(&frame(2, 1, Command::Hello)), Some(Reply::Identity(_))));
+    assert!(matches!(
+        desk.send(&frame(2, 1, Command::Hello)),
+        Some(Reply::Identity(_))
+    ));
     assert_eq!(refused(desk.ask(Command::Status)), Refusal::NoSession);
-    let unknown = wire::encode(&(2_u16, 2_u16, 99_u8), &mut [0; MAX_FRAME]).unwrap().to_vec();
+    let unknown = wire::encode(&(2_u16, 2_u16, 99_u8), &mut [0; MAX_FRAME])
+        .unwrap()
+        .to_vec();
     assert_eq!(refused(desk.send(&unknown)), Refusal::NotUnderstood);
 }
 
 #[test]
 fn runs_out_of_bounds_are_refused() {
-    let Command::RunCircle(good) = circle() else { panic!() };
+    let Command::RunCircle(good) = circle() else {
+        panic!()
+    };
     let bad = [
-        ExactCircle { radius_half_nm: 0, ..good },
-        ExactCircle { radius_half_nm: -200_000_000, ..good },
-        ExactCircle { radius_half_nm: i32::MAX, ..good },
-        ExactCircle { feed_m_s: 0.0, ..good },
-        ExactCircle { feed_m_s: f32::NAN, ..good },
+        ExactCircle {
+            radius_half_nm: 0,
+            ..good
+        },
+        ExactCircle {
+            radius_half_nm: -200_000_000,
+            ..good
+        },
+        ExactCircle {
+            radius_half_nm: i32::MAX,
+            ..good
+        },
+        ExactCircle {
+            feed_m_s: 0.0,
+            ..good
+        },
+        ExactCircle {
+            feed_m_s: f32::NAN,
+            ..good
+        },
         ExactCircle { laps: 0, ..good },
-        ExactCircle { radius_half_nm: 20_000_000, feed_m_s: 1.0, ..good },
+        ExactCircle {
+            radius_half_nm: 20_000_000,
+            feed_m_s: 1.0,
+            ..good
+        },
     ];
     let mut desk = fresh();
     for run in bad {
         let refusal = refused(desk.ask(Command::RunCircle(run)));
-        assert!(matches!(refusal, Refusal::Motion(MotionRefusal::OutOfBounds { .. })), "{refusal}");
+        assert!(
+            matches!(refusal, Refusal::Motion(MotionRefusal::OutOfBounds { .. })),
+            "{refusal}"
+        );
     }
     assert_eq!(desk.server.motion_mut().runs, 0);
 }
@@ -219,13 +320,20 @@ fn runs_out_of_bounds_are_refused() {
 fn read_back_stays_inside_the_slot() {
     let mut desk = fresh();
     assert!(desk.flash("a"));
-    let read = |slot, offset, length| Command::ReadBack { slot, offset, length };
+    let read = |slot, offset, length| Command::ReadBack {
+        slot,
+        offset,
+        length,
+    };
     match desk.ask(read(0, 0, 16)) {
         Some(Reply::Data { offset: 0, data }) => assert_eq!(data, image("a")[..16]),
         other => panic!("{other:?}"),
     }
     for (slot, offset, length) in [(2, 0, 1), (0, 2040, 16), (0, 0, 200), (1, u16::MAX, 1)] {
-        assert_eq!(refused(desk.ask(read(slot, offset, length))), Refusal::NoSuchPlace);
+        assert_eq!(
+            refused(desk.ask(read(slot, offset, length))),
+            Refusal::NoSuchPlace
+        );
     }
 }
 

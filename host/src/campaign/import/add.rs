@@ -45,7 +45,9 @@ impl Options {
     /// A run of which the file is `path` and the rows are those of `slice`.
     pub(super) fn entry(&self, path: &Path, slice: Slice) -> Entry {
         Entry {
-            file: path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
+            file: path
+                .file_name()
+                .map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
             path: path.to_path_buf(),
             line: 0,
             radius_m: self.radius_m,
@@ -112,12 +114,16 @@ pub fn add(
     progress: &dyn Fn(&Path, u64),
 ) -> Result<Vec<Added>, CampaignError> {
     let manifest_path = dir.join("campaign.toml");
-    let old = if manifest_path.exists() { Some(Manifest::open(dir)?) } else { None };
+    let old = if manifest_path.exists() {
+        Some(Manifest::open(dir)?)
+    } else {
+        None
+    };
     let io = |e: std::io::Error| CampaignError::io(dir, "made", "a place for a directory", &e);
     let fresh = !dir.exists();
     std::fs::create_dir_all(dir).map_err(io)?;
-    let staged =
-        stage(files, dir, options, progress).and_then(|staged| commit(dir, old.as_ref(), options, staged));
+    let staged = stage(files, dir, options, progress)
+        .and_then(|staged| commit(dir, old.as_ref(), options, staged));
     if staged.is_err() && fresh {
         let _ = std::fs::remove_dir(dir); // only if still empty
     }
@@ -139,18 +145,39 @@ struct Staged {
 /// The laps of a file that become runs.
 fn laps(path: &Path, options: &Options, progress: &dyn Fn(u64)) -> Result<Vec<Lap>, CampaignError> {
     let scan = scan(path, options, progress)?;
-    let Turns { sign, arc_rad, feed_in, feed_out, .. } = scan.turns;
+    let Turns {
+        sign,
+        arc_rad,
+        feed_in,
+        feed_out,
+        ..
+    } = scan.turns;
     let direction = match (options.direction, sign) {
         (Some(direction), _) => direction,
         (None, sign) if sign > 0.0 => Direction::Ccw,
         (None, sign) if sign < 0.0 => Direction::Cw,
         _ => {
-            let line = scan.slices.first().map_or(1, |slice| slice.first_line - scan.laps[0].start);
-            return Err(CampaignError::new(Place::at(path, line, 1), Problem::DirectionUnknown));
+            let line = scan
+                .slices
+                .first()
+                .map_or(1, |slice| slice.first_line - scan.laps[0].start);
+            return Err(CampaignError::new(
+                Place::at(path, line, 1),
+                Problem::DirectionUnknown,
+            ));
         }
     };
-    let wanted = if options.laps == Laps::First { 1 } else { scan.laps.len() };
-    let each = scan.slices.into_iter().zip(scan.target_radius_m).enumerate().take(wanted);
+    let wanted = if options.laps == Laps::First {
+        1
+    } else {
+        scan.laps.len()
+    };
+    let each = scan
+        .slices
+        .into_iter()
+        .zip(scan.target_radius_m)
+        .enumerate()
+        .take(wanted);
     let lap = |(index, (slice, target_radius_m)): (usize, (Slice, Option<f64>))| Lap {
         added: Added {
             file: String::new(),
@@ -167,7 +194,11 @@ fn laps(path: &Path, options: &Options, progress: &dyn Fn(u64)) -> Result<Vec<La
             target_radius_m,
             notes: Vec::new(),
         },
-        entry: Entry { direction, arc_rad, ..options.entry(path, slice) },
+        entry: Entry {
+            direction,
+            arc_rad,
+            ..options.entry(path, slice)
+        },
     };
     Ok(each.map(lap).collect())
 }
@@ -183,9 +214,23 @@ pub fn open(
 ) -> Result<(Manifest, Vec<Added>), CampaignError> {
     let laps = laps(path, options, &|bytes| progress(path, bytes))?;
     let (runs, added) = laps.into_iter().map(|lap| (lap.entry, lap.added)).unzip();
-    let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    let machine = options.machine.clone().unwrap_or_else(|| "unknown".to_owned());
-    Ok((Manifest { path: path.to_path_buf(), name, machine, runs, notes: Vec::new() }, added))
+    let name = path
+        .file_name()
+        .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    let machine = options
+        .machine
+        .clone()
+        .unwrap_or_else(|| "unknown".to_owned());
+    Ok((
+        Manifest {
+            path: path.to_path_buf(),
+            name,
+            machine,
+            runs,
+            notes: Vec::new(),
+        },
+        added,
+    ))
 }
 
 fn stage(
@@ -238,13 +283,20 @@ fn write_rows(entry: &Entry, clocked: bool, dir: &Path) -> Result<NamedTempFile,
         _ => true,
     });
     columns.sort_by_key(|c| {
-        ["time_s", "x_mm", "y_mm", "z_mm", "angle_deg"].iter().position(|n| *n == c.1).unwrap_or(9)
+        ["time_s", "x_mm", "y_mm", "z_mm", "angle_deg"]
+            .iter()
+            .position(|n| *n == c.1)
+            .unwrap_or(9)
     });
     let mut origin = 0.0;
     if let Some(&(field, ..)) = columns.iter().find(|c| c.1 == "time_s") {
         origin = first_of(entry, field)?;
     }
-    let mut file = tempfile::Builder::new().prefix(".import-").suffix(".csv").tempfile_in(dir).map_err(io)?;
+    let mut file = tempfile::Builder::new()
+        .prefix(".import-")
+        .suffix(".csv")
+        .tempfile_in(dir)
+        .map_err(io)?;
     let names: Vec<&str> = columns.iter().map(|c| c.1).collect();
     writeln!(file, "{}", names.join(",")).map_err(io)?;
     let text = |batch: Batch| {
@@ -252,8 +304,17 @@ fn write_rows(entry: &Entry, clocked: bool, dir: &Path) -> Result<NamedTempFile,
         for k in 0..batch.rows {
             for (index, (field, name, factor, places)) in columns.iter().enumerate() {
                 let shift = if *name == "time_s" { origin } else { 0.0 };
-                let end = if index + 1 == columns.len() { b'\n' } else { b',' };
-                write::number(&mut text, (batch.columns[*field][k] - shift) * factor, *places, end);
+                let end = if index + 1 == columns.len() {
+                    b'\n'
+                } else {
+                    b','
+                };
+                write::number(
+                    &mut text,
+                    (batch.columns[*field][k] - shift) * factor,
+                    *places,
+                    end,
+                );
             }
         }
         text
@@ -265,7 +326,9 @@ fn write_rows(entry: &Entry, clocked: bool, dir: &Path) -> Result<NamedTempFile,
 /// The first value of a column.
 fn first_of(entry: &Entry, field: usize) -> Result<f64, CampaignError> {
     let mut first = 0.0;
-    let Some(slice) = &entry.slice else { return Ok(first) };
+    let Some(slice) = &entry.slice else {
+        return Ok(first);
+    };
     slice.walk(
         &entry.path,
         |batch| batch.columns[field].first().copied(),
@@ -289,8 +352,10 @@ fn commit(
     let mut document = match old {
         None => {
             let mut document = DocumentMut::new();
-            let name =
-                dir.canonicalize().ok().and_then(|d| Some(d.file_name()?.to_string_lossy().into_owned()));
+            let name = dir
+                .canonicalize()
+                .ok()
+                .and_then(|d| Some(d.file_name()?.to_string_lossy().into_owned()));
             let mut head = Table::new();
             head["name"] = value(name.unwrap_or_else(|| "campaign".to_owned()));
             head["machine"] = value(options.machine.as_deref().unwrap_or("unknown"));
@@ -301,19 +366,33 @@ fn commit(
             let text = std::fs::read_to_string(&path).map_err(io)?;
             let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
             text.parse().map_err(|e: toml_edit::TomlError| {
-                CampaignError::new(Place::file(&path), Problem::Toml { reason: e.message().to_owned() })
+                CampaignError::new(
+                    Place::file(&path),
+                    Problem::Toml {
+                        reason: e.message().to_owned(),
+                    },
+                )
             })?
         }
     };
-    let list = document.entry("run").or_insert(Item::ArrayOfTables(ArrayOfTables::new()));
+    let list = document
+        .entry("run")
+        .or_insert(Item::ArrayOfTables(ArrayOfTables::new()));
     let Some(list) = list.as_array_of_tables_mut() else {
         let reason =
-            "`run` is an inline list, to which no table can be added; write [[run]] tables".to_owned();
-        return Err(CampaignError::new(Place::file(&path), Problem::Toml { reason }));
+            "`run` is an inline list, to which no table can be added; write [[run]] tables"
+                .to_owned();
+        return Err(CampaignError::new(
+            Place::file(&path),
+            Problem::Toml { reason },
+        ));
     };
     let mut number = old.map_or(0, |m| m.runs.len());
     let mut done: Vec<Added> = Vec::new();
-    let undo = |done: &[Added]| done.iter().for_each(|a| drop(std::fs::remove_file(dir.join(&a.file))));
+    let undo = |done: &[Added]| {
+        done.iter()
+            .for_each(|a| drop(std::fs::remove_file(dir.join(&a.file))))
+    };
     for Staged { file, mut added } in staged {
         let name = loop {
             let name = format!("run{number:03}.csv");
@@ -322,7 +401,10 @@ fn commit(
                 break name;
             }
         };
-        let kept = file.persist(dir.join(&name)).map_err(|e| e.error).and_then(|f| write::make_public(&f));
+        let kept = file
+            .persist(dir.join(&name))
+            .map_err(|e| e.error)
+            .and_then(|f| write::make_public(&f));
         if let Err(error) = kept {
             undo(&done);
             return Err(io(error));
@@ -333,7 +415,11 @@ fn commit(
         table["file"] = value(&added.file);
         table["radius_mm"] = si(options.radius_m);
         table["feed_mm_s"] = si(options.feed_m_s);
-        table["direction"] = value(if added.direction == Direction::Ccw { "ccw" } else { "cw" });
+        table["direction"] = value(if added.direction == Direction::Ccw {
+            "ccw"
+        } else {
+            "cw"
+        });
         if let Some(start) = options.start_angle_rad {
             table["start_angle_deg"] = value((start.to_degrees() * 1e9).round() / 1e9);
         }
@@ -344,8 +430,12 @@ fn commit(
             table["temperature_c"] = value(temperature);
         }
         if let Some(centre) = options.centre_m {
-            table["centre_mm"] =
-                value(centre.map(|c| (c * 1e12).round() / 1e9).into_iter().collect::<toml_edit::Array>());
+            table["centre_mm"] = value(
+                centre
+                    .map(|c| (c * 1e12).round() / 1e9)
+                    .into_iter()
+                    .collect::<toml_edit::Array>(),
+            );
         }
         if let Some(arc) = added.arc_rad {
             table["arc_deg"] = value((arc.to_degrees() * 1e3).round() / 1e3);

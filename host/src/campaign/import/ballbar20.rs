@@ -55,10 +55,16 @@ pub fn read(path: &Path) -> Result<Ballbar20, CampaignError> {
     const EXPECTED: &str = "a Ballbar 20 .b5r file";
     let bytes = std::fs::read(path).map_err(|e| CampaignError::io(path, "read", EXPECTED, &e))?;
     if bytes.is_empty() {
-        return Err(CampaignError::new(Place::file(path), Problem::Empty { expected: EXPECTED }));
+        return Err(CampaignError::new(
+            Place::file(path),
+            Problem::Empty { expected: EXPECTED },
+        ));
     }
     parse(&decode(&bytes)).map_err(|(at, text, reason)| {
-        CampaignError::new(Place::of_byte(path, text.as_bytes(), at), Problem::Xml { reason })
+        CampaignError::new(
+            Place::of_byte(path, text.as_bytes(), at),
+            Problem::Xml { reason },
+        )
     })
 }
 
@@ -66,7 +72,9 @@ pub fn read(path: &Path) -> Result<Ballbar20, CampaignError> {
 fn decode(bytes: &[u8]) -> String {
     let wide = |from: fn([u8; 2]) -> u16| {
         let units = bytes[2..].chunks_exact(2).map(|b| from([b[0], b[1]]));
-        char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)).collect()
+        char::decode_utf16(units)
+            .map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER))
+            .collect()
     };
     match bytes {
         [0xFF, 0xFE, ..] => wide(u16::from_le_bytes),
@@ -76,7 +84,10 @@ fn decode(bytes: &[u8]) -> String {
 }
 
 fn attribute(element: &BytesStart<'_>, name: &str) -> Option<String> {
-    let found = element.attributes().filter_map(Result::ok).find(|a| a.key.as_ref() == name)?;
+    let found = element
+        .attributes()
+        .filter_map(Result::ok)
+        .find(|a| a.key.as_ref() == name)?;
     Some(found.value.trim().to_owned())
 }
 
@@ -89,7 +100,9 @@ fn parse(text: &str) -> Result<Ballbar20, (usize, &str, String)> {
     let mut elements = 0;
     loop {
         let before = usize::try_from(reader.buffer_position()).unwrap_or(text.len());
-        let event = reader.read_event().map_err(|e| (before, text, e.to_string()))?;
+        let event = reader
+            .read_event()
+            .map_err(|e| (before, text, e.to_string()))?;
         let mut finish = false;
         match &event {
             Event::Start(e) | Event::Empty(e) => {
@@ -102,7 +115,9 @@ fn parse(text: &str) -> Result<Ballbar20, (usize, &str, String)> {
                         finish = matches!(event, Event::Empty(_));
                     }
                     "PLANE" => found.plane = attribute(e, "TEST_PLANE").or(found.plane.take()),
-                    "MACHINE_TESTED" => found.machine = attribute(e, "NAME").or(found.machine.take()),
+                    "MACHINE_TESTED" => {
+                        found.machine = attribute(e, "NAME").or(found.machine.take())
+                    }
                     "DATE_STARTED" => date = matches!(event, Event::Start(_)),
                     _ => {}
                 }
@@ -124,18 +139,34 @@ fn parse(text: &str) -> Result<Ballbar20, (usize, &str, String)> {
             _ => {}
         }
         if finish && let Some((name, dt, value)) = open.take() {
-            let number = value.replace(',', ".").parse::<f64>().ok().filter(|v| v.is_finite());
+            let number = value
+                .replace(',', ".")
+                .parse::<f64>()
+                .ok()
+                .filter(|v| v.is_finite());
             let Some(value) = number else {
                 let reason = format!("FEATURE {name} is \"{value}\"; expected a number");
                 return Err((before, text, reason));
             };
             let name = name.trim_start_matches("AF_").to_owned();
-            found.features.push(Feature { name, value, unit: unit(&dt) });
+            found.features.push(Feature {
+                name,
+                value,
+                unit: unit(&dt),
+            });
         }
     }
     if found.features.is_empty() {
-        let what = if elements == 0 { "not XML" } else { "no FEATURE in it" };
-        return Err((0, text, format!("{what}; expected the results of a Ballbar 20 test")));
+        let what = if elements == 0 {
+            "not XML"
+        } else {
+            "no FEATURE in it"
+        };
+        return Err((
+            0,
+            text,
+            format!("{what}; expected the results of a Ballbar 20 test"),
+        ));
     }
     Ok(found)
 }

@@ -65,8 +65,13 @@ pub(super) fn detect(head: &Head, wanted: Format, given: Option<&str>) -> Result
         return Ok(Detected::Results);
     }
     type Recogniser = fn(&Head) -> Option<Layout>;
-    let known: [Recogniser; 5] =
-        [spatial_analyzer::recognise, rtde::recognise, kflop::recognise, leica::recognise, named::recognise];
+    let known: [Recogniser; 5] = [
+        spatial_analyzer::recognise,
+        rtde::recognise,
+        kflop::recognise,
+        leica::recognise,
+        named::recognise,
+    ];
     let mut found = known.iter().filter_map(|recognise| recognise(head));
     let layout = found.find(|l| wanted == Format::Auto || l.format == wanted);
     Ok(layout.map_or(Detected::Unknown, Detected::Table))

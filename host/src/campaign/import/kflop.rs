@@ -9,7 +9,12 @@ pub(super) fn recognise(head: &Head) -> Option<Layout> {
     let names = split(head.line(0), b',');
     let mut fields = Vec::new();
     for (index, name) in names.iter().enumerate() {
-        let axis = |prefix: &str| name.strip_prefix(prefix)?.parse().ok().filter(|&a: &usize| a < 3);
+        let axis = |prefix: &str| {
+            name.strip_prefix(prefix)?
+                .parse()
+                .ok()
+                .filter(|&a: &usize| a < 3)
+        };
         if *name == "time" {
             fields.push((index, Quantity::Time, 1.0));
         } else if let Some(axis) = axis("pos") {

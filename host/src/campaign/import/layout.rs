@@ -53,7 +53,9 @@ impl Head {
     pub(super) fn of(bytes: &[u8]) -> Self {
         let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
         let lines = bytes.split(|&b| b == b'\n').take(40).map(latin1);
-        Self { lines: lines.map(|l| l.trim_end_matches('\r').to_owned()).collect() }
+        Self {
+            lines: lines.map(|l| l.trim_end_matches('\r').to_owned()).collect(),
+        }
     }
 
     pub(super) fn line(&self, index: usize) -> &str {
@@ -63,15 +65,23 @@ impl Head {
 
 /// Text of bytes that are UTF-8 or else Latin-1.
 pub(super) fn latin1(bytes: &[u8]) -> String {
-    std::str::from_utf8(bytes).map_or_else(|_| bytes.iter().map(|&b| char::from(b)).collect(), str::to_owned)
+    std::str::from_utf8(bytes).map_or_else(
+        |_| bytes.iter().map(|&b| char::from(b)).collect(),
+        str::to_owned,
+    )
 }
 
 /// Splits a line at a separator, quotes and blanks around fields taken off.
 pub(super) fn split(line: &str, separator: u8) -> Vec<&str> {
     if separator == b' ' {
-        return line.split_ascii_whitespace().map(|f| f.trim_matches('"')).collect();
+        return line
+            .split_ascii_whitespace()
+            .map(|f| f.trim_matches('"'))
+            .collect();
     }
-    line.split(char::from(separator)).map(|f| f.trim().trim_matches('"').trim()).collect()
+    line.split(char::from(separator))
+        .map(|f| f.trim().trim_matches('"').trim())
+        .collect()
 }
 
 /// Metres, seconds or radians in a unit, by its usual spellings.

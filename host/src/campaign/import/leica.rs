@@ -9,11 +9,14 @@ pub(super) fn recognise(head: &Head) -> Option<Layout> {
     let mut fields = Vec::new();
     let mut tracker = false;
     for (index, name) in split(header, separator).into_iter().enumerate() {
-        let (word, bracket) =
-            name.split_once('[').map_or((name, None), |(w, b)| (w.trim(), b.split(']').next()));
+        let (word, bracket) = name
+            .split_once('[')
+            .map_or((name, None), |(w, b)| (w.trim(), b.split(']').next()));
         let axis = ["X", "Y", "Z"].iter().position(|a| *a == word);
         match (axis, bracket) {
-            (Some(axis), Some(bracket)) => fields.push((index, Quantity::Position(axis), unit(bracket)?)),
+            (Some(axis), Some(bracket)) => {
+                fields.push((index, Quantity::Position(axis), unit(bracket)?))
+            }
             (None, _) if word.eq_ignore_ascii_case("time stamp") => {
                 fields.push((index, Quantity::Stamp(DateOrder::DayMonthYear), 1.0));
                 tracker = true;
@@ -22,7 +25,10 @@ pub(super) fn recognise(head: &Head) -> Option<Layout> {
             _ => {}
         }
     }
-    let positions = fields.iter().filter(|f| matches!(f.1, Quantity::Position(_))).count();
+    let positions = fields
+        .iter()
+        .filter(|f| matches!(f.1, Quantity::Position(_)))
+        .count();
     let decimal_comma = separator == b';';
     (tracker && positions >= 2).then_some(Layout {
         format: Format::Leica,

@@ -44,6 +44,10 @@ use std::path::Path;
 ///
 /// # Errors
 /// A file that cannot be read, or whose layout is not known.
-pub fn recognise(file: &Path, format: Format, columns: Option<&str>) -> Result<Format, CampaignError> {
+pub fn recognise(
+    file: &Path,
+    format: Format,
+    columns: Option<&str>,
+) -> Result<Format, CampaignError> {
     recognise::rows_of(file, format, columns).map(|slice| slice.format())
 }

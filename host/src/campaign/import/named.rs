@@ -4,7 +4,10 @@ use super::layout::{Head, Layout, Quantity, split, unit};
 
 pub(super) fn recognise(head: &Head) -> Option<Layout> {
     let header = head.line(0);
-    let separator = [b';', b'\t', b','].into_iter().find(|&s| header.contains(char::from(s))).unwrap_or(b' ');
+    let separator = [b';', b'\t', b',']
+        .into_iter()
+        .find(|&s| header.contains(char::from(s)))
+        .unwrap_or(b' ');
     let row = head.line(1);
     let decimal_comma = separator != b',' && row.contains(',') && !row.contains('.');
     let mut fields = Vec::new();
@@ -27,16 +30,28 @@ pub(super) fn recognise(head: &Head) -> Option<Layout> {
     } else {
         Format::Named
     };
-    Some(Layout { format, separator, decimal_comma, skip: 1, fields })
+    Some(Layout {
+        format,
+        separator,
+        decimal_comma,
+        skip: 1,
+        fields,
+    })
 }
 
 /// Meaning and factor to SI of a column name such as `x_mm`, `X [mm]`, `Zeit (s)`, `Abweichung [µm]`.
 pub(super) fn column(name: &str) -> Option<(Quantity, f64)> {
     let lower = name.trim().to_lowercase();
     let (word, given) = match lower.find(['[', '(']) {
-        Some(at) => {
-            (lower[..at].trim(), Some(lower[at + 1..].trim_end_matches([']', ')']).trim().to_owned()))
-        }
+        Some(at) => (
+            lower[..at].trim(),
+            Some(
+                lower[at + 1..]
+                    .trim_end_matches([']', ')'])
+                    .trim()
+                    .to_owned(),
+            ),
+        ),
         None => match lower.rsplit_once(['_', ' ']) {
             Some((word, tail)) if unit(tail).is_some() => (word, Some(tail.to_owned())),
             _ => (lower.as_str(), None),

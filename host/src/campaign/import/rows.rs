@@ -56,7 +56,14 @@ impl Slice {
     /// The columns of one row, if it can be read.
     pub(super) fn one(&self, line: &[u8]) -> Option<Vec<f64>> {
         let parsed = Plan::of(&self.layout).block(line);
-        (parsed.batch.rows == 1).then(|| parsed.batch.columns.iter().map(|column| column[0]).collect())
+        (parsed.batch.rows == 1).then(|| {
+            parsed
+                .batch
+                .columns
+                .iter()
+                .map(|column| column[0])
+                .collect()
+        })
     }
 
     /// Walks the rows: `prepare` gets blocks of columns on all cores, `take` gets what it made in order and may end the walk.
@@ -67,18 +74,29 @@ impl Slice {
         mut take: impl FnMut(Block, T) -> Result<ControlFlow<()>, CampaignError>,
     ) -> Result<(), CampaignError> {
         let io = |e: std::io::Error| CampaignError::io(path, "read", EXPECTED, &e);
-        let text = Text::between(File::open(path).map_err(io)?, self.bytes[0], self.bytes[1]).map_err(io)?;
+        let text = Text::between(File::open(path).map_err(io)?, self.bytes[0], self.bytes[1])
+            .map_err(io)?;
         let plan = Plan::of(&self.layout);
         let (mut lines, mut rows) = (0, 0);
         let mut blank: Option<usize> = None;
         let parse = |at: u64, bytes: &[u8]| {
             let parsed = plan.block(bytes);
             let [blank, count, lines] = [parsed.blank, Some(parsed.batch.rows), Some(parsed.lines)];
-            (blank, count, lines, parsed.failed, [at, at + bytes.len() as u64], prepare(parsed.batch))
+            (
+                blank,
+                count,
+                lines,
+                parsed.failed,
+                [at, at + bytes.len() as u64],
+                prepare(parsed.batch),
+            )
         };
         let walked = text.walk(parse, |(empty, count, more, failed, bytes, prepared)| {
             let refuse = |line: usize, column: usize, problem: Problem| {
-                Err(CampaignError::new(Place::at(path, self.first_line + line, column), problem))
+                Err(CampaignError::new(
+                    Place::at(path, self.first_line + line, column),
+                    problem,
+                ))
             };
             let (count, more) = (count.unwrap_or(0), more.unwrap_or(0));
             if let (Some(blank), true) = (blank, count > 0 || failed.is_some()) {
@@ -89,15 +107,24 @@ impl Slice {
             }
             blank = blank.or(empty.map(|line| lines + line));
             lines += more;
-            let block = Block { first: rows, rows: count, bytes };
+            let block = Block {
+                first: rows,
+                rows: count,
+                bytes,
+            };
             rows += count;
-            if count == 0 { Ok(ControlFlow::Continue(())) } else { take(block, prepared) }
+            if count == 0 {
+                Ok(ControlFlow::Continue(()))
+            } else {
+                take(block, prepared)
+            }
         });
         walked.map_err(|fault| match fault {
             Fault::Io(e) => io(e),
             Fault::Endless(_) => {
-                let problem =
-                    Problem::Columns { reason: "no line end for a long way; expected rows".to_owned() };
+                let problem = Problem::Columns {
+                    reason: "no line end for a long way; expected rows".to_owned(),
+                };
                 CampaignError::new(Place::at(path, self.first_line + lines, 1), problem)
             }
             Fault::Taken(error) => error,
@@ -111,7 +138,9 @@ impl Slice {
         prepare: impl Fn(Batch) -> T + Sync,
         mut take: impl FnMut(T) -> Result<(), CampaignError>,
     ) -> Result<(), CampaignError> {
-        self.walk(path, prepare, |_, prepared| take(prepared).map(|()| ControlFlow::Continue(())))
+        self.walk(path, prepare, |_, prepared| {
+            take(prepared).map(|()| ControlFlow::Continue(()))
+        })
     }
 }
 
@@ -133,15 +162,20 @@ struct Parsed {
 impl<'a> Plan<'a> {
     fn of(layout: &'a Layout) -> Self {
         let columns = layout.fields.iter().enumerate();
-        let mut fields: Vec<_> =
-            columns.map(|(k, &(at, quantity, factor))| (at, k, quantity, factor)).collect();
+        let mut fields: Vec<_> = columns
+            .map(|(k, &(at, quantity, factor))| (at, k, quantity, factor))
+            .collect();
         fields.sort_by_key(|f| f.0);
         Self { layout, fields }
     }
 
     fn block(&self, bytes: &[u8]) -> Parsed {
         let guess = bytes.len() / (8 * self.fields.len()) + 1;
-        let mut columns: Vec<Vec<f64>> = self.fields.iter().map(|_| Vec::with_capacity(guess)).collect();
+        let mut columns: Vec<Vec<f64>> = self
+            .fields
+            .iter()
+            .map(|_| Vec::with_capacity(guess))
+            .collect();
         let mut values = vec![0.0; columns.len()];
         let (mut at, mut rows, mut lines, mut blank, mut failed) = (0, 0, 0, None, None);
         let mut dates = Dates::default();
@@ -154,7 +188,8 @@ impl<'a> Plan<'a> {
             let next = match fast {
                 Some(next) => next,
                 None => {
-                    let end = memchr::memchr(b'\n', &bytes[at..]).map_or(bytes.len(), |p| at + p + 1);
+                    let end =
+                        memchr::memchr(b'\n', &bytes[at..]).map_or(bytes.len(), |p| at + p + 1);
                     let line = &bytes[at..end];
                     if line.trim_ascii().is_empty() {
                         blank = blank.or(Some(lines));
@@ -172,17 +207,35 @@ impl<'a> Plan<'a> {
                 failed = Some((blank, 1, Problem::EmptyLine));
                 break;
             }
-            columns.iter_mut().zip(&values).for_each(|(column, value)| column.push(*value));
+            columns
+                .iter_mut()
+                .zip(&values)
+                .for_each(|(column, value)| column.push(*value));
             (at, rows, lines) = (next, rows + 1, lines + 1);
         }
-        Parsed { batch: Batch { columns, rows }, lines, blank, failed }
+        Parsed {
+            batch: Batch { columns, rows },
+            lines,
+            blank,
+            failed,
+        }
     }
 
     /// Reads the row at `at` into `values`; the byte after its end, or nothing where it is not plain.
-    fn fast(&self, bytes: &[u8], mut at: usize, dates: &mut Dates, values: &mut [f64]) -> Option<usize> {
+    fn fast(
+        &self,
+        bytes: &[u8],
+        mut at: usize,
+        dates: &mut Dates,
+        values: &mut [f64],
+    ) -> Option<usize> {
         let separator = self.layout.separator;
         let runs = separator == b' ';
-        let mark = if self.layout.decimal_comma { b',' } else { b'.' };
+        let mark = if self.layout.decimal_comma {
+            b','
+        } else {
+            b'.'
+        };
         let mut field = 0;
         if runs {
             at = skip(bytes, at, b" \t\"");
@@ -204,7 +257,11 @@ impl<'a> Plan<'a> {
                 }
                 field += 1;
             }
-            at = skip(bytes, at, if separator == b'\t' { b" \"" } else { b" \t\"" });
+            at = skip(
+                bytes,
+                at,
+                if separator == b'\t' { b" \"" } else { b" \t\"" },
+            );
             let rest = bytes.get(at..)?;
             let (value, used) = match quantity {
                 Quantity::Stamp(order) => dates.stamp(rest, order)?,
@@ -216,7 +273,11 @@ impl<'a> Plan<'a> {
             values[column] = value * factor;
             at += used;
             if !runs {
-                at = skip(bytes, at, if separator == b'\t' { b" \"" } else { b" \t\"" });
+                at = skip(
+                    bytes,
+                    at,
+                    if separator == b'\t' { b" \"" } else { b" \t\"" },
+                );
             } else if bytes.get(at) == Some(&b'"') {
                 at += 1;
             }
@@ -230,7 +291,9 @@ impl<'a> Plan<'a> {
         match bytes.get(at) {
             None => Some(at),
             Some(b'\n') => Some(at + 1),
-            Some(_) => Some(memchr::memchr(b'\n', &bytes[at..]).map_or(bytes.len(), |p| at + p + 1)),
+            Some(_) => {
+                Some(memchr::memchr(b'\n', &bytes[at..]).map_or(bytes.len(), |p| at + p + 1))
+            }
         }
     }
 }
@@ -264,7 +327,12 @@ impl Dates {
         }
         let clock = &bytes[quote + length + 1..];
         let two = |k: usize| {
-            let digit = |k: usize| clock.get(k).filter(|b| b.is_ascii_digit()).map(|b| f64::from(b - b'0'));
+            let digit = |k: usize| {
+                clock
+                    .get(k)
+                    .filter(|b| b.is_ascii_digit())
+                    .map(|b| f64::from(b - b'0'))
+            };
             Some(10.0 * digit(k)? + digit(k + 1)?)
         };
         if clock.get(2) != Some(&b':') || clock.get(5) != Some(&b':') {
@@ -291,14 +359,32 @@ fn slow(layout: &Layout, line: &[u8], values: &mut [f64]) -> Result<(), (usize, 
     let needed = layout.fields.iter().map(|f| f.0 + 1).max().unwrap_or(0);
     let parts = split(line, layout.separator);
     if parts.len() < needed {
-        return Err((line.chars().count().max(1), Problem::Ragged { found: parts.len(), expected: needed }));
+        return Err((
+            line.chars().count().max(1),
+            Problem::Ragged {
+                found: parts.len(),
+                expected: needed,
+            },
+        ));
     }
     for (&(at, quantity, factor), value) in layout.fields.iter().zip(values) {
         let field = parts[at];
-        let column = || line[..field.as_ptr() as usize - line.as_ptr() as usize].chars().count() + 1;
+        let column = || {
+            line[..field.as_ptr() as usize - line.as_ptr() as usize]
+                .chars()
+                .count()
+                + 1
+        };
         let name = || format!("{quantity:?}").to_lowercase();
         *value = if let Quantity::Stamp(order) = quantity {
-            seconds(field, order).ok_or_else(|| (column(), Problem::NotAStamp { text: field.to_owned() }))?
+            seconds(field, order).ok_or_else(|| {
+                (
+                    column(),
+                    Problem::NotAStamp {
+                        text: field.to_owned(),
+                    },
+                )
+            })?
         } else {
             let parsed = if layout.decimal_comma && field.contains(',') {
                 fast_float2::parse::<f64, _>(field.replace(',', "."))
@@ -308,12 +394,26 @@ fn slow(layout: &Layout, line: &[u8], values: &mut [f64]) -> Result<(), (usize, 
             match parsed {
                 Ok(v) if v.is_finite() => v * factor,
                 Ok(_) => {
-                    return Err((column(), Problem::NotFinite { text: field.to_owned(), column: name() }));
+                    return Err((
+                        column(),
+                        Problem::NotFinite {
+                            text: field.to_owned(),
+                            column: name(),
+                        },
+                    ));
                 }
-                Err(_) if field.is_empty() => return Err((column(), Problem::EmptyField { column: name() })),
+                Err(_) if field.is_empty() => {
+                    return Err((column(), Problem::EmptyField { column: name() }));
+                }
                 Err(_) => {
                     let text = shorten(field);
-                    return Err((column(), Problem::NotANumber { text, column: name() }));
+                    return Err((
+                        column(),
+                        Problem::NotANumber {
+                            text,
+                            column: name(),
+                        },
+                    ));
                 }
             }
         };
@@ -326,7 +426,10 @@ fn seconds(text: &str, order: DateOrder) -> Option<f64> {
     let text = text.trim().trim_start_matches('\'').trim();
     let (date, clock) = text.split_once(' ')?;
     let mut clock = clock.trim().split(':');
-    let (hour, minute) = (clock.next()?.parse::<f64>().ok()?, clock.next()?.parse::<f64>().ok()?);
+    let (hour, minute) = (
+        clock.next()?.parse::<f64>().ok()?,
+        clock.next()?.parse::<f64>().ok()?,
+    );
     let second = clock.next()?.replace(',', ".").parse::<f64>().ok()?;
     if clock.next().is_some() {
         return None;
@@ -367,11 +470,20 @@ mod tests {
         let stamp = Quantity::Stamp(DateOrder::DayMonthYear);
         let xyz: Vec<_> = (0..3).map(|k| (k, Quantity::Position(k), 1e-3)).collect();
         let leica = [&xyz[..], &[(5, stamp, 1.0)]].concat();
-        let rtde =
-            [(0, Quantity::Time, 1.0), (4, Quantity::Position(0), 1.0), (2, Quantity::Position(1), 1.0)];
+        let rtde = [
+            (0, Quantity::Time, 1.0),
+            (4, Quantity::Position(0), 1.0),
+            (2, Quantity::Position(1), 1.0),
+        ];
         let cases: [(Layout, &str); 6] = [
-            (layout(b',', false, &leica), "1832.4,-977.1 , 6.118e2,0.01,20,'08.11.2022 16:17:28.353,P\r\n"),
-            (layout(b',', false, &leica), "1,2,3,,,'29.02.2024 00:00:00.5\n"),
+            (
+                layout(b',', false, &leica),
+                "1832.4,-977.1 , 6.118e2,0.01,20,'08.11.2022 16:17:28.353,P\r\n",
+            ),
+            (
+                layout(b',', false, &leica),
+                "1,2,3,,,'29.02.2024 00:00:00.5\n",
+            ),
             (layout(b';', true, &xyz), "1,25;-0,5;3;Bemerkung\r\n"),
             (layout(b' ', false, &rtde), " 0.002  7 8.5\t9 -1.25\n"),
             (layout(b'\t', false, &rtde), "0.1\t7\t8.5\t9\t-1.25"),
@@ -379,8 +491,10 @@ mod tests {
         ];
         for (layout, row) in cases {
             let plan = Plan::of(&layout);
-            let [mut fast, mut slow_values] =
-                [vec![0.0; layout.fields.len()], vec![0.0; layout.fields.len()]];
+            let [mut fast, mut slow_values] = [
+                vec![0.0; layout.fields.len()],
+                vec![0.0; layout.fields.len()],
+            ];
             assert_eq!(
                 plan.fast(row.as_bytes(), 0, &mut Dates::default(), &mut fast),
                 Some(row.len()),

@@ -20,7 +20,10 @@ pub(super) fn recognise(head: &Head) -> Option<Layout> {
             fields.push((index, Quantity::Target(axis), 1.0));
         }
     }
-    let positions = fields.iter().filter(|f| matches!(f.1, Quantity::Position(_))).count();
+    let positions = fields
+        .iter()
+        .filter(|f| matches!(f.1, Quantity::Position(_)))
+        .count();
     (positions == 3).then_some(Layout {
         format: Format::Rtde,
         separator,

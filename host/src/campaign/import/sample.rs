@@ -42,9 +42,16 @@ pub(super) fn points(
         let at = start + (size - start) / ROWS * k;
         window.clear();
         file.seek(SeekFrom::Start(at)).map_err(io)?;
-        file.by_ref().take(WINDOW).read_to_end(&mut window).map_err(io)?;
+        file.by_ref()
+            .take(WINDOW)
+            .read_to_end(&mut window)
+            .map_err(io)?;
         // Somewhere in a row, but for the first place: the next one is whole.
-        let from = if k == 0 { Some(0) } else { memchr::memchr(b'\n', &window).map(|p| p + 1) };
+        let from = if k == 0 {
+            Some(0)
+        } else {
+            memchr::memchr(b'\n', &window).map(|p| p + 1)
+        };
         let row = from.and_then(|from| {
             let end = memchr::memchr(b'\n', &window[from..])?;
             slice.one(&window[from..=from + end])

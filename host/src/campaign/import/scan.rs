@@ -82,7 +82,11 @@ impl Columns {
 }
 
 /// Looks through a file. `progress` is told the bytes read so far.
-pub(super) fn scan(path: &Path, options: &Options, progress: &dyn Fn(u64)) -> Result<Scan, CampaignError> {
+pub(super) fn scan(
+    path: &Path,
+    options: &Options,
+    progress: &dyn Fn(u64),
+) -> Result<Scan, CampaignError> {
     let all = rows_of(path, options.format, options.columns.as_deref())?;
     let refuse = |problem| CampaignError::new(Place::at(path, all.first_line, 1), problem);
     let columns = Columns::of(&all, options.radius_m);
@@ -96,13 +100,22 @@ pub(super) fn scan(path: &Path, options: &Options, progress: &dyn Fn(u64)) -> Re
                 let found = trim::ring(&points, options.radius_m);
                 let rows = points[0].len();
                 let radius_mm = (options.radius_m * 1e9).round() / 1e6;
-                Some(found.ok_or_else(|| refuse(Problem::OffCircle { found: 0, rows, radius_mm }))?)
+                Some(found.ok_or_else(|| {
+                    refuse(Problem::OffCircle {
+                        found: 0,
+                        rows,
+                        radius_mm,
+                    })
+                })?)
             }
         }
     };
     let mut seen = look(path, &all, &columns, ring.as_ref(), progress)?;
     if seen.rows < FEWEST {
-        return Err(refuse(Problem::TooFew { found: seen.rows, expected: FEWEST }));
+        return Err(refuse(Problem::TooFew {
+            found: seen.rows,
+            expected: FEWEST,
+        }));
     }
     let turns = turns(&mut seen, path, &all, &columns, options).map_err(refuse)?;
     let (mut slices, mut targets) = (Vec::new(), Vec::new());
@@ -111,7 +124,14 @@ pub(super) fn scan(path: &Path, options: &Options, progress: &dyn Fn(u64)) -> Re
         targets.push(target_radius(&seen.targets, lap, columns.target));
     }
     let laps = turns.laps.clone();
-    Ok(Scan { format: all.layout.format, rows: seen.rows, turns, slices, laps, target_radius_m: targets })
+    Ok(Scan {
+        format: all.layout.format,
+        rows: seen.rows,
+        turns,
+        slices,
+        laps,
+        target_radius_m: targets,
+    })
 }
 
 fn look(
@@ -158,21 +178,30 @@ fn look(
                 seen.angle.reserve_exact(rows);
             }
         }
-        seen.marks.push(Mark { first: block.first, bytes: block.bytes, scatter });
+        seen.marks.push(Mark {
+            first: block.first,
+            bytes: block.bytes,
+            scatter,
+        });
         seen.rows += block.rows;
         seen.angle.extend_from_slice(&angle);
         on.iter().for_each(|on| seen.stretch.push(*on));
         if by_time {
             let time = columns.time.map_or(&[][..], |f| &batch.columns[f]);
-            let (radial, nominal) = columns.radial.map_or((&[][..], 0.0), |(f, r)| (&batch.columns[f], r));
+            let (radial, nominal) = columns
+                .radial
+                .map_or((&[][..], 0.0), |(f, r)| (&batch.columns[f], r));
             seen.time.extend_from_slice(time);
             seen.deviation.extend(radial.iter().map(|v| v - nominal));
         } else if let Some(field) = columns.time {
-            batch.columns[field].iter().for_each(|t| seen.times.push(*t));
+            batch.columns[field]
+                .iter()
+                .for_each(|t| seen.times.push(*t));
         }
         if let Some(target) = columns.target {
             for k in 0..batch.rows {
-                seen.targets.push(target.map(|f| f.map_or(0.0, |f| batch.columns[f][k])));
+                seen.targets
+                    .push(target.map(|f| f.map_or(0.0, |f| batch.columns[f][k])));
             }
         }
         progress(block.bytes[1]);
@@ -192,13 +221,20 @@ fn turns(
         let (rows, stretch) = (seen.rows, seen.stretch.best());
         if stretch.len() * 4 < rows || stretch.len() < FEWEST {
             let radius_mm = (options.radius_m * 1e9).round() / 1e6;
-            return Err(Problem::OffCircle { found: stretch.len(), rows, radius_mm });
+            return Err(Problem::OffCircle {
+                found: stretch.len(),
+                rows,
+                radius_mm,
+            });
         }
         let mut angle = std::mem::take(&mut seen.angle);
         let angle = &mut angle[stretch.clone()];
         trim::unwrap(angle);
         let mut turns = trim::of_angles(angle, stretch.start, &seen.times)?;
-        turns.laps.iter_mut().for_each(|l| *l = l.start + stretch.start..l.end + stretch.start);
+        turns
+            .laps
+            .iter_mut()
+            .for_each(|l| *l = l.start + stretch.start..l.end + stretch.start);
         turns.feed_in += stretch.start;
         turns.feed_out += rows - stretch.end;
         return Ok(turns);
@@ -208,7 +244,10 @@ fn turns(
         trim::unwrap(&mut angle);
         return trim::of_angles(&angle, 0, &seen.times);
     }
-    let (time, deviation) = (std::mem::take(&mut seen.time), std::mem::take(&mut seen.deviation));
+    let (time, deviation) = (
+        std::mem::take(&mut seen.time),
+        std::mem::take(&mut seen.deviation),
+    );
     trim::of_times(&time, &deviation, &options.entry(path, all.clone()))
 }
 
@@ -244,8 +283,10 @@ fn slice(
             })
         };
         // Whole blocks are known; the rows before and after them are read again.
-        let inside: Vec<&Mark> =
-            marks.iter().filter(|m| m.bytes[0] >= bytes[0] && m.bytes[1] <= bytes[1]).collect();
+        let inside: Vec<&Mark> = marks
+            .iter()
+            .filter(|m| m.bytes[0] >= bytes[0] && m.bytes[1] <= bytes[1])
+            .collect();
         if let (Some(first), Some(last)) = (inside.first(), inside.last()) {
             add(bytes[0], first.bytes[0], &mut sum)?;
             inside.iter().for_each(|m| sum.merge(&m.scatter));
@@ -262,7 +303,9 @@ fn slice(
 fn byte_of(path: &Path, marks: &[Mark], row: usize) -> Result<u64, CampaignError> {
     let io = |e: std::io::Error| CampaignError::io(path, "read", super::rows::EXPECTED, &e);
     let at = marks.partition_point(|m| m.first <= row).saturating_sub(1);
-    let Some(mark) = marks.get(at) else { return Ok(0) };
+    let Some(mark) = marks.get(at) else {
+        return Ok(0);
+    };
     let ahead = row - mark.first;
     if ahead == 0 {
         return Ok(mark.bytes[0]);
@@ -270,9 +313,13 @@ fn byte_of(path: &Path, marks: &[Mark], row: usize) -> Result<u64, CampaignError
     let mut file = std::fs::File::open(path).map_err(io)?;
     file.seek(SeekFrom::Start(mark.bytes[0])).map_err(io)?;
     let mut text = Vec::new();
-    file.take(mark.bytes[1] - mark.bytes[0]).read_to_end(&mut text).map_err(io)?;
+    file.take(mark.bytes[1] - mark.bytes[0])
+        .read_to_end(&mut text)
+        .map_err(io)?;
     // The last row of a file may have no end of line.
-    let end = memchr::memchr_iter(b'\n', &text).nth(ahead - 1).map_or(text.len(), |p| p + 1);
+    let end = memchr::memchr_iter(b'\n', &text)
+        .nth(ahead - 1)
+        .map_or(text.len(), |p| p + 1);
     Ok(mark.bytes[0] + end as u64)
 }
 
@@ -286,15 +333,26 @@ fn target_radius(
     let mut points: [Vec<f64>; 3] = Default::default();
     for (_, point) in targets.iter().filter(|(row, _)| lap.contains(row)) {
         let axes = if spatial { 3 } else { 2 };
-        points.iter_mut().zip(point).take(axes).for_each(|(axis, v)| axis.push(v));
+        points
+            .iter_mut()
+            .zip(point)
+            .take(axes)
+            .for_each(|(axis, v)| axis.push(v));
     }
     let (x, y) = if spatial {
         let [x, y, z] = &points;
         let plane = Plane::fit(x.iter().zip(y).zip(z).map(|((&x, &y), &z)| [x, y, z])).ok()?;
-        x.iter().zip(y).zip(z).map(|((&x, &y), &z)| plane.project([x, y, z])).map(|[u, v]| (u, v)).unzip()
+        x.iter()
+            .zip(y)
+            .zip(z)
+            .map(|((&x, &y), &z)| plane.project([x, y, z]))
+            .map(|[u, v]| (u, v))
+            .unzip()
     } else {
         let [x, y, _] = points;
         (x, y)
     };
-    crate::fit::fit_circle(&x, &y).ok().map(|fit| fit.circle.radius)
+    crate::fit::fit_circle(&x, &y)
+        .ok()
+        .map(|fit| fit.circle.radius)
 }

@@ -40,7 +40,10 @@ impl Ring {
     pub(super) fn at(&self, point: [f64; 3]) -> (f64, bool) {
         let [x, y] = flat(self.plane.as_ref(), point);
         let (dx, dy) = (x - self.circle.centre[0], y - self.circle.centre[1]);
-        (dy.atan2(dx), (dx.hypot(dy) - self.circle.radius).abs() <= self.limit)
+        (
+            dy.atan2(dx),
+            (dx.hypot(dy) - self.circle.radius).abs() <= self.limit,
+        )
     }
 }
 
@@ -59,17 +62,30 @@ pub(super) fn ring(points: &[Vec<f64>; 3], radius_m: f64) -> Option<Ring> {
     let mut used: Vec<usize> = (0..rows).collect();
     if z.is_empty() {
         let (circle, limit) = robust_circle(x, y, &used, radius_m)?;
-        return Some(Ring { plane: None, circle, limit });
+        return Some(Ring {
+            plane: None,
+            circle,
+            limit,
+        });
     }
     let fit = |used: &[usize]| {
         let plane = Plane::fit(used.iter().map(|&k| point(k))).ok()?;
-        let largest =
-            plane.normal.iter().copied().fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
+        let largest = plane
+            .normal
+            .iter()
+            .copied()
+            .fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
         let plane = Some((plane, largest.signum()));
-        let (u, v): (Vec<f64>, Vec<f64>) =
-            (0..rows).map(|k| flat(plane.as_ref(), point(k))).map(|[u, v]| (u, v)).unzip();
+        let (u, v): (Vec<f64>, Vec<f64>) = (0..rows)
+            .map(|k| flat(plane.as_ref(), point(k)))
+            .map(|[u, v]| (u, v))
+            .unzip();
         let (circle, limit) = robust_circle(&u, &v, used, radius_m)?;
-        Some(Ring { plane, circle, limit })
+        Some(Ring {
+            plane,
+            circle,
+            limit,
+        })
     };
     let ring = fit(&used)?;
     // The plane of the circle alone: a lift before it has tilted the first one.
@@ -82,8 +98,10 @@ fn robust_circle(x: &[f64], y: &[f64], rows: &[usize], radius_m: f64) -> Option<
     let n = rows.len();
     let starts = [0..n, n / 4..n - n / 4, n / 2..n, 0..n / 2, n / 3..2 * n / 3];
     let spread = |c: &Circle| {
-        let mut off: Vec<f64> =
-            rows.iter().map(|&k| ((x[k] - c.centre[0]).hypot(y[k] - c.centre[1]) - c.radius).abs()).collect();
+        let mut off: Vec<f64> = rows
+            .iter()
+            .map(|&k| ((x[k] - c.centre[0]).hypot(y[k] - c.centre[1]) - c.radius).abs())
+            .collect();
         off.sort_unstable_by(f64::total_cmp);
         off[off.len() / 2]
     };
@@ -91,10 +109,14 @@ fn robust_circle(x: &[f64], y: &[f64], rows: &[usize], radius_m: f64) -> Option<
         let (x, y): (Vec<f64>, Vec<f64>) = rows.iter().map(|&k| (x[k], y[k])).unzip();
         Some(circle::fit(&Xy::new(&x, &y).ok()?).ok()?.circle)
     };
-    let mut best = starts.into_iter().filter_map(|r| fit(&rows[r])).min_by(|a, b| {
-        let far = |c: &Circle| spread(c) + (c.radius / radius_m - 1.0).abs().max(0.1) * radius_m;
-        far(a).total_cmp(&far(b))
-    })?;
+    let mut best = starts
+        .into_iter()
+        .filter_map(|r| fit(&rows[r]))
+        .min_by(|a, b| {
+            let far =
+                |c: &Circle| spread(c) + (c.radius / radius_m - 1.0).abs().max(0.1) * radius_m;
+            far(a).total_cmp(&far(b))
+        })?;
     let mut limit = 0.0;
     for _ in 0..10 {
         limit = (6.0 * 1.4826 * spread(&best)).max(OFF_CIRCLE * best.radius);
@@ -114,18 +136,27 @@ fn robust_circle(x: &[f64], y: &[f64], rows: &[usize], radius_m: f64) -> Option<
 }
 
 /// Turns of unwrapped angles. `time` may be empty; its row `offset` is the first of `angle`.
-pub(super) fn of_angles(angle: &[f64], offset: usize, time: &Thinned<f64>) -> Result<Turns, Problem> {
+pub(super) fn of_angles(
+    angle: &[f64],
+    offset: usize,
+    time: &Thinned<f64>,
+) -> Result<Turns, Problem> {
     let n = angle.len();
     let sign = (angle[n - 1] - angle[0]).signum();
     let block = (n / 200).max(1);
     // Of long recordings every n-th time was kept: the rate is that between the rows of these.
     let timed = |k: usize| {
         let kept = time.at(offset + k);
-        kept.filter(|(row, _)| *row >= offset).map_or((k, k as f64), |(row, t)| (row - offset, t))
+        kept.filter(|(row, _)| *row >= offset)
+            .map_or((k, k as f64), |(row, t)| (row - offset, t))
     };
     let rate = |k: usize| {
         let ((from, a), (to, b)) = (timed(k), timed((k + block).min(n - 1)));
-        if b > a { sign * (angle[to] - angle[from]) / (b - a) } else { 0.0 }
+        if b > a {
+            sign * (angle[to] - angle[from]) / (b - a)
+        } else {
+            0.0
+        }
     };
     let mut rates: Vec<f64> = (0..n - 1).step_by(block).map(rate).collect();
     rates.sort_unstable_by(f64::total_cmp);
@@ -137,14 +168,18 @@ pub(super) fn of_angles(angle: &[f64], offset: usize, time: &Thinned<f64>) -> Re
         while from + 2 * block < to && rate(from) < least * usual && long_enough(from + block, to) {
             from += block;
         }
-        while from + 2 * block < to && rate(to - 1 - block) < least * usual && long_enough(from, to - block) {
+        while from + 2 * block < to
+            && rate(to - 1 - block) < least * usual
+            && long_enough(from, to - block)
+        {
             to -= block;
         }
         from..to
     };
     let moving = steady(STANDING, false, 0..n);
     let range = steady(RAMPING, true, moving);
-    let spacing = (angle[range.end - 1] - angle[range.start]).abs() / (range.len() - 1).max(1) as f64;
+    let spacing =
+        (angle[range.end - 1] - angle[range.start]).abs() / (range.len() - 1).max(1) as f64;
     let around = covered(angle, range.clone());
     let mut laps = Vec::new();
     let mut from = range.start;
@@ -167,13 +202,21 @@ pub(super) fn of_angles(angle: &[f64], offset: usize, time: &Thinned<f64>) -> Re
     let mut arc_rad = None;
     if laps.is_empty() {
         if around < SHORTEST_ARC_DEG.to_radians() {
-            return Err(Problem::ShortArc { covered_deg: around.to_degrees() });
+            return Err(Problem::ShortArc {
+                covered_deg: around.to_degrees(),
+            });
         }
         arc_rad = Some(around);
         laps.push(range);
     }
     let end = laps.last().map_or(n, |l| l.end);
-    Ok(Turns { feed_in: laps[0].start, feed_out: n - end, laps, arc_rad, sign })
+    Ok(Turns {
+        feed_in: laps[0].start,
+        feed_out: n - end,
+        laps,
+        arc_rad,
+        sign,
+    })
 }
 
 /// Angle of a stretch, one spacing counted for its last row.
@@ -228,12 +271,18 @@ pub(super) fn of_times(time: &[f64], deviation: &[f64], entry: &Entry) -> Result
     let n = time.len();
     let last = time[n - 1] - time[0];
     let turn_s = last * n as f64 / (n as f64 - 1.0);
-    let found =
-        check::duration(entry, turn_s, &deviation[from..to], &mut Vec::new()).map_err(|e| *e.problem)?;
+    let found = check::duration(entry, turn_s, &deviation[from..to], &mut Vec::new())
+        .map_err(|e| *e.problem)?;
     let count = found.unwrap_or(1) as usize;
     let edge = |k: usize| from + n * k / count;
     let laps: Vec<Range<usize>> = (0..count).map(|k| edge(k)..edge(k + 1)).collect();
-    Ok(Turns { laps, arc_rad: None, feed_in: from, feed_out: rows - to, sign: 0.0 })
+    Ok(Turns {
+        laps,
+        arc_rad: None,
+        feed_in: from,
+        feed_out: rows - to,
+        sign: 0.0,
+    })
 }
 
 /// Adds whole turns so that no step is half a turn or more.

@@ -15,9 +15,12 @@ const CELL_ASPECT: f64 = 2.0;
 
 /// Draws the view.
 pub(super) fn draw(frame: &mut Frame<'_>, view: &View) {
-    let [head, body, foot] =
-        Layout::vertical([Constraint::Length(1), Constraint::Min(3), Constraint::Length(1)])
-            .areas(frame.area());
+    let [head, body, foot] = Layout::vertical([
+        Constraint::Length(1),
+        Constraint::Min(3),
+        Constraint::Length(1),
+    ])
+    .areas(frame.area());
     frame.render_widget(Paragraph::new(headline(view)), head);
     if body.width >= PANEL + 20 {
         let [picture, panel] =
@@ -27,14 +30,20 @@ pub(super) fn draw(frame: &mut Frame<'_>, view: &View) {
     } else {
         state(frame, view, body);
     }
-    frame.render_widget(Paragraph::new("q quit   s stop   b bypass on/off   r run again"), foot);
+    frame.render_widget(
+        Paragraph::new("q quit   s stop   b bypass on/off   r run again"),
+        foot,
+    );
 }
 
 fn headline(view: &View) -> Line<'static> {
     match (&view.lost, &view.identity) {
         (Some(why), _) => {
             let text = format!("LOST  {why}; trying to open it again");
-            Line::styled(text, Style::new().fg(Color::Red).add_modifier(Modifier::BOLD))
+            Line::styled(
+                text,
+                Style::new().fg(Color::Red).add_modifier(Modifier::BOLD),
+            )
         }
         (None, Some(who)) => Line::raw(format!("{} {} at {}", who.board, who.build, view.port)),
         (None, None) => Line::raw(format!("asking {}", view.port)),
@@ -46,23 +55,37 @@ fn trace(frame: &mut Frame<'_>, view: &View, area: Rect) {
     let title = if trace.programmed.is_empty() {
         " no set-points yet ".to_owned()
     } else {
-        format!(" · programmed  • corrected, ×{}: up to {:.1} µm ", trace.magnification, trace.largest_um)
+        format!(
+            " · programmed  • corrected, ×{}: up to {:.1} µm ",
+            trace.magnification, trace.largest_um
+        )
     };
-    let (columns, rows) =
-        (f64::from(area.width.saturating_sub(2).max(1)), f64::from(area.height.saturating_sub(2).max(1)));
+    let (columns, rows) = (
+        f64::from(area.width.saturating_sub(2).max(1)),
+        f64::from(area.height.saturating_sub(2).max(1)),
+    );
     let wide = columns / (CELL_ASPECT * rows);
     // The shorter side holds the whole trace.
-    let reach =
-        if wide < 1.0 { [trace.reach, trace.reach / wide] } else { [trace.reach * wide, trace.reach] };
+    let reach = if wide < 1.0 {
+        [trace.reach, trace.reach / wide]
+    } else {
+        [trace.reach * wide, trace.reach]
+    };
     let bounds = [0, 1].map(|i| [trace.centre[i] - reach[i], trace.centre[i] + reach[i]]);
     let canvas = Canvas::default()
         .block(Block::bordered().title(title))
         .x_bounds(bounds[0])
         .y_bounds(bounds[1])
         .paint(|picture| {
-            picture.draw(&Points { coords: &trace.programmed, color: Color::DarkGray });
+            picture.draw(&Points {
+                coords: &trace.programmed,
+                color: Color::DarkGray,
+            });
             picture.layer();
-            picture.draw(&Points { coords: &trace.corrected, color: Color::Green });
+            picture.draw(&Points {
+                coords: &trace.corrected,
+                color: Color::Green,
+            });
             if let (Some((x, y)), false) = (trace.corrected.last(), trace.corrected.is_empty()) {
                 picture.print(*x, *y, "●");
             }
@@ -71,15 +94,27 @@ fn trace(frame: &mut Frame<'_>, view: &View, area: Rect) {
 }
 
 fn state(frame: &mut Frame<'_>, view: &View, area: Rect) {
-    let mut lines = view.status.as_ref().map_or_else(|| vec![Line::raw("no answer yet")], |s| words(s));
+    let mut lines = view
+        .status
+        .as_ref()
+        .map_or_else(|| vec![Line::raw("no answer yet")], |s| words(s));
     if view.losses > 0 {
         lines.push(Line::raw(format!("line lost    {}×", view.losses)));
     }
     if let Some(why) = &view.refused {
-        lines.push(Line::styled(format!("refused      {why}"), Style::new().fg(Color::Yellow)));
+        lines.push(Line::styled(
+            format!("refused      {why}"),
+            Style::new().fg(Color::Yellow),
+        ));
     }
-    let old = if view.lost.is_some() { " state before the loss " } else { " state " };
-    let panel = Paragraph::new(lines).wrap(Wrap { trim: false }).block(Block::bordered().title(old));
+    let old = if view.lost.is_some() {
+        " state before the loss "
+    } else {
+        " state "
+    };
+    let panel = Paragraph::new(lines)
+        .wrap(Wrap { trim: false })
+        .block(Block::bordered().title(old));
     frame.render_widget(panel, area);
 }
 
@@ -108,8 +143,15 @@ fn words(status: &Status) -> Vec<Line<'static>> {
             None => format!("{:08x}, not confirmed", info.crc),
         },
     };
-    let cause = status.fault.map(|cause| format!(" ({cause:?})").to_lowercase()).unwrap_or_default();
-    let stop = if status.stop_input { ", stop input active" } else { "" };
+    let cause = status
+        .fault
+        .map(|cause| format!(" ({cause:?})").to_lowercase())
+        .unwrap_or_default();
+    let stop = if status.stop_input {
+        ", stop input active"
+    } else {
+        ""
+    };
     let mut lines: Vec<String> = vec![
         format!("motion       {}{cause}{stop}", motion(status.motion)),
         format!("correction   {correction}"),
@@ -119,19 +161,40 @@ fn words(status: &Status) -> Vec<Line<'static>> {
         format!("programmed   {} mm", place(status.raw_nm)),
         format!("corrected    {} mm", place(status.corrected_nm)),
         format!("ticks        {}", status.tick),
-        format!("overruns     {}; {} uncorrected", counts.tick_overruns, counts.uncorrected_segments),
-        format!("clamps       offset {}, rate {}", counts.offset_clamps, counts.slew_clamps),
+        format!(
+            "overruns     {}; {} uncorrected",
+            counts.tick_overruns, counts.uncorrected_segments
+        ),
+        format!(
+            "clamps       offset {}, rate {}",
+            counts.offset_clamps, counts.slew_clamps
+        ),
         format!(
             "segments     {} done, {} waiting, {} dropped",
             counts.segments, status.queued, counts.dropped_segments
         ),
-        format!("stops        {}, {} runs lost their host", counts.stops, counts.link_losses),
-        format!("link         {} CRC errors, {} malformed", counts.crc_errors, counts.malformed_frames),
-        format!("             {} overlong, {} repeated", counts.overlong_frames, counts.repeated_requests),
-        format!("lost         {} bytes, {} set-points", counts.lost_bytes, counts.dropped_set_points),
+        format!(
+            "stops        {}, {} runs lost their host",
+            counts.stops, counts.link_losses
+        ),
+        format!(
+            "link         {} CRC errors, {} malformed",
+            counts.crc_errors, counts.malformed_frames
+        ),
+        format!(
+            "             {} overlong, {} repeated",
+            counts.overlong_frames, counts.repeated_requests
+        ),
+        format!(
+            "lost         {} bytes, {} set-points",
+            counts.lost_bytes, counts.dropped_set_points
+        ),
     ];
     if status.stack_bytes > 0 {
-        lines.push(format!("stack        {} bytes at the deepest", status.stack_bytes));
+        lines.push(format!(
+            "stack        {} bytes at the deepest",
+            status.stack_bytes
+        ));
     }
     lines.into_iter().map(Line::raw).collect()
 }
@@ -159,7 +222,10 @@ mod tests {
             idle_permille: None,
             raw_nm: [50_000_000, -1, 0],
             corrected_nm: [50_012_000, 0, 0],
-            counters: Counters { crc_errors: 7, ..Counters::default() },
+            counters: Counters {
+                crc_errors: 7,
+                ..Counters::default()
+            },
         }
     }
 
@@ -167,12 +233,18 @@ mod tests {
         let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
         terminal.draw(|frame| draw(frame, view)).unwrap();
         let buffer = terminal.backend().buffer().clone();
-        let row = |y| (0..width).map(|x| buffer[(x, y)].symbol().to_owned()).collect::<String>();
+        let row = |y| {
+            (0..width)
+                .map(|x| buffer[(x, y)].symbol().to_owned())
+                .collect::<String>()
+        };
         (0..height).map(row).collect()
     }
 
     fn dots(line: &str) -> usize {
-        line.chars().filter(|c| ('\u{2801}'..='\u{28ff}').contains(c)).count()
+        line.chars()
+            .filter(|c| ('\u{2801}'..='\u{28ff}').contains(c))
+            .count()
     }
 
     #[test]
@@ -182,7 +254,10 @@ mod tests {
         let point = |k: usize| {
             let (sin, cos) = (k as f64 * 0.01).sin_cos();
             let at = |r: f64| [(r * cos) as i32, (r * sin) as i32, 0];
-            SetPoint { raw_nm: at(50e6), corrected_nm: at(50.012e6) }
+            SetPoint {
+                raw_nm: at(50e6),
+                corrected_nm: at(50.012e6),
+            }
         };
         view.take(Event::Points((0..629).map(point).collect()));
         let lines = picture(&view, 110, 32);
@@ -211,7 +286,10 @@ mod tests {
         view.take(Event::Status(Box::new(status())));
         view.take(Event::Down("/dev/ttyUSB0: connection lost".into()));
         let lines = picture(&view, 100, 20);
-        assert!(lines[0].starts_with("LOST  /dev/ttyUSB0: connection lost; trying"), "{lines:?}");
+        assert!(
+            lines[0].starts_with("LOST  /dev/ttyUSB0: connection lost; trying"),
+            "{lines:?}"
+        );
         assert!(
             lines.join("\n").contains("state before the loss")
                 && lines.join("\n").contains("line lost    1×")

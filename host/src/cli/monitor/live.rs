@@ -19,14 +19,19 @@ pub(super) fn run(args: Args, controller: Controller) -> Result<(), Failure> {
     let circle = args.circle();
     let mut view = View::new(controller.port());
     let interval = Duration::from_secs_f64(args.interval);
-    let silent = Output { json: false, quiet: true, non_interactive: true };
+    let silent = Output {
+        json: false,
+        quiet: true,
+        non_interactive: true,
+    };
     let count = args.count;
     let port = args.port;
     std::thread::spawn(move || watch(controller, || port.connect(silent), interval, &hear, &tell));
     if let Some(circle) = circle {
         let _ = wishes.send(Wish::Run(circle)); // nobody listens: the loop below finds out
     }
-    let failed = |e: io::Error| Failure::usage(format_args!("the terminal cannot be drawn on: {e}"));
+    let failed =
+        |e: io::Error| Failure::usage(format_args!("the terminal cannot be drawn on: {e}"));
     let mut terminal = ratatui::try_init().map_err(failed)?;
     let mut looks = 0;
     let outcome = loop {
@@ -59,7 +64,9 @@ fn keys(wishes: &Sender<Wish>, view: &View, again: Option<Wish>) -> io::Result<b
     if !event::poll(PICTURE)? {
         return Ok(true);
     }
-    let Key::Key(key) = event::read()? else { return Ok(true) };
+    let Key::Key(key) = event::read()? else {
+        return Ok(true);
+    };
     if key.kind != KeyEventKind::Press {
         return Ok(true);
     }

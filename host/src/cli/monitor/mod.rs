@@ -43,7 +43,12 @@ pub struct Args {
     #[arg(long, value_name = "ccw|cw", value_parser = direction, default_value = "ccw", help_heading = "A circle to watch")]
     direction: Direction,
     /// Its turns.
-    #[arg(long, value_name = "N", default_value_t = 10, help_heading = "A circle to watch")]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 10,
+        help_heading = "A circle to watch"
+    )]
     laps: u32,
 }
 
@@ -64,7 +69,10 @@ impl Args {
 /// Runs the command: a picture on a terminal, lines elsewhere.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     if !(args.interval > 0.0 && args.interval <= 3600.0) {
-        return Err(Failure::usage(format_args!("--interval is {}, expected up to 3600 s", args.interval)));
+        return Err(Failure::usage(format_args!(
+            "--interval is {}, expected up to 3600 s",
+            args.interval
+        )));
     }
     // Who is not there at the beginning was not unplugged.
     let controller = args.port.open(out)?;
@@ -111,11 +119,18 @@ fn lines(args: &Args, mut controller: Controller, out: Output) -> Result<(), Fai
 
 /// Whether the line is lost rather than the request refused.
 fn gone(error: &ControllerError) -> bool {
-    matches!(error, ControllerError::Lost { .. } | ControllerError::NoAnswer { .. })
+    matches!(
+        error,
+        ControllerError::Lost { .. } | ControllerError::NoAnswer { .. }
+    )
 }
 
 fn back(args: &Args) -> Controller {
-    let silent = Output { json: false, quiet: true, non_interactive: true };
+    let silent = Output {
+        json: false,
+        quiet: true,
+        non_interactive: true,
+    };
     loop {
         std::thread::sleep(watch::RETRY);
         if let Ok(controller) = args.port.connect(silent) {

@@ -49,7 +49,10 @@ pub(super) fn motion(state: MotionState) -> &'static str {
 
 impl View {
     pub(super) fn new(port: &str) -> Self {
-        Self { port: port.to_owned(), ..Self::default() }
+        Self {
+            port: port.to_owned(),
+            ..Self::default()
+        }
     }
 
     pub(super) fn take(&mut self, event: Event) {
@@ -63,7 +66,8 @@ impl View {
                 self.lost = Some(why);
             }
             Event::Status(status) => {
-                let moves = |s: MotionState| matches!(s, MotionState::Running | MotionState::Stopping);
+                let moves =
+                    |s: MotionState| matches!(s, MotionState::Running | MotionState::Stopping);
                 let before = self.status.as_ref().is_some_and(|s| moves(s.motion));
                 if moves(status.motion) && !before {
                     // Another run, another picture.
@@ -84,23 +88,41 @@ impl View {
     /// The set-points as a picture; the correction magnified by a round number so that it can be seen.
     pub(super) fn trace(&self) -> Trace {
         let mm = |nm: i32| f64::from(nm) * 1e-6;
-        let raw: Vec<[f64; 2]> = self.trace.iter().map(|p| [mm(p.raw_nm[0]), mm(p.raw_nm[1])]).collect();
-        let offset =
-            |p: &SetPoint| [0, 1].map(|i| f64::from(p.corrected_nm[i].wrapping_sub(p.raw_nm[i])) * 1e-6);
-        let largest = self.trace.iter().map(offset).map(|[x, y]| x.hypot(y)).fold(0.0, f64::max);
+        let raw: Vec<[f64; 2]> = self
+            .trace
+            .iter()
+            .map(|p| [mm(p.raw_nm[0]), mm(p.raw_nm[1])])
+            .collect();
+        let offset = |p: &SetPoint| {
+            [0, 1].map(|i| f64::from(p.corrected_nm[i].wrapping_sub(p.raw_nm[i])) * 1e-6)
+        };
+        let largest = self
+            .trace
+            .iter()
+            .map(offset)
+            .map(|[x, y]| x.hypot(y))
+            .fold(0.0, f64::max);
         if raw.is_empty() {
-            return Trace { magnification: 1.0, reach: 1.0, ..Trace::default() };
+            return Trace {
+                magnification: 1.0,
+                reach: 1.0,
+                ..Trace::default()
+            };
         }
-        let bound =
-            |i: usize, pick: fn(f64, f64) -> f64, start: f64| raw.iter().map(|p| p[i]).fold(start, pick);
+        let bound = |i: usize, pick: fn(f64, f64) -> f64, start: f64| {
+            raw.iter().map(|p| p[i]).fold(start, pick)
+        };
         let (low, high) = (
             [0, 1].map(|i| bound(i, f64::min, f64::INFINITY)),
             [0, 1].map(|i| bound(i, f64::max, f64::NEG_INFINITY)),
         );
         let centre = [0, 1].map(|i| 0.5 * (low[i] + high[i]));
         let half = (0.5 * (high[0] - low[0]).max(high[1] - low[1])).max(1e-3);
-        let magnification =
-            if largest > 0.0 { round_down(SHOWN_SHARE * half / largest).max(1.0) } else { 1.0 };
+        let magnification = if largest > 0.0 {
+            round_down(SHOWN_SHARE * half / largest).max(1.0)
+        } else {
+            1.0
+        };
         let corrected = self.trace.iter().zip(&raw).map(|(p, [x, y])| {
             let [dx, dy] = offset(p);
             (x + magnification * dx, y + magnification * dy)
@@ -119,7 +141,11 @@ impl View {
 /// The next of 1, 2, 5, 10 … below.
 fn round_down(value: f64) -> f64 {
     let decade = 10f64.powf(value.log10().floor());
-    [5.0, 2.0, 1.0].into_iter().map(|k| k * decade).find(|v| *v <= value).unwrap_or(decade)
+    [5.0, 2.0, 1.0]
+        .into_iter()
+        .map(|k| k * decade)
+        .find(|v| *v <= value)
+        .unwrap_or(decade)
 }
 
 #[cfg(test)]
@@ -133,25 +159,41 @@ mod tests {
         let point = |k: usize| {
             let (sin, cos) = (k as f64 * 0.01).sin_cos();
             let at = |r: f64| [(r * cos) as i32, (r * sin) as i32, 0];
-            SetPoint { raw_nm: at(50e6), corrected_nm: at(50.012e6) }
+            SetPoint {
+                raw_nm: at(50e6),
+                corrected_nm: at(50.012e6),
+            }
         };
         view.take(Event::Points((0..629).map(point).collect()));
         let trace = view.trace();
         assert_eq!(trace.magnification, 500.0); // 0.15·50/0.012 = 625
-        assert!((trace.largest_um - 12.0).abs() < 0.01, "{}", trace.largest_um);
+        assert!(
+            (trace.largest_um - 12.0).abs() < 0.01,
+            "{}",
+            trace.largest_um
+        );
         let (x, y) = trace.corrected[100];
         assert!((x.hypot(y) - 56.0).abs() < 1e-3, "{x} {y}");
         assert!(trace.centre[0].abs() < 0.1 && trace.reach > 56.0);
         for (value, expected) in [(625.0, 500.0), (499.0, 200.0), (1.0, 1.0), (0.03, 0.02)] {
-            assert!((round_down(value) / expected - 1.0).abs() < 1e-12, "{value}");
+            assert!(
+                (round_down(value) / expected - 1.0).abs() < 1e-12,
+                "{value}"
+            );
         }
     }
 
     #[test]
     fn a_long_watch_keeps_the_last_two_minutes() {
         let mut view = View::new("sim");
-        let points =
-            |n: i32| (0..n).map(|k| SetPoint { raw_nm: [k, 0, 0], corrected_nm: [k, 0, 0] }).collect();
+        let points = |n: i32| {
+            (0..n)
+                .map(|k| SetPoint {
+                    raw_nm: [k, 0, 0],
+                    corrected_nm: [k, 0, 0],
+                })
+                .collect()
+        };
         view.take(Event::Points(points(TRACE as i32)));
         view.take(Event::Points(points(100)));
         assert_eq!(view.trace().programmed.len(), TRACE);

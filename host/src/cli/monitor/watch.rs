@@ -74,10 +74,14 @@ fn serve(
     wishes: &Receiver<Wish>,
     events: &Sender<Event>,
 ) -> Option<String> {
-    events.send(Event::Up(Box::new(controller.identity().clone()))).ok()?;
+    events
+        .send(Event::Up(Box::new(controller.identity().clone())))
+        .ok()?;
     let every = (controller.identity().tick_hz / POINTS_PER_S).clamp(1, u32::from(u16::MAX)) as u16;
-    if let Err(error) = controller.command(Command::Subscribe { every, on_link: true })
-        && super::gone(&error)
+    if let Err(error) = controller.command(Command::Subscribe {
+        every,
+        on_link: true,
+    }) && super::gone(&error)
     {
         return Some(error.to_string());
     }
@@ -111,7 +115,11 @@ fn serve(
             return Some(error.to_string());
         }
         since += pause;
-        let points: Vec<SetPoint> = controller.take_set_points().into_iter().flat_map(|b| b.points).collect();
+        let points: Vec<SetPoint> = controller
+            .take_set_points()
+            .into_iter()
+            .flat_map(|b| b.points)
+            .collect();
         if !points.is_empty() {
             events.send(Event::Points(points)).ok()?;
         }
@@ -136,7 +144,10 @@ mod tests {
         }
 
         fn receive(&mut self, buffer: &mut [u8], until: Duration) -> io::Result<usize> {
-            self.1 = self.1.checked_sub(1).ok_or_else(|| io::Error::from(io::ErrorKind::BrokenPipe))?;
+            self.1 = self
+                .1
+                .checked_sub(1)
+                .ok_or_else(|| io::Error::from(io::ErrorKind::BrokenPipe))?;
             self.0.receive(buffer, until)
         }
 
@@ -157,7 +168,9 @@ mod tests {
         let open = move || {
             attempts += 1;
             if attempts == 1 {
-                return Err(ControllerError::NoPort { port: "plug".into() });
+                return Err(ControllerError::NoPort {
+                    port: "plug".into(),
+                });
             }
             controller(usize::MAX)
         };
@@ -194,7 +207,10 @@ mod tests {
             }
         }
         assert_eq!((ups, downs.len()), (2, 2), "{downs:?}");
-        assert!(downs[0].contains("plug") && statuses > 2, "{downs:?} {statuses}");
+        assert!(
+            downs[0].contains("plug") && statuses > 2,
+            "{downs:?} {statuses}"
+        );
         drop(wishes);
         drop(events);
         worker.join().unwrap();

@@ -38,7 +38,10 @@ enum Sense {
 /// Runs the command.
 pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
     let centre: [f64; 3] = args.centre.as_slice().try_into().map_err(|_| {
-        Failure::usage(format_args!("--centre has {} numbers, expected X,Y,Z", args.centre.len()))
+        Failure::usage(format_args!(
+            "--centre has {} numbers, expected X,Y,Z",
+            args.centre.len()
+        ))
     })?;
     let direction = match args.direction {
         Sense::Ccw => Direction::Ccw,
@@ -46,7 +49,14 @@ pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
     };
     let (radius_m, feed_m_s) = (args.radius * 1e-3, args.feed * 1e-3);
     let centre_m = centre.map(|mm| mm * 1e-3);
-    let wanted = CircleRun { centre_m, radius_m, feed_m_s, direction, laps: args.laps, start_rad: 0.0 };
+    let wanted = CircleRun {
+        centre_m,
+        radius_m,
+        feed_m_s,
+        direction,
+        laps: args.laps,
+        start_rad: 0.0,
+    };
     args.record.ready()?;
     let mut controller = args.port.open(out)?;
     let recording = controller.run_circle(&wanted, args.record.every)?;

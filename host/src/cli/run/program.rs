@@ -52,12 +52,24 @@ pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
     blocks(&args.program, &text, &running)?;
     let mut controller = args.port.open(out)?;
     let start_mm = controller.status()?.raw_nm.map(|nm| f64::from(nm) * 1e-6);
-    let blocks = blocks(&args.program, &text, &Running { start_mm, ..running })?;
+    let blocks = blocks(
+        &args.program,
+        &text,
+        &Running {
+            start_mm,
+            ..running
+        },
+    )?;
     let steps: Vec<Step> = blocks.iter().map(|block| block.step).collect();
     let recording = controller
         .run_program(&steps, args.record.every)
         .map_err(|error| failure(&args.program, &blocks, error))?;
-    args.record.report(&controller, &recording, &[("blocks", json!(blocks.len()))], out)
+    args.record.report(
+        &controller,
+        &recording,
+        &[("blocks", json!(blocks.len()))],
+        out,
+    )
 }
 
 fn blocks(path: &Path, text: &[u8], running: &Running) -> Result<Vec<Block>, Failure> {
@@ -69,13 +81,17 @@ fn blocks(path: &Path, text: &[u8], running: &Running) -> Result<Vec<Block>, Fai
 
 /// With the line that could not be run.
 fn failure(path: &Path, blocks: &[Block], ProgramError { step, error }: ProgramError) -> Failure {
-    let Some(block) = step.and_then(|step| blocks.get(step)) else { return error.into() };
+    let Some(block) = step.and_then(|step| blocks.get(step)) else {
+        return error.into();
+    };
     let place = format!("{}:{}:1", path.display(), block.line);
     match &error {
-        ControllerError::Path(_) => {
-            Failure::input(format_args!("{place}: {error}")).help("nothing has moved; change this block")
-        }
-        _ => Failure::controller(format_args!("{place}: {error}"))
-            .help(error.help().unwrap_or("the blocks before it have run; change this one")),
+        ControllerError::Path(_) => Failure::input(format_args!("{place}: {error}"))
+            .help("nothing has moved; change this block"),
+        _ => Failure::controller(format_args!("{place}: {error}")).help(
+            error
+                .help()
+                .unwrap_or("the blocks before it have run; change this one"),
+        ),
     }
 }

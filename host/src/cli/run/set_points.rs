@@ -20,7 +20,9 @@ pub(super) struct Record {
 impl Record {
     /// Says before anything moves that the file cannot be written.
     pub(super) fn ready(&self) -> Result<(), Failure> {
-        let Some(path) = &self.output else { return Ok(()) };
+        let Some(path) = &self.output else {
+            return Ok(());
+        };
         let new = !path.exists();
         let open = OpenOptions::new().append(true).create(true).open(path);
         open.map_err(|error| cannot_write(path, &error))?;
@@ -41,7 +43,10 @@ impl Record {
         if let Some(path) = &self.output {
             write(path, recording)?;
         }
-        let largest = recording.points.iter().map(|point| offset_m(point.programmed_m, point.corrected_m));
+        let largest = recording
+            .points
+            .iter()
+            .map(|point| offset_m(point.programmed_m, point.corrected_m));
         let largest_um = largest.fold(0.0, f64::max) * 1e6;
         let seconds = recording.points.last().map_or(0.0, |point| point.time_s);
         if out.json {
@@ -62,21 +67,35 @@ impl Record {
             "{}: {} set-points in {seconds:.3} s, largest correction {largest_um:.3} um{}",
             controller.port(),
             recording.points.len(),
-            self.output.as_ref().map_or(String::new(), |path| format!(", in {}", path.display()))
+            self.output
+                .as_ref()
+                .map_or(String::new(), |path| format!(", in {}", path.display()))
         ));
         Ok(())
     }
 }
 
 fn offset_m(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (b - a) * (b - a)).sum::<f64>().sqrt()
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (b - a) * (b - a))
+        .sum::<f64>()
+        .sqrt()
 }
 
 /// Writes `time_s,x_mm,y_mm,z_mm,corrected_x_mm,corrected_y_mm,corrected_z_mm`.
 fn write(path: &Path, recording: &Recording) -> Result<(), Failure> {
     let failed = |error: csv::Error| cannot_write(path, &std::io::Error::other(error));
     let mut writer = csv::Writer::from_path(path).map_err(failed)?;
-    let header = ["time_s", "x_mm", "y_mm", "z_mm", "corrected_x_mm", "corrected_y_mm", "corrected_z_mm"];
+    let header = [
+        "time_s",
+        "x_mm",
+        "y_mm",
+        "z_mm",
+        "corrected_x_mm",
+        "corrected_y_mm",
+        "corrected_z_mm",
+    ];
     writer.write_record(header).map_err(failed)?;
     for point in &recording.points {
         // Nanometres and microseconds, to the last digit.

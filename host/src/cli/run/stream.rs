@@ -52,7 +52,8 @@ pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
         ("late_set_points", json!(streamed.late)),
         ("rejected_set_points", json!(streamed.rejected)),
     ];
-    args.record.report(&controller, &streamed.recording, &more, out)
+    args.record
+        .report(&controller, &streamed.recording, &more, out)
 }
 
 /// Where a row's time stands.
@@ -81,7 +82,10 @@ fn fastest(places_nm: &[[i32; 3]], tick_s: f64) -> (usize, f64) {
         let between = |i: usize| f64::from(places_nm[row][i]) - f64::from(places_nm[row - 1][i]);
         (0..3).map(|i| between(i).powi(2)).sum::<f64>().sqrt()
     };
-    let farthest = (1..places_nm.len()).rev().max_by(|&a, &b| step_nm(a).total_cmp(&step_nm(b))).unwrap_or(1);
+    let farthest = (1..places_nm.len())
+        .rev()
+        .max_by(|&a, &b| step_nm(a).total_cmp(&step_nm(b)))
+        .unwrap_or(1);
     (farthest, (step_nm(farthest) * 1e-9 / tick_s).max(1e-3))
 }
 
@@ -90,7 +94,11 @@ fn too_fast(error: ControllerError, place: &str) -> Failure {
     use MotionRefusal::{OutOfBounds, Path};
     match &error {
         ControllerError::Refused(Refusal::Motion(
-            OutOfBounds { quantity: Quantity::Feed, .. } | Path(Quantity::Feed),
+            OutOfBounds {
+                quantity: Quantity::Feed,
+                ..
+            }
+            | Path(Quantity::Feed),
         )) => Failure::controller(format_args!("{place}: to this row: {error}"))
             .help("nothing of it has moved; write the set-points closer to each other"),
         _ => error.into(),

@@ -28,26 +28,51 @@ pub(super) fn read(path: &Path) -> Result<Vec<Row>, Failure> {
         Err(e) => return Err(file(&format!("cannot read: {e}"))),
     };
     let mut lines = text.trim_start_matches('\u{feff}').lines().enumerate();
-    let header: Vec<&str> = lines.next().map_or("", |(_, line)| line).split(',').map(str::trim).collect();
+    let header: Vec<&str> = lines
+        .next()
+        .map_or("", |(_, line)| line)
+        .split(',')
+        .map(str::trim)
+        .collect();
     let mut columns = [None; 4];
     for (at, column) in header.iter().enumerate() {
-        match ["time_s", "x_mm", "y_mm", "z_mm"].iter().position(|known| known == column) {
+        match ["time_s", "x_mm", "y_mm", "z_mm"]
+            .iter()
+            .position(|known| known == column)
+        {
             Some(known) if columns[known].is_none() => columns[known] = Some(at),
             Some(_) => return Err(file(&format!("has two columns {column}"))),
             None if column.starts_with("corrected_") => {}
             None => return Err(file(&format!("has a column \"{column}\""))),
         }
     }
-    let [Some(time), Some(x), Some(y), z] = columns else { return Err(file("lacks a column")) };
+    let [Some(time), Some(x), Some(y), z] = columns else {
+        return Err(file("lacks a column"));
+    };
     let mut rows = Vec::new();
     for (index, text) in lines.filter(|(_, line)| !line.trim().is_empty()) {
         let fields: Vec<&str> = text.split(',').collect();
-        let column = |field: usize| 1 + fields.iter().take(field).map(|field| field.len() + 1).sum::<usize>();
+        let column = |field: usize| {
+            1 + fields
+                .iter()
+                .take(field)
+                .map(|field| field.len() + 1)
+                .sum::<usize>()
+        };
         let place = |field: usize, what: String| {
-            Failure::input(format_args!("{name}:{}:{}: {what}", index + 1, column(field))).help(EXPECTED)
+            Failure::input(format_args!(
+                "{name}:{}:{}: {what}",
+                index + 1,
+                column(field)
+            ))
+            .help(EXPECTED)
         };
         if fields.len() != header.len() {
-            let what = format!("{} fields, expected {} as in the header", fields.len(), header.len());
+            let what = format!(
+                "{} fields, expected {} as in the header",
+                fields.len(),
+                header.len()
+            );
             return Err(place(0, what));
         }
         let number = |at: usize| {
@@ -65,7 +90,12 @@ pub(super) fn read(path: &Path) -> Result<Vec<Row>, Failure> {
             }
         };
         let place_nm = [nm(x)?, nm(y)?, z.map_or(Ok(0), nm)?];
-        rows.push(Row { line: index + 1, column: column(time), time_s: number(time)?, place_nm });
+        rows.push(Row {
+            line: index + 1,
+            column: column(time),
+            time_s: number(time)?,
+            place_nm,
+        });
     }
     if rows.len() < 2 {
         return Err(file("has fewer than two rows"));

@@ -16,8 +16,15 @@ fn image(scale: f64) -> Vec<u8> {
         format: FORMAT,
         campaign: "lab".to_owned(),
         machine: "irb1600".to_owned(),
-        servo: Servo::Beta { beta1_s2: -23.29e-6 * scale, beta2_s4: -0.23e-6, half_width95: [0.0; 2] },
-        valid: Valid { radius_mm: [50.0, 300.0], feed_mm_s: [20.0, 700.0] },
+        servo: Servo::Beta {
+            beta1_s2: -23.29e-6 * scale,
+            beta2_s4: -0.23e-6,
+            half_width95: [0.0; 2],
+        },
+        valid: Valid {
+            radius_mm: [50.0, 300.0],
+            feed_mm_s: [20.0, 700.0],
+        },
         effects: Vec::new(),
     };
     let mut out = [0; MAX_IMAGE_BYTES];
@@ -28,14 +35,25 @@ fn image(scale: f64) -> Vec<u8> {
 #[test]
 fn flash_verify_reset_verify() {
     let mut controller = sim();
-    assert_eq!(controller.verify(&image(1.0)).unwrap(), flash::Verdict::None);
+    assert_eq!(
+        controller.verify(&image(1.0)).unwrap(),
+        flash::Verdict::None
+    );
     let mut steps = Vec::new();
-    let flashed = controller.flash(&image(1.0), &mut |step| steps.push(step)).unwrap();
+    let flashed = controller
+        .flash(&image(1.0), &mut |step| steps.push(step))
+        .unwrap();
     assert_eq!((flashed.slot, flashed.generation), (0, 1));
     assert_eq!(steps.last(), Some(&flash::Progress::Confirmed));
     for _ in 0..2 {
-        assert_eq!(controller.verify(&image(1.0)).unwrap(), flash::Verdict::Same { slot: 0 });
-        assert!(matches!(controller.verify(&image(1.1)).unwrap(), flash::Verdict::Differs { slot: 0, .. }));
+        assert_eq!(
+            controller.verify(&image(1.0)).unwrap(),
+            flash::Verdict::Same { slot: 0 }
+        );
+        assert!(matches!(
+            controller.verify(&image(1.1)).unwrap(),
+            flash::Verdict::Differs { slot: 0, .. }
+        ));
         controller.reset().unwrap();
     }
 }
@@ -47,20 +65,32 @@ fn a_bad_file_is_never_sent() {
     let mut bad = image(1.1);
     bad[30] ^= 1;
     let mut sent = 0;
-    assert!(matches!(controller.flash(&bad, &mut |_| sent += 1), Err(ControllerError::Table(_))));
+    assert!(matches!(
+        controller.flash(&bad, &mut |_| sent += 1),
+        Err(ControllerError::Table(_))
+    ));
     assert_eq!(sent, 0);
-    assert_eq!(controller.verify(&image(1.0)).unwrap(), flash::Verdict::Same { slot: 0 });
+    assert_eq!(
+        controller.verify(&image(1.0)).unwrap(),
+        flash::Verdict::Same { slot: 0 }
+    );
 }
 
 #[test]
 fn rollback_and_bypass() {
     let mut controller = sim();
     let refused = controller.command(Command::Bypass { on: false });
-    assert!(matches!(refused, Err(ControllerError::Refused(Refusal::NoTable))));
+    assert!(matches!(
+        refused,
+        Err(ControllerError::Refused(Refusal::NoTable))
+    ));
     controller.flash(&image(1.0), &mut |_| {}).unwrap();
     controller.flash(&image(1.1), &mut |_| {}).unwrap();
     controller.command(Command::Rollback).unwrap();
-    assert_eq!(controller.verify(&image(1.0)).unwrap(), flash::Verdict::Same { slot: 0 });
+    assert_eq!(
+        controller.verify(&image(1.0)).unwrap(),
+        flash::Verdict::Same { slot: 0 }
+    );
     controller.command(Command::Bypass { on: true }).unwrap();
     let status = controller.status().unwrap();
     assert!(status.bypass && matches!(status.slots[1], SlotState::Table(_)));
@@ -73,7 +103,9 @@ fn radii(recording: &Recording, radius_m: f64) -> Vec<f64> {
         let [x, y, _] = point.programmed_m;
         (x.hypot(y) - radius_m).abs() < 1e-8
     });
-    let middle: Vec<f64> = turn.map(|point| point.corrected_m[0].hypot(point.corrected_m[1])).collect();
+    let middle: Vec<f64> = turn
+        .map(|point| point.corrected_m[0].hypot(point.corrected_m[1]))
+        .collect();
     let quarter = middle.len() / 4;
     middle[quarter..3 * quarter].to_vec()
 }
@@ -93,7 +125,11 @@ fn circles_are_corrected_unless_bypassed() {
     controller.command(Command::Bypass { on: true }).unwrap();
     let recording = controller.run_circle(&wanted, 1).unwrap();
     let end = recording.points.len() - 1;
-    assert!(recording.points[300..].iter().all(|point| point.programmed_m == point.corrected_m));
+    assert!(
+        recording.points[300..]
+            .iter()
+            .all(|point| point.programmed_m == point.corrected_m)
+    );
     // Two laps at constant feed, entry and exit, and the approach from the origin.
     let turns_s = 2.0 * std::f64::consts::TAU * radius / feed;
     assert!(recording.points[end].time_s > turns_s && recording.points[end].time_s < turns_s + 3.0);
@@ -108,7 +144,10 @@ fn a_coarse_record_is_a_thinned_one() {
     assert_eq!(coarse.dt_s, 0.007);
     let thinned = fine.points.iter().step_by(7);
     for (a, b) in thinned.zip(&coarse.points) {
-        assert_eq!((a.programmed_m, a.corrected_m), (b.programmed_m, b.corrected_m));
+        assert_eq!(
+            (a.programmed_m, a.corrected_m),
+            (b.programmed_m, b.corrected_m)
+        );
     }
     assert_eq!(fine.points.len().div_ceil(7), coarse.points.len() - 1);
 }
@@ -116,17 +155,27 @@ fn a_coarse_record_is_a_thinned_one() {
 #[test]
 fn a_second_run_waits_for_the_first() {
     let mut controller = sim();
-    controller.start_circle(&circle(0.1, 0.1, Direction::Ccw, 1)).unwrap();
+    controller
+        .start_circle(&circle(0.1, 0.1, Direction::Ccw, 1))
+        .unwrap();
     let refused = controller.start_circle(&circle(0.1, 0.1, Direction::Ccw, 1));
-    assert!(matches!(refused, Err(ControllerError::Refused(Refusal::Busy))));
-    assert!(matches!(controller.reset(), Err(ControllerError::Refused(Refusal::Busy))));
+    assert!(matches!(
+        refused,
+        Err(ControllerError::Refused(Refusal::Busy))
+    ));
+    assert!(matches!(
+        controller.reset(),
+        Err(ControllerError::Refused(Refusal::Busy))
+    ));
     controller.command(Command::Stop).unwrap();
     let mut polls = 0;
     while controller.status().unwrap().motion != MotionState::Idle {
         polls += 1;
         assert!(polls < 2000, "does not stop");
     }
-    controller.run_circle(&circle(0.1, 0.4, Direction::Ccw, 1), 1).unwrap();
+    controller
+        .run_circle(&circle(0.1, 0.4, Direction::Ccw, 1), 1)
+        .unwrap();
 }
 
 fn table_refusal(result: Result<flash::Flashed, ControllerError>) -> table::TableError {
@@ -143,29 +192,59 @@ fn only_signed_tables_once_a_key_is_provisioned() {
     let (key, other) = (SigningKey::generate(), SigningKey::generate());
     let mut controller = sim();
     controller.flash(&image(1.0), &mut |_| {}).unwrap();
-    controller.flash(&key.sign(&image(1.1)).unwrap(), &mut |_| {}).unwrap();
+    controller
+        .flash(&key.sign(&image(1.1)).unwrap(), &mut |_| {})
+        .unwrap();
     controller.flash(&image(1.2), &mut |_| {}).unwrap();
-    controller.command(Command::Provision { key: key.public() }).unwrap();
+    controller
+        .command(Command::Provision { key: key.public() })
+        .unwrap();
     // The unsigned table in use is gone, the signed one before it is back.
-    assert_eq!(controller.verify(&key.sign(&image(1.1)).unwrap()).unwrap(), flash::Verdict::Same { slot: 1 });
+    assert_eq!(
+        controller.verify(&key.sign(&image(1.1)).unwrap()).unwrap(),
+        flash::Verdict::Same { slot: 1 }
+    );
     controller.reset().unwrap();
     assert!(controller.identity().signed_only);
     let good = key.sign(&image(1.3)).unwrap();
-    assert_eq!(table_refusal(controller.flash(&image(1.3), &mut |_| {})), table::TableError::Unsigned);
+    assert_eq!(
+        table_refusal(controller.flash(&image(1.3), &mut |_| {})),
+        table::TableError::Unsigned
+    );
     let strange = other.sign(&image(1.3)).unwrap();
-    assert_eq!(table_refusal(controller.flash(&strange, &mut |_| {})), table::TableError::BadSignature);
+    assert_eq!(
+        table_refusal(controller.flash(&strange, &mut |_| {})),
+        table::TableError::BadSignature
+    );
     // Altered after it was signed, its CRC set right.
     let mut altered = image(1.4);
     let signature = &good[good.len() - table::image::SIGNATURE_BYTES..];
     altered.resize(altered.len() + signature.len(), 0);
     let length = altered.len() - signature.len();
-    table::image::attach_signature(&mut altered, length, |_, _| signature.try_into().unwrap()).unwrap();
-    assert_eq!(table_refusal(controller.flash(&altered, &mut |_| {})), table::TableError::BadSignature);
-    assert_eq!(controller.verify(&key.sign(&image(1.1)).unwrap()).unwrap(), flash::Verdict::Same { slot: 1 });
+    table::image::attach_signature(&mut altered, length, |_, _| signature.try_into().unwrap())
+        .unwrap();
+    assert_eq!(
+        table_refusal(controller.flash(&altered, &mut |_| {})),
+        table::TableError::BadSignature
+    );
+    assert_eq!(
+        controller.verify(&key.sign(&image(1.1)).unwrap()).unwrap(),
+        flash::Verdict::Same { slot: 1 }
+    );
     // Once: the same key again changes nothing, another one is refused.
-    controller.command(Command::Provision { key: key.public() }).unwrap();
-    let again = controller.command(Command::Provision { key: other.public() });
-    assert!(matches!(again, Err(ControllerError::Refused(Refusal::KeyProvisioned))));
+    controller
+        .command(Command::Provision { key: key.public() })
+        .unwrap();
+    let again = controller.command(Command::Provision {
+        key: other.public(),
+    });
+    assert!(matches!(
+        again,
+        Err(ControllerError::Refused(Refusal::KeyProvisioned))
+    ));
     controller.flash(&good, &mut |_| {}).unwrap();
-    assert_eq!(controller.verify(&good).unwrap(), flash::Verdict::Same { slot: 0 });
+    assert_eq!(
+        controller.verify(&good).unwrap(),
+        flash::Verdict::Same { slot: 0 }
+    );
 }

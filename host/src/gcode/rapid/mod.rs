@@ -26,12 +26,19 @@ pub fn is_rapid(program: &[u8]) -> bool {
         .map(|line| line.trim_ascii())
         .filter(|line| !line.is_empty() && !line.starts_with(b"!"))
         .skip_while(|line| {
-            [b"%%%".as_slice(), b"VERSION:", b"LANGUAGE:"].iter().any(|head| line.starts_with(head))
+            [b"%%%".as_slice(), b"VERSION:", b"LANGUAGE:"]
+                .iter()
+                .any(|head| line.starts_with(head))
         })
         .map(|line| {
-            line.split(|b| !b.is_ascii_alphanumeric()).next().unwrap_or_default().to_ascii_uppercase()
+            line.split(|b| !b.is_ascii_alphanumeric())
+                .next()
+                .unwrap_or_default()
+                .to_ascii_uppercase()
         });
-    words.next().is_some_and(|word| [b"MODULE".as_slice(), b"PROC", b"LOCAL"].contains(&word.as_slice()))
+    words
+        .next()
+        .is_some_and(|word| [b"MODULE".as_slice(), b"PROC", b"LOCAL"].contains(&word.as_slice()))
 }
 
 /// Rewrites the arcs of a module.
@@ -50,11 +57,27 @@ pub fn compensate(program: &[u8], model: &ModelFile, options: &Options) -> Compe
             motions.push((i, None));
         }
     }
-    let nothing = Line { text: b"", end: b"", words: Vec::new(), sort: Sort::Plain };
-    let plans =
-        decide(&vec![nothing; actions.len()], &actions, &Inverse::new(model, options), options, LEAST_MM);
-    let mut out = Compensated { program: Vec::new(), arcs: Vec::new() };
-    let end = lines.iter().find_map(|l| l.ends_with(b"\r\n").then_some("\r\n")).unwrap_or("\n");
+    let nothing = Line {
+        text: b"",
+        end: b"",
+        words: Vec::new(),
+        sort: Sort::Plain,
+    };
+    let plans = decide(
+        &vec![nothing; actions.len()],
+        &actions,
+        &Inverse::new(model, options),
+        options,
+        LEAST_MM,
+    );
+    let mut out = Compensated {
+        program: Vec::new(),
+        arcs: Vec::new(),
+    };
+    let end = lines
+        .iter()
+        .find_map(|l| l.ends_with(b"\r\n").then_some("\r\n"))
+        .unwrap_or("\n");
     // Where the last rewritten arc ended, if the next one goes on from there.
     let mut from: Option<[f64; 2]> = None;
     for (i, line) in lines.iter().enumerate() {
@@ -62,7 +85,15 @@ pub fn compensate(program: &[u8], model: &ModelFile, options: &Options) -> Compe
         let fate = match (&actions[at], &plans[at], &motions[at].1) {
             (Action::Arc(arc), Some(Ok(plan)), Some(motion)) => {
                 let pieces = blend::pieces(arc, plan.twin.delta_mm, plan.entry, plan.exit);
-                let text = blocks(arc, plan, &pieces, motion, from.unwrap_or(arc.start), line, end);
+                let text = blocks(
+                    arc,
+                    plan,
+                    &pieces,
+                    motion,
+                    from.unwrap_or(arc.start),
+                    line,
+                    end,
+                );
                 out.program.extend_from_slice(&text);
                 from = pieces.last().map(|p| p.end);
                 let (radius_mm, feed_mm_s) = (arc.radius_mm, arc.feed_mm_s);
@@ -80,10 +111,13 @@ pub fn compensate(program: &[u8], model: &ModelFile, options: &Options) -> Compe
                 if *action != Action::Nothing {
                     from = None;
                 }
-                plan.as_ref().and_then(|p| p.as_ref().err()).map(|left| Fate::Left(*left))
+                plan.as_ref()
+                    .and_then(|p| p.as_ref().err())
+                    .map(|left| Fate::Left(*left))
             }
         };
-        out.arcs.extend(fate.map(|fate| Report { line: i + 1, fate }));
+        out.arcs
+            .extend(fate.map(|fate| Report { line: i + 1, fate }));
     }
     out
 }
@@ -92,8 +126,11 @@ pub fn compensate(program: &[u8], model: &ModelFile, options: &Options) -> Compe
 #[cfg(test)]
 pub(super) fn actions(program: &[u8]) -> Vec<Action> {
     let mut reader = Reader::default();
-    let read = program.split_inclusive(|b| *b == b'\n').map(|line| reader.step(line));
-    read.flat_map(|read| std::iter::once(read.action).chain(read.stops.then_some(Action::Other))).collect()
+    let read = program
+        .split_inclusive(|b| *b == b'\n')
+        .map(|line| reader.step(line));
+    read.flat_map(|read| std::iter::once(read.action).chain(read.stops.then_some(Action::Other)))
+        .collect()
 }
 
 /// The instructions that take the place of an arc.
@@ -106,26 +143,52 @@ fn blocks(
     line: &[u8],
     end: &str,
 ) -> Vec<u8> {
-    let indent = line.iter().take_while(|b| b.is_ascii_whitespace()).count().min(line.len());
-    let target =
-        |[x, y]: [f64; 2]| format!("[[{},{},{}],{}]", number(x), number(y), motion.height, motion.pose);
+    let indent = line
+        .iter()
+        .take_while(|b| b.is_ascii_whitespace())
+        .count()
+        .min(line.len());
+    let target = |[x, y]: [f64; 2]| {
+        format!(
+            "[[{},{},{}],{}]",
+            number(x),
+            number(y),
+            motion.height,
+            motion.pose
+        )
+    };
     let speed = match plan.twin.feed_factor {
         1.0 => motion.speed.clone(),
-        factor => format!("[{},{}]", number(arc.feed_mm_s * factor), motion.other_speeds),
+        factor => format!(
+            "[{},{}]",
+            number(arc.feed_mm_s * factor),
+            motion.other_speeds
+        ),
     };
-    let passing = if motion.zone.eq_ignore_ascii_case("fine") { "z0" } else { &motion.zone };
+    let passing = if motion.zone.eq_ignore_ascii_case("fine") {
+        "z0"
+    } else {
+        &motion.zone
+    };
     let mut text = Vec::new();
     let mut from = start;
     for (k, piece) in pieces.iter().enumerate() {
         let last = k + 1 == pieces.len();
         // The end of the arc, if it is where it was, as it was written.
-        let to = if last && piece.end == arc.end { motion.to.clone() } else { target(piece.end) };
+        let to = if last && piece.end == arc.end {
+            motion.to.clone()
+        } else {
+            target(piece.end)
+        };
         let zone = if last { motion.zone.as_str() } else { passing };
         text.extend_from_slice(&line[..indent]);
         let with = &motion.tool;
         let code = match piece.centre {
             Some(centre) => {
-                format!("MoveC {},{to},{speed},{zone},{with};", target(middle(from, piece, centre)))
+                format!(
+                    "MoveC {},{to},{speed},{zone},{with};",
+                    target(middle(from, piece, centre))
+                )
             }
             None => format!("MoveL {to},{speed},{zone},{with};"),
         };
@@ -147,12 +210,19 @@ fn middle(from: [f64; 2], piece: &Piece, centre: [f64; 2]) -> [f64; 2] {
     let sense = if piece.ccw { 1.0 } else { -1.0 };
     let turned = (sense * (b[1].atan2(b[0]) - a[1].atan2(a[0]))).rem_euclid(std::f64::consts::TAU);
     let (sin, cos) = (sense * 0.5 * turned).sin_cos();
-    [centre[0] + a[0] * cos - a[1] * sin, centre[1] + a[0] * sin + a[1] * cos]
+    [
+        centre[0] + a[0] * cos - a[1] * sin,
+        centre[1] + a[0] * sin + a[1] * cos,
+    ]
 }
 
 /// A hundredth of a micrometre, without trailing zeros.
 fn number(value: f64) -> String {
     let text = format!("{value:.5}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".into() } else { text.into() }
+    if text == "-0" {
+        "0".into()
+    } else {
+        text.into()
+    }
 }

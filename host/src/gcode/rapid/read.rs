@@ -55,15 +55,19 @@ pub(super) struct Reader {
 const FLAT_MM: f64 = 1e-3;
 /// The predefined speeds v5 … v7000, mm/s.
 const PREDEFINED: [u32; 25] = [
-    5, 10, 20, 30, 40, 50, 60, 80, 100, 150, 200, 300, 400, 500, 600, 800, 1000, 1500, 2000, 2500, 3000,
-    4000, 5000, 6000, 7000,
+    5, 10, 20, 30, 40, 50, 60, 80, 100, 150, 200, 300, 400, 500, 600, 800, 1000, 1500, 2000, 2500,
+    3000, 4000, 5000, 6000, 7000,
 ];
 /// What goes with a predefined speed.
 const PREDEFINED_REST: &str = "500,5000,1000";
 
 impl Read {
     fn of(action: Action) -> Self {
-        Self { action, motion: None, stops: false }
+        Self {
+            action,
+            motion: None,
+            stops: false,
+        }
     }
 }
 
@@ -76,8 +80,10 @@ impl Reader {
             return Read::of(Action::Other);
         };
         let trimmed = text.trim();
-        let first =
-            trimmed.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').next().unwrap_or_default();
+        let first = trimmed
+            .split(|c: char| !c.is_ascii_alphanumeric() && c != '_')
+            .next()
+            .unwrap_or_default();
         match first.to_ascii_uppercase().as_str() {
             "" if trimmed.is_empty() => Read::of(Action::Nothing),
             "MODULE" | "ENDMODULE" | "PERS" | "VAR" | "TASK" | "RECORD" | "ENDRECORD" | "ALIAS" => {
@@ -91,13 +97,14 @@ impl Reader {
                 (self.stand, self.blocked) = (None, None);
                 Read::of(Action::Other)
             }
-            "CONFL" | "CONFJ" | "SINGAREA" | "ACCSET" | "TPWRITE" | "TPERASE" => Read::of(Action::Nothing),
-            // The robot may stand still here and is where it was afterwards.
-            "STOP" | "WAITTIME" | "WAITDI" | "WAITDO" | "WAITROB" | "SETDO" | "SET" | "RESET" | "PULSEDO" => {
-                Read::of(Action::Other)
+            "CONFL" | "CONFJ" | "SINGAREA" | "ACCSET" | "TPWRITE" | "TPERASE" => {
+                Read::of(Action::Nothing)
             }
-            "IF" | "ELSE" | "ELSEIF" | "ENDIF" | "FOR" | "ENDFOR" | "WHILE" | "ENDWHILE" | "TEST"
-            | "CASE" | "DEFAULT" | "ENDTEST" | "GOTO" | "RETURN" | "ERROR" | "UNDO" => {
+            // The robot may stand still here and is where it was afterwards.
+            "STOP" | "WAITTIME" | "WAITDI" | "WAITDO" | "WAITROB" | "SETDO" | "SET" | "RESET"
+            | "PULSEDO" => Read::of(Action::Other),
+            "IF" | "ELSE" | "ELSEIF" | "ENDIF" | "FOR" | "ENDFOR" | "WHILE" | "ENDWHILE"
+            | "TEST" | "CASE" | "DEFAULT" | "ENDTEST" | "GOTO" | "RETURN" | "ERROR" | "UNDO" => {
                 self.blocked = Some(Left::ProgramFlow);
                 Read::of(Action::Other)
             }
@@ -119,9 +126,12 @@ impl Reader {
             }
             "MOVEJ" => {
                 let arguments = arguments(trimmed, "MoveJ");
-                self.stand = arguments
-                    .filter(|a| a.len() == 4)
-                    .and_then(|a| Some(Stand { target: self.target(&a[0])?, tool: a[3].clone() }));
+                self.stand = arguments.filter(|a| a.len() == 4).and_then(|a| {
+                    Some(Stand {
+                        target: self.target(&a[0])?,
+                        tool: a[3].clone(),
+                    })
+                });
                 Read::of(Action::Other)
             }
             _ if trimmed.contains(":=") && !trimmed.contains('(') => Read::of(Action::Nothing),
@@ -135,12 +145,16 @@ impl Reader {
 
     /// `CONST robtarget name := [...];` or `CONST speeddata name := [...];`
     fn declare(&mut self, text: &str) {
-        let Some((left, right)) = text.split_once(":=") else { return };
+        let Some((left, right)) = text.split_once(":=") else {
+            return;
+        };
         let words: Vec<&str> = left.split_whitespace().collect();
         let literal = right.trim().trim_end_matches(';').trim();
         let [kind, name] = match words[..] {
             [c, kind, name] if c.eq_ignore_ascii_case("CONST") => [kind, name],
-            [l, c, kind, name] if l.eq_ignore_ascii_case("LOCAL") && c.eq_ignore_ascii_case("CONST") => {
+            [l, c, kind, name]
+                if l.eq_ignore_ascii_case("LOCAL") && c.eq_ignore_ascii_case("CONST") =>
+            {
                 [kind, name]
             }
             _ => return,
@@ -170,8 +184,10 @@ impl Reader {
         let (name, own) = match text.split_once('\\') {
             Some((name, switch)) => {
                 let (key, value) = switch.split_once(":=")?;
-                let value =
-                    key.trim().eq_ignore_ascii_case("V").then(|| value.trim().parse::<f64>().ok())??;
+                let value = key
+                    .trim()
+                    .eq_ignore_ascii_case("V")
+                    .then(|| value.trim().parse::<f64>().ok())??;
                 (name.trim(), Some(value))
             }
             None => (text, None),
@@ -196,36 +212,68 @@ impl Reader {
         };
         let stops = list[2].eq_ignore_ascii_case("fine");
         let before = self.stand.take();
-        self.stand = self.target(&list[0]).map(|target| Stand { target, tool: list[3].clone() });
-        let Some(now) = &self.stand else { return Read { stops, ..Read::of(Action::Other) } };
+        self.stand = self.target(&list[0]).map(|target| Stand {
+            target,
+            tool: list[3].clone(),
+        });
+        let Some(now) = &self.stand else {
+            return Read {
+                stops,
+                ..Read::of(Action::Other)
+            };
+        };
         let before = before.filter(|b| b.tool == now.tool);
         let start = before.map_or([None; 3], |b| b.target.place.map(Some));
-        let action = Action::Line(Straight { start, end: now.target.place.map(Some), absolute: true });
-        Read { stops, ..Read::of(action) }
+        let action = Action::Line(Straight {
+            start,
+            end: now.target.place.map(Some),
+            absolute: true,
+        });
+        Read {
+            stops,
+            ..Read::of(action)
+        }
     }
 
     fn arc(&mut self, text: &str) -> Result<Read, Left> {
         let trimmed = text.trim();
-        let list = arguments(trimmed, "MoveC").filter(|a| a.len() == 5).ok_or(Left::Expression)?;
+        let list = arguments(trimmed, "MoveC")
+            .filter(|a| a.len() == 5)
+            .ok_or(Left::Expression)?;
         let [via, to, speed, zone, tool] = [&list[0], &list[1], &list[2], &list[3], &list[4]];
         let before = self.stand.take();
         let target = self.target(to);
-        self.stand = target.clone().map(|target| Stand { target, tool: tool.clone() });
+        self.stand = target.clone().map(|target| Stand {
+            target,
+            tool: tool.clone(),
+        });
         let stops = zone.eq_ignore_ascii_case("fine");
-        let lost = |left| Ok(Read { stops, ..Read::of(Action::LostArc(left)) });
+        let lost = |left| {
+            Ok(Read {
+                stops,
+                ..Read::of(Action::LostArc(left))
+            })
+        };
         if let Some(left) = self.blocked {
             return lost(left);
         }
-        let (Some(via), Some(end)) = (self.target(via), target) else { return lost(Left::Expression) };
+        let (Some(via), Some(end)) = (self.target(via), target) else {
+            return lost(Left::Expression);
+        };
         let Some(Stand { target: start, .. }) = before.filter(|b| b.tool == *tool) else {
             return lost(Left::UnknownPosition);
         };
-        let Some((feed_mm_s, other_speeds)) = self.speed(speed) else { return lost(Left::UnknownFeed) };
+        let Some((feed_mm_s, other_speeds)) = self.speed(speed) else {
+            return lost(Left::UnknownFeed);
+        };
         if start.pose != end.pose {
             return lost(Left::OtherAxes);
         }
         let height = end.place[2];
-        if [&start, &via].iter().any(|t| (t.place[2] - height).abs() > FLAT_MM) {
+        if [&start, &via]
+            .iter()
+            .any(|t| (t.place[2] - height).abs() > FLAT_MM)
+        {
             return lost(Left::OtherPlane);
         }
         let flat = |t: &Target| [t.place[0], t.place[1]];
@@ -233,8 +281,12 @@ impl Reader {
             return lost(Left::Geometry);
         };
         let radius_mm = (start.place[0] - centre[0]).hypot(start.place[1] - centre[1]);
-        let modes =
-            Modes { inch: false, absolute: true, absolute_centres: false, feed_mode: FeedMode::PerMinute };
+        let modes = Modes {
+            inch: false,
+            absolute: true,
+            absolute_centres: false,
+            feed_mode: FeedMode::PerMinute,
+        };
         let arc = Arc {
             plane: Plane::Xy,
             start: flat(&start),
@@ -257,7 +309,11 @@ impl Reader {
             pose: end.pose,
             rest: text.rfind(';').map_or(text.len(), |at| at + 1),
         };
-        Ok(Read { action: Action::Arc(arc), motion: Some(motion), stops })
+        Ok(Read {
+            action: Action::Arc(arc),
+            motion: Some(motion),
+            stops,
+        })
     }
 }
 
@@ -297,14 +353,21 @@ fn literal_target(text: &str) -> Option<Target> {
     let text: String = text.chars().filter(|c| !c.is_whitespace()).collect();
     let inner = text.strip_prefix("[[")?.strip_suffix("]]")?;
     let (place, rest) = inner.split_once("],")?;
-    let numbers: Option<Vec<f64>> =
-        place.split(',').map(|n| n.parse().ok().filter(|v: &f64| v.is_finite())).collect();
+    let numbers: Option<Vec<f64>> = place
+        .split(',')
+        .map(|n| n.parse().ok().filter(|v: &f64| v.is_finite()))
+        .collect();
     let place = numbers?.try_into().ok()?;
     let pose = format!("{rest}]");
     // Four numbers of orientation, four of configuration, six of external axes.
     let counts: Vec<usize> = pose
         .split("],[")
-        .map(|part| part.trim_matches(['[', ']']).split(',').filter(|n| n.parse::<f64>().is_ok()).count())
+        .map(|part| {
+            part.trim_matches(['[', ']'])
+                .split(',')
+                .filter(|n| n.parse::<f64>().is_ok())
+                .count()
+        })
         .collect();
     (counts == [4, 4, 6]).then_some(Target { place, pose })
 }
@@ -326,9 +389,19 @@ fn through(s: [f64; 2], v: [f64; 2], e: [f64; 2]) -> Option<([f64; 2], f64)> {
     if cross.abs() < 1e-9 * (bb + cc) || cc < 1e-12 {
         return None;
     }
-    let centre = [s[0] + (c[1] * bb - b[1] * cc) / cross, s[1] + (b[0] * cc - c[0] * bb) / cross];
+    let centre = [
+        s[0] + (c[1] * bb - b[1] * cc) / cross,
+        s[1] + (b[0] * cc - c[0] * bb) / cross,
+    ];
     let angle = |p: [f64; 2]| (p[1] - centre[1]).atan2(p[0] - centre[0]);
     let turned = |p: [f64; 2]| (angle(p) - angle(s)).rem_euclid(TAU);
     let (to_via, to_end) = (turned(v), turned(e));
-    Some((centre, if to_via < to_end { to_end } else { to_end - TAU }))
+    Some((
+        centre,
+        if to_via < to_end {
+            to_end
+        } else {
+            to_end - TAU
+        },
+    ))
 }

@@ -13,7 +13,10 @@ fn zone() -> Zone {
         radius_m: [0.05, 0.3],
         feed_m_s: [0.02, 0.7],
         travel: Travel::Both,
-        cumulants: Cumulants { kappa2_s2: 46.58e-6, kappa4_s4: -5.5e-6 },
+        cumulants: Cumulants {
+            kappa2_s2: 46.58e-6,
+            kappa4_s4: -5.5e-6,
+        },
         terms: heapless::Vec::new(),
     }
 }
@@ -22,7 +25,10 @@ fn table() -> Table {
     Table {
         machine: "irb1600".try_into().unwrap(),
         zones: heapless::Vec::from_slice(&[zone()]).unwrap(),
-        limits: Limits { offset_m: 1e-3, slew_m_s: 0.05 },
+        limits: Limits {
+            offset_m: 1e-3,
+            slew_m_s: 0.05,
+        },
     }
 }
 
@@ -34,12 +40,29 @@ fn all_terms() -> [Term<f32>; 11] {
         Term::ScaleMismatch { relative: 1e-5 },
         Term::Squareness { shear_rad: 1e-5 },
         Term::ServoMismatch { delta_tau_s: 1e-4 },
-        Term::BandwidthMismatch { delta_kappa2_s2: 1e-6 },
+        Term::BandwidthMismatch {
+            delta_kappa2_s2: 1e-6,
+        },
         Term::Backlash { axis, step_m: 1e-5 },
-        Term::LateralPlay { axis: x, shift_m: 1e-5 },
-        Term::ReversalSpike { axis, peak_m: 1e-5, decay_s: 0.02 },
-        Term::Cyclic { axis, amplitude_m: 1e-6, pitch_m: 0.01, phase_rad: 1.0 },
-        Term::Straightness { axis: x, curvature_per_m: 1e-4 },
+        Term::LateralPlay {
+            axis: x,
+            shift_m: 1e-5,
+        },
+        Term::ReversalSpike {
+            axis,
+            peak_m: 1e-5,
+            decay_s: 0.02,
+        },
+        Term::Cyclic {
+            axis,
+            amplitude_m: 1e-6,
+            pitch_m: 0.01,
+            phase_rad: 1.0,
+        },
+        Term::Straightness {
+            axis: x,
+            curvature_per_m: 1e-4,
+        },
     ]
 }
 
@@ -80,7 +103,12 @@ fn golden_bytes() {
     assert_eq!(image[..12], expected[..12]);
     assert_eq!(image[20..], expected[20..]);
     // An independent CRC-32 (zlib's, of the same bytes), so that neither crate nor layout can drift.
-    assert_eq!(image[12..16], GOLDEN_CRC.to_le_bytes(), "{:08x}", crc_of(&image));
+    assert_eq!(
+        image[12..16],
+        GOLDEN_CRC.to_le_bytes(),
+        "{:08x}",
+        crc_of(&image)
+    );
     assert_eq!(SCHEMA_HASH, GOLDEN_SCHEMA, "{SCHEMA_HASH:08x}");
 }
 
@@ -93,12 +121,18 @@ const GOLDEN_SCHEMA: u32 = 0xb37a_9ab9;
 fn discriminants_are_pinned() {
     let mut out = [0; 32];
     for (index, term) in all_terms().into_iter().enumerate() {
-        assert_eq!(usize::from(postcard::to_slice(&term, &mut out).unwrap()[0]), index);
+        assert_eq!(
+            usize::from(postcard::to_slice(&term, &mut out).unwrap()[0]),
+            index
+        );
     }
     let mut one = |value: &dyn Fn(&mut [u8]) -> u8| value(&mut out);
     assert_eq!(one(&|b| postcard::to_slice(&Axis::Y, b).unwrap()[0]), 1);
     assert_eq!(one(&|b| postcard::to_slice(&Travel::Cw, b).unwrap()[0]), 2);
-    assert_eq!(one(&|b| postcard::to_slice(&Direction::Cw, b).unwrap()[0]), 1);
+    assert_eq!(
+        one(&|b| postcard::to_slice(&Direction::Cw, b).unwrap()[0]),
+        1
+    );
 }
 
 #[test]
@@ -115,7 +149,10 @@ fn largest_table_fits_exactly() {
     assert_eq!(decode(&image), Ok(table.clone()));
     assert_eq!(check(&image), Ok(()));
     // Zone by zone is what postcard makes of the whole.
-    assert_eq!(postcard::from_bytes::<Table>(&image[HEADER_BYTES..]), Ok(table));
+    assert_eq!(
+        postcard::from_bytes::<Table>(&image[HEADER_BYTES..]),
+        Ok(table)
+    );
 }
 
 #[test]
@@ -138,19 +175,43 @@ fn each_breakage_has_its_own_error() {
     };
     assert_eq!(broken(&|b| b.clear()), TableError::NotATable);
     assert_eq!(broken(&|b| b[0] = b'g'), TableError::NotATable);
-    assert_eq!(broken(&|b| b.truncate(10)), TableError::Truncated { have: 10, need: 20 });
-    assert_eq!(broken(&|b| b.truncate(40)), TableError::Truncated { have: 40, need: have });
-    assert_eq!(broken(&|b| b.push(0)), TableError::TooLong { length: have + 1, max: have });
+    assert_eq!(
+        broken(&|b| b.truncate(10)),
+        TableError::Truncated { have: 10, need: 20 }
+    );
+    assert_eq!(
+        broken(&|b| b.truncate(40)),
+        TableError::Truncated {
+            have: 40,
+            need: have
+        }
+    );
+    assert_eq!(
+        broken(&|b| b.push(0)),
+        TableError::TooLong {
+            length: have + 1,
+            max: have
+        }
+    );
     assert_eq!(
         broken(&|b| b[9] = 0xff),
-        TableError::TooLong { length: 0xff00 + have, max: MAX_IMAGE_BYTES as u32 }
+        TableError::TooLong {
+            length: 0xff00 + have,
+            max: MAX_IMAGE_BYTES as u32
+        }
     );
     assert!(matches!(broken(&|b| b[30] ^= 1), TableError::BadCrc { .. }));
     let newer = |b: &mut Vec<u8>| {
         b[4] = 9;
         reseal(b);
     };
-    assert_eq!(broken(&newer), TableError::NewerVersion { version: 9, supported: 1 });
+    assert_eq!(
+        broken(&newer),
+        TableError::NewerVersion {
+            version: 9,
+            supported: 1
+        }
+    );
     // The same byte changed on the way, not by a newer giotto.
     assert!(matches!(broken(&|b| b[4] = 9), TableError::BadCrc { .. }));
     let edit = |at: usize, value: u8| {
@@ -161,7 +222,10 @@ fn each_breakage_has_its_own_error() {
     };
     assert_eq!(edit(4, 0), TableError::UnknownVersion { version: 0 });
     assert_eq!(edit(6, 2), TableError::UnknownFlags { flags: 2 });
-    assert!(matches!(edit(16, !good[16]), TableError::SchemaMismatch { .. }));
+    assert!(matches!(
+        edit(16, !good[16]),
+        TableError::SchemaMismatch { .. }
+    ));
     assert_eq!(edit(20, 200), TableError::Malformed);
     assert_eq!(edit(28, 0), TableError::NoZones);
     assert_eq!(edit(28, 2), TableError::Malformed); // a zone missing
@@ -177,7 +241,10 @@ fn each_bad_number_is_named() {
     let at = Where(Some(0));
     let nan = |at, field| TableError::NonFinite { at, field };
     assert_eq!(wrong(&|t| t.zones.clear()), TableError::NoZones);
-    assert_eq!(wrong(&|t| t.limits.offset_m = f32::NAN), nan(Where::HEAD, Field::LimitOffset));
+    assert_eq!(
+        wrong(&|t| t.limits.offset_m = f32::NAN),
+        nan(Where::HEAD, Field::LimitOffset)
+    );
     assert_eq!(
         wrong(&|t| t.limits.offset_m = 0.1),
         TableError::OutOfBounds {
@@ -188,20 +255,45 @@ fn each_bad_number_is_named() {
             hi: bounds::OFFSET_MAX_M
         }
     );
-    assert_eq!(wrong(&|t| t.limits.slew_m_s = f32::INFINITY), nan(Where::HEAD, Field::LimitSlew));
-    assert_eq!(wrong(&|t| t.zones[0].cumulants.kappa4_s4 = f32::NAN), nan(at, Field::Kappa4));
+    assert_eq!(
+        wrong(&|t| t.limits.slew_m_s = f32::INFINITY),
+        nan(Where::HEAD, Field::LimitSlew)
+    );
+    assert_eq!(
+        wrong(&|t| t.zones[0].cumulants.kappa4_s4 = f32::NAN),
+        nan(at, Field::Kappa4)
+    );
     assert_eq!(
         wrong(&|t| t.zones[0].radius_m = [0.3, 0.05]),
-        TableError::EmptyRange { at, field: Field::Radius, lo: 0.3, hi: 0.05 }
+        TableError::EmptyRange {
+            at,
+            field: Field::Radius,
+            lo: 0.3,
+            hi: 0.05
+        }
     );
     let field_of = |error| match error {
-        TableError::OutOfBounds { at: place, field, .. } if place == at => field,
+        TableError::OutOfBounds {
+            at: place, field, ..
+        } if place == at => field,
         other => panic!("{other}"),
     };
-    assert_eq!(field_of(wrong(&|t| t.zones[0].radius_m[1] = 1.5)), Field::Radius);
-    assert_eq!(field_of(wrong(&|t| t.zones[0].feed_m_s[0] = 0.0)), Field::Feed);
-    assert_eq!(field_of(wrong(&|t| t.zones[0].cumulants.kappa2_s2 = -0.1)), Field::Kappa2);
-    assert_eq!(field_of(wrong(&|t| t.zones[0].place_m = Some([[-1e6; 3]; 2]))), Field::Place);
+    assert_eq!(
+        field_of(wrong(&|t| t.zones[0].radius_m[1] = 1.5)),
+        Field::Radius
+    );
+    assert_eq!(
+        field_of(wrong(&|t| t.zones[0].feed_m_s[0] = 0.0)),
+        Field::Feed
+    );
+    assert_eq!(
+        field_of(wrong(&|t| t.zones[0].cumulants.kappa2_s2 = -0.1)),
+        Field::Kappa2
+    );
+    assert_eq!(
+        field_of(wrong(&|t| t.zones[0].place_m = Some([[-1e6; 3]; 2]))),
+        Field::Place
+    );
 }
 
 /// Every number of every term, made not finite and made huge, is refused.
@@ -217,7 +309,10 @@ fn no_number_of_a_term_goes_unchecked() {
                 let end = length - 4 * (numbers - 1 - number);
                 changed[end - 4..end].copy_from_slice(&bad.to_le_bytes());
                 let mut table = table();
-                table.zones[0].terms.push(postcard::from_bytes(&changed[..length]).unwrap()).unwrap();
+                table.zones[0]
+                    .terms
+                    .push(postcard::from_bytes(&changed[..length]).unwrap())
+                    .unwrap();
                 let refused = table.validate();
                 assert!(refused.is_err(), "{term:?} number {number} = {bad}");
             }
@@ -237,7 +332,10 @@ fn signature_travels_outside_the_body() {
     });
     let image = &out[..signed.unwrap()];
     assert_eq!(decode(image), Ok(table()));
-    assert_eq!(signed_parts(image).unwrap().signature, &[7; SIGNATURE_BYTES]);
+    assert_eq!(
+        signed_parts(image).unwrap().signature,
+        &[7; SIGNATURE_BYTES]
+    );
 }
 
 proptest! {

@@ -11,7 +11,11 @@ fn framed<M: Serialize>(message: &M) -> Vec<u8> {
 }
 
 fn request(seq: u16) -> Request {
-    Request { session: 7, seq, command: Command::Status }
+    Request {
+        session: 7,
+        seq,
+        command: Command::Status,
+    }
 }
 
 /// Every payload found in `bytes`.
@@ -29,9 +33,20 @@ fn received(accumulator: &mut Accumulator, bytes: &[u8]) -> Vec<Request> {
 #[test]
 fn largest_messages_fit() {
     let data = Chunk::from_slice(&[0xff; CHUNK]).unwrap();
-    let command = Command::WriteChunk { offset: u16::MAX, data: data.clone() };
-    framed(&Request { session: u16::MAX, seq: u16::MAX, command });
-    framed(&Request { session: u16::MAX, seq: u16::MAX, command: Command::Provision { key: [255; 32] } });
+    let command = Command::WriteChunk {
+        offset: u16::MAX,
+        data: data.clone(),
+    };
+    framed(&Request {
+        session: u16::MAX,
+        seq: u16::MAX,
+        command,
+    });
+    framed(&Request {
+        session: u16::MAX,
+        seq: u16::MAX,
+        command: Command::Provision { key: [255; 32] },
+    });
     let most_nm = [i32::MIN; 3];
     let arc = ExactArc {
         centre_nm: most_nm,
@@ -42,10 +57,26 @@ fn largest_messages_fit() {
         fraction: u64::MAX,
         feed_m_s: f32::MAX,
     };
-    let command = Command::Append { segment: ExactSegment::Arc(arc), tolerance_nm: u32::MAX };
-    framed(&Request { session: u16::MAX, seq: u16::MAX, command });
-    let reply = |reply| framed(&FromController::Reply { session: u16::MAX, seq: u16::MAX, reply });
-    reply(Reply::Data { offset: u16::MAX, data });
+    let command = Command::Append {
+        segment: ExactSegment::Arc(arc),
+        tolerance_nm: u32::MAX,
+    };
+    framed(&Request {
+        session: u16::MAX,
+        seq: u16::MAX,
+        command,
+    });
+    let reply = |reply| {
+        framed(&FromController::Reply {
+            session: u16::MAX,
+            seq: u16::MAX,
+            reply,
+        })
+    };
+    reply(Reply::Data {
+        offset: u16::MAX,
+        data,
+    });
     let name: heapless::String<16> = "1234567890123456".try_into().unwrap();
     reply(Reply::Identity(Identity {
         board: name.clone(),
@@ -58,7 +89,11 @@ fn largest_messages_fit() {
         signed_only: true,
     }));
     let most = u32::MAX;
-    let slot = SlotState::Table(TableInfo { length: u16::MAX, crc: most, generation: Some(most) });
+    let slot = SlotState::Table(TableInfo {
+        length: u16::MAX,
+        crc: most,
+        generation: Some(most),
+    });
     reply(Reply::Status(Status {
         motion: MotionState::Fault,
         fault: Some(FaultCause::Discontinuity),
@@ -93,7 +128,10 @@ fn largest_messages_fit() {
             link_losses: most,
         },
     }));
-    let point = SetPoint { raw_nm: [i32::MIN; 3], corrected_nm: [i32::MIN; 3] };
+    let point = SetPoint {
+        raw_nm: [i32::MIN; 3],
+        corrected_nm: [i32::MIN; 3],
+    };
     framed(&FromController::SetPoints(SetPoints {
         tick: most,
         every: u16::MAX,
@@ -113,7 +151,11 @@ fn golden_frame() {
         start_rad: core::f64::consts::FRAC_PI_2,
     };
     let command = Command::RunCircle(run.exact().unwrap());
-    let frame = framed(&Request { session: 1, seq: 300, command });
+    let frame = framed(&Request {
+        session: 1,
+        seq: 300,
+        command,
+    });
     #[rustfmt::skip]
     let payload = [
         1,                                              // session
@@ -126,7 +168,10 @@ fn golden_frame() {
         0x80, 0x80, 0x80, 0x80, 0x04,                   // from a quarter turn
     ];
     let mut accumulator = Accumulator::new();
-    let found = frame.iter().find_map(|&byte| accumulator.push(byte).map(<[u8]>::to_vec)).unwrap();
+    let found = frame
+        .iter()
+        .find_map(|&byte| accumulator.push(byte).map(<[u8]>::to_vec))
+        .unwrap();
     assert_eq!(found, payload);
 }
 
@@ -138,7 +183,13 @@ fn next_frame_is_found_after_an_overlong_one() {
     bytes.extend(framed(&request(1)));
     bytes.extend(framed(&request(2)));
     assert_eq!(received(&mut accumulator, &bytes), [request(2)]);
-    assert_eq!(accumulator.counts(), FrameCounts { overlong: 1, ..FrameCounts::default() });
+    assert_eq!(
+        accumulator.counts(),
+        FrameCounts {
+            overlong: 1,
+            ..FrameCounts::default()
+        }
+    );
 }
 
 #[test]
@@ -158,7 +209,14 @@ fn changed_frames_are_counted_and_dropped() {
     bytes.extend([1, 0]); // too short for a CRC
     bytes.extend(framed(&request(2)));
     assert_eq!(received(&mut accumulator, &bytes), [request(2)]);
-    assert_eq!(accumulator.counts(), FrameCounts { crc_errors: 1, malformed: 1, overlong: 0 });
+    assert_eq!(
+        accumulator.counts(),
+        FrameCounts {
+            crc_errors: 1,
+            malformed: 1,
+            overlong: 0
+        }
+    );
 }
 
 proptest! {
