@@ -2,9 +2,9 @@
 //!
 //! The machine is a position loop behind a moving average, the same on both axes, as fast as machines are that are asked for
 //! 5 m/s² and 100 m/s³. It knows nothing of the correction, and the table nothing of it but its two cumulants.
-use giotto::controller::Recording;
 use giotto::simulation::machine::{AccDec, PositionLoop};
 use giotto::simulation::{Hold, Machine, SetPoints, drive};
+use giotto_link::Recording;
 use giotto_shared::model::Cumulants;
 use giotto_shared::table::{self, Limits, MAX_IMAGE_BYTES, Table, Travel, Zone};
 
@@ -74,7 +74,7 @@ impl Errors {
 
 /// The errors of a recorded run; `distance` is that of a point from the programmed path, m.
 pub fn errors(recording: &Recording, distance: &dyn Fn([f64; 2]) -> f64) -> Errors {
-    let largest = |pick: fn(&giotto::controller::SetPointRecord) -> [f64; 3]| {
+    let largest = |pick: fn(&giotto_link::SetPointRecord) -> [f64; 3]| {
         let mut position_m: Vec<[f64; 2]> = recording
             .points
             .iter()

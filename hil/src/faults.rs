@@ -1,9 +1,9 @@
 //! A link that breaks bytes on purpose: flip, drop, duplicate, delay, truncate, split, join, burst. Seeded.
 use crate::ticks::largest_table;
-use giotto::controller::flash::Verdict;
-use giotto::controller::link::Link;
-use giotto::controller::virtual_controller::VirtualLink;
-use giotto::controller::{Controller, ControllerError, Segment, Step};
+use giotto_link::flash::Verdict;
+use giotto_link::link::Link;
+use giotto_link::virtual_controller::VirtualLink;
+use giotto_link::{Controller, ControllerError, Segment, Step};
 use giotto_shared::table::{self, MAX_IMAGE_BYTES};
 use giotto_shared::wire::{Command, MotionState};
 use rand::{Rng, RngExt, SeedableRng};

@@ -3,7 +3,7 @@
 //! Counts do not depend on what else a machine does, so a check of them can fail for one reason only: the code. Host kernels
 //! use what the processor has: one without AVX2 takes more, which the line on who made the record shows.
 use crate::ticks;
-use giotto::controller::ControllerError;
+use giotto_link::ControllerError;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -1,10 +1,10 @@
 //! What a table takes on the link, beside a raw echo of as many bytes on the same emulated line, as many of them on their
 //! way at once.
 use crate::ticks::largest_table;
-use giotto::controller::emulator::{Emulator, Pace};
-use giotto::controller::image::{self, Board};
-use giotto::controller::link::Link;
-use giotto::controller::{Controller, ControllerError};
+use giotto_link::emulator::{Emulator, Pace};
+use giotto_link::image::{self, Board};
+use giotto_link::link::Link;
+use giotto_link::{Controller, ControllerError};
 use giotto_shared::wire::IN_FLIGHT;
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};

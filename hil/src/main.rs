@@ -2,13 +2,13 @@
 #![forbid(unsafe_code)]
 
 use clap::{Parser, Subcommand};
-use giotto::controller::ControllerError;
-use giotto::controller::{Board, OpenOptions, Pace, Port, open};
 use giotto_hil::faults;
 use giotto_hil::instructions::{self, CountError};
 use giotto_hil::scenarios::{self, Outcome};
 use giotto_hil::ticks::{self, Counts, TERMS};
 use giotto_hil::{link, rate, size, streams};
+use giotto_link::ControllerError;
+use giotto_link::{Board, OpenOptions, Pace, Port, open};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -35,7 +35,7 @@ enum Command {
         #[arg(long)]
         port: String,
         /// Baud rate of a serial device.
-        #[arg(long, default_value_t = giotto::controller::port::BAUD)]
+        #[arg(long, default_value_t = giotto_link::port::BAUD)]
         baud: u32,
         /// Firmware image for QEMU, instead of the one of this workspace.
         #[arg(long)]

@@ -1,7 +1,7 @@
 //! Scenarios of programs: segments sent ahead of the machine, and the contour that comes of them.
 use crate::contour::{self, Errors};
 use crate::scenarios::{Trouble, at_rest, ensure, holds, refused_as};
-use giotto::controller::{Controller, ControllerError, ProgramError, Recording, Segment, Step};
+use giotto_link::{Controller, ControllerError, ProgramError, Recording, Segment, Step};
 use giotto_shared::wire::{Command, MotionRefusal, Refusal};
 use std::f64::consts::PI;
 use std::time::Duration;

@@ -1,8 +1,8 @@
 //! How fast a controller can be: ticks a second with time to spare, and the time from a file to a confirmed table.
 use crate::ticks::largest_table;
-use giotto::controller::emulator::{Emulator, Pace};
-use giotto::controller::image::{self, Board};
-use giotto::controller::{Controller, ControllerError, circle};
+use giotto_link::emulator::{Emulator, Pace};
+use giotto_link::image::{self, Board};
+use giotto_link::{Controller, ControllerError, circle};
 use giotto_shared::Direction;
 use giotto_shared::wire::MotionState;
 use serde_json::{Value, json};

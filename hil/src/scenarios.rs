@@ -4,8 +4,8 @@
 use crate::contour::Errors;
 use crate::programs;
 use crate::ticks::largest_table;
-use giotto::controller::flash::{Verdict, is_flash_fault};
-use giotto::controller::{Controller, ControllerError, circle};
+use giotto_link::flash::{Verdict, is_flash_fault};
+use giotto_link::{Controller, ControllerError, circle};
 use giotto_shared::Direction;
 use giotto_shared::table::{self, MAX_IMAGE_BYTES, TableError};
 use giotto_shared::wire::{

@@ -1,9 +1,9 @@
 //! What an image takes and what its tick can reach, against the bars.
 use crate::elf::{Image, Reach};
 use crate::ticks::largest_table;
-use giotto::controller::emulator::{Emulator, Pace};
-use giotto::controller::image::{self, Board};
-use giotto::controller::{Controller, ControllerError, Segment, Step, circle};
+use giotto_link::emulator::{Emulator, Pace};
+use giotto_link::image::{self, Board};
+use giotto_link::{Controller, ControllerError, Segment, Step, circle};
 use giotto_shared::Direction;
 use serde_json::{Value, json};
 use std::path::Path;

@@ -2,8 +2,8 @@
 use crate::contour;
 use crate::programs::{self, TRIES};
 use crate::scenarios::{Scenario, Trouble, ensure, holds};
-use giotto::controller::streaming::Streamed;
-use giotto::controller::{Controller, ControllerError};
+use giotto_link::streaming::Streamed;
+use giotto_link::{Controller, ControllerError};
 use giotto_shared::path::smoothstep;
 use giotto_shared::wire::{Command, FaultCause, MotionState};
 use std::f64::consts::TAU;

@@ -1,8 +1,8 @@
 //! Instructions of one tick, counted by the emulator, and what the image takes.
 use crate::elf;
-use giotto::controller::emulator::program;
-use giotto::controller::image::{self, Board};
-use giotto::controller::{ControllerError, OpenOptions, Port, circle, open};
+use giotto_link::emulator::program;
+use giotto_link::image::{self, Board};
+use giotto_link::{ControllerError, OpenOptions, Port, circle, open};
 use giotto_shared::Direction;
 use giotto_shared::model::Cumulants;
 use giotto_shared::table::{

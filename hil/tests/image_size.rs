@@ -3,8 +3,8 @@
     clippy::unwrap_used,
     reason = "helpers of a test fail as the test does"
 )]
-use giotto::controller::image::Board;
 use giotto_hil::size::{RAM_BAR, TEXT_BAR, measure};
+use giotto_link::image::Board;
 
 #[test]
 fn the_image_meets_its_bars_and_cannot_panic() {

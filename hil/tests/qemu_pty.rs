@@ -3,12 +3,12 @@
     clippy::unwrap_used,
     reason = "helpers of a test fail as the test does"
 )]
-use giotto::controller::emulator::{Emulator, Pace};
-use giotto::controller::flash::Verdict;
-use giotto::controller::port::BAUD;
-use giotto::controller::serial::SerialLink;
-use giotto::controller::{Controller, ControllerError, circle};
 use giotto_hil::ticks::largest_table;
+use giotto_link::emulator::{Emulator, Pace};
+use giotto_link::flash::Verdict;
+use giotto_link::port::BAUD;
+use giotto_link::serial::SerialLink;
+use giotto_link::{Controller, ControllerError, circle};
 use giotto_shared::Direction;
 use giotto_shared::table::{self, MAX_IMAGE_BYTES, TableError};
 use giotto_shared::wire::{Command, Refusal};

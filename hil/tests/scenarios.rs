@@ -4,10 +4,10 @@
     clippy::unwrap_used,
     reason = "helpers of a test fail as the test does"
 )]
-use giotto::controller::emulator::{Emulator, Pace};
-use giotto::controller::{Board, Controller, OpenOptions, Port, circle, open};
 use giotto_hil::scenarios::{self, Outcome, Scenario};
 use giotto_hil::streams;
+use giotto_link::emulator::{Emulator, Pace};
+use giotto_link::{Board, Controller, OpenOptions, Port, circle, open};
 use giotto_shared::Direction;
 use giotto_shared::wire::{MotionState, Refusal};
 use std::io::Write;
@@ -89,9 +89,7 @@ fn stop_switch() {
     let refused = controller.start_circle(&circle(0.1, 0.1, Direction::Ccw, 1));
     let refused = matches!(
         refused,
-        Err(giotto::controller::ControllerError::Refused(
-            Refusal::Motion(_)
-        ))
+        Err(giotto_link::ControllerError::Refused(Refusal::Motion(_)))
     );
     assert!(refused && controller.status().unwrap().counters.stops == 1);
     switch.write_all(b".").unwrap();

@@ -4,11 +4,11 @@
     clippy::unwrap_used,
     reason = "helpers of a test fail as the test does"
 )]
-use giotto::controller::flash::{Verdict, active_table};
-use giotto::controller::link::Link;
-use giotto::controller::virtual_controller::VirtualLink;
-use giotto::controller::{Controller, ControllerError};
 use giotto_hil::ticks::largest_table;
+use giotto_link::flash::{Verdict, active_table};
+use giotto_link::link::Link;
+use giotto_link::virtual_controller::VirtualLink;
+use giotto_link::{Controller, ControllerError};
 use giotto_shared::table::{self, MAX_IMAGE_BYTES};
 use giotto_shared::wire::{IN_FLIGHT, MAX_FRAME, Probation, SlotState};
 use std::collections::VecDeque;

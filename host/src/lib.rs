@@ -4,16 +4,10 @@
 pub mod analysis;
 pub mod campaign;
 pub mod causes;
-pub mod cli;
-pub mod controller;
-pub mod demo;
 pub mod diagnosis;
 pub mod fit;
-pub mod gcode;
 pub mod model_file;
 pub mod planning;
-pub mod report;
-pub mod signing;
 pub mod simulation;
 pub mod table_from_model;
 pub mod toml_file;

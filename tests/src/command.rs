@@ -19,7 +19,14 @@ pub fn giotto() -> Command {
             .expect("tests run from target/PROFILE/deps")
             .to_path_buf();
         let mut build = Command::new(env!("CARGO"));
-        build.args(["build", "--quiet", "--package", "giotto", "--bin", "giotto"]);
+        build.args([
+            "build",
+            "--quiet",
+            "--package",
+            "giotto-cli",
+            "--bin",
+            "giotto",
+        ]);
         if profile.ends_with("release") {
             build.arg("--release");
         }

@@ -4,8 +4,8 @@
     clippy::panic,
     reason = "helpers of a test fail as the test does"
 )]
-use giotto::controller::{OpenOptions, Port, open};
-use giotto::demo::{CIRCLES, Learned, Proof, bundled, learn, picture, prove};
+use giotto_cli::ring::{CIRCLES, Learned, Proof, bundled, learn, picture, prove};
+use giotto_link::{OpenOptions, Port, open};
 use giotto_shared::table::Table;
 use giotto_tests::command::{giotto, outcome};
 use serde_json::Value;

@@ -5,12 +5,11 @@
 //! a peer that solves another problem stops the bench. The Python peers live in a virtual environment that is made
 //! beside the build (`python3 -m venv`, `pip install`); the last table is in `host/benches/RESULTS.md`.
 //!
-//! Each part runs in a process of its own. `-- circle`, `stepwise`, `csv`, `diagnosis`, `plant`, `ticks`, `link` run parts
+//! Each part runs in a process of its own. `-- circle`, `stepwise`, `csv`, `plant`, `ticks`, `link` run parts
 //! alone and write nothing. What the controller does is measured under QEMU by `giotto-hil`, which is built on the way.
 mod circle;
 mod controller;
 mod csv;
-mod diagnosis;
 mod plant;
 mod python;
 mod stepwise;
@@ -39,11 +38,10 @@ fn main() -> Result<(), Error> {
         .filter(|a| !a.starts_with("--"))
         .collect();
     let for_page = std::env::args().any(|a| a == FOR_PAGE);
-    let parts: [(&str, Part); 7] = [
+    let parts: [(&str, Part); 6] = [
         ("circle", circle::run),
         ("stepwise", stepwise::run),
         ("csv", csv::run),
-        ("diagnosis", diagnosis::run),
         ("plant", plant::run),
         ("ticks", controller::ticks),
         ("link", controller::link),

@@ -11,7 +11,6 @@ import time
 from importlib.metadata import version
 
 import circle_fit
-import diagnosis
 import numpy as np
 import pandas as pd
 import polars as pl
@@ -160,7 +159,6 @@ def plant_solve_ivp(data):
 PEERS = {
     "lsim": plant_lsim,
     "solve_ivp": plant_solve_ivp,
-    "diagnosis": diagnosis.run,
     "scipy": circle_scipy,
     "circle-fit": circle_circle_fit,
     "statsmodels": stepwise_statsmodels,

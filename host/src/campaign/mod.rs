@@ -40,7 +40,7 @@ pub use manifest::{Entry, Manifest, SHORTEST_ARC_DEG};
 pub use read::{Together, read, read_with_notes};
 pub use samples::{Frame, Loaded, Tilt};
 pub(crate) use table::is_contract_header;
-pub(crate) use write::replace;
+pub use write::replace;
 pub use write::write;
 
 use std::f64::consts::TAU;

@@ -62,7 +62,7 @@ fn make_dir(dir: &Path) -> Result<(), CampaignError> {
 }
 
 /// Writes a file whole or not at all.
-pub(crate) fn replace(path: &Path, text: &str) -> Result<(), CampaignError> {
+pub fn replace(path: &Path, text: &str) -> Result<(), CampaignError> {
     let io = |e: std::io::Error| CampaignError::io(path, "written", "a place for a file", &e);
     let dir = path
         .parent()

@@ -11,13 +11,11 @@
 //! | `lanes` | sums over points with the vectors that this processor has |
 //! | `radius` | [`RadiusFit`]: β1, β2 with intervals (Eq. 15–16, 20–21), offsets, prediction of radii not used |
 //! | `heldout` | how well circles that were not fitted are predicted |
-//! | `figures` | the paper's Figures 8–11 as SVG |
 //!
 //! The run is the unit of replication here: each run gives one radius error, and the spread between runs is what
 //! the intervals are made of.
 mod by_radius;
 mod circle;
-mod figures;
 mod heldout;
 pub(crate) mod lanes;
 mod least_squares;
@@ -33,7 +31,6 @@ mod stepwise;
 mod tests;
 
 pub use circle::{Parallel, fit_circle};
-pub use figures::{Figure, FigureError, figures};
 pub use heldout::Heldout;
 pub use least_squares::{LeastSquares, Triangle};
 pub use quantile::{critical_f, critical_t};

@@ -441,33 +441,6 @@ fn scatter_is_that_of_the_points() {
 }
 
 #[test]
-fn figures_are_drawn_with_every_run_in_them() {
-    let mut runs = campaign(PAPER, |_| 0.0);
-    runs.iter_mut()
-        .for_each(|r| r.out_of_roundness_m = Some(20e-6));
-    let fit = RadiusFit::new(
-        &runs,
-        Options {
-            train_radius_m: Some(0.1),
-            ..Options::default()
-        },
-    )
-    .unwrap();
-    let figures = figures(&fit.points(&runs), &fit.model).unwrap();
-    assert_eq!(figures.len(), 4);
-    for figure in figures {
-        // A mark for each run and one for each radius in the key.
-        assert_eq!(
-            figure.svg.matches("<circle").count(),
-            78 + 3,
-            "{}",
-            figure.file
-        );
-        assert!(figure.svg.contains("R 300 mm, predicted"));
-    }
-}
-
-#[test]
 fn a_radius_left_out_is_predicted_by_the_fit_on_the_others() {
     let runs = campaign(PAPER, |i| 1e-6 * ((i as f64 * 0.754877666).fract() - 0.5));
     for offset in [Offset::Joint, Offset::LowestSpeed] {

@@ -12,8 +12,6 @@ mod design;
 mod grid;
 mod information;
 mod program;
-#[cfg(test)]
-mod program_tests;
 mod question;
 mod sequence;
 #[cfg(test)]

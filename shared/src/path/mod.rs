@@ -20,4 +20,4 @@ pub use exact::{
 };
 pub use feed_ramp::{FeedRamp, MotionLimits, STEEPEST, Smoothstep, smoothstep};
 pub use quantity::Quantity;
-pub use segment::{CircleRun, Segment};
+pub use segment::{CircleRun, Segment, Step};

@@ -48,3 +48,12 @@ pub enum Segment {
         time_s: f64,
     },
 }
+
+/// One piece of a program.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// The piece, from where the one before ends.
+    pub segment: Segment,
+    /// How far the path may leave the joint with the one before, m; 0: exact stop.
+    pub tolerance_m: f64,
+}

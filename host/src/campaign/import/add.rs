@@ -64,12 +64,24 @@ impl Options {
 }
 
 /// Which laps of a recording become runs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Laps {
     /// The first whole one: laps of one recording share its set-up and are no repetitions of it.
     First,
     /// Each one, as a run of its own.
     Each,
+}
+
+impl Laps {
+    /// Every choice with its name on a command line and what it is.
+    pub const ALL: [(Self, &str, &str); 2] = [
+        (
+            Self::First,
+            "first",
+            "The first whole one: laps of one recording share its set-up and are no repetitions of it",
+        ),
+        (Self::Each, "each", "Each one, as a run of its own"),
+    ];
 }
 
 /// A run that was added.

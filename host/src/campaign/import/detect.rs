@@ -4,7 +4,7 @@ use super::{columns, kflop, leica, named, rtde, spatial_analyzer};
 use std::fmt;
 
 /// Layouts that are read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// By the first lines of the file.
     Auto,
@@ -26,6 +26,34 @@ pub enum Format {
     Columns,
     /// Ballbar 20 `.b5r`: results without samples.
     B5r,
+}
+
+impl Format {
+    /// Every layout with its name on a command line and what it is.
+    pub const ALL: [(Self, &str, &str); 10] = [
+        (Self::Auto, "auto", "By the first lines of the file"),
+        (Self::Contract, "contract", "CSV of a giotto campaign"),
+        (
+            Self::German,
+            "german",
+            "Columns by the words of the header, `;` between them, decimal comma",
+        ),
+        (Self::Named, "named", "Columns by the words of the header"),
+        (Self::Leica, "leica", "Leica tracker CSV"),
+        (
+            Self::SpatialAnalyzer,
+            "spatial-analyzer",
+            "SpatialAnalyzer text",
+        ),
+        (Self::Rtde, "rtde", "Universal Robots RTDE recording"),
+        (Self::Kflop, "kflop", "KFLOP log"),
+        (Self::Columns, "columns", "As `--columns` says"),
+        (
+            Self::B5r,
+            "b5r",
+            "Ballbar 20 `.b5r`: results without samples",
+        ),
+    ];
 }
 
 impl fmt::Display for Format {

@@ -1,0 +1,47 @@
+//! `giotto controller`: start a virtual controller.
+use super::{Failure, Output};
+use giotto_link::emulator::{Emulator, Pace};
+use giotto_link::virtual_controller;
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Arguments of `giotto controller`.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    /// `sim`: the firmware's library in this process; `qemu`: the firmware image in the emulator.
+    kind: Kind,
+    /// Firmware image for `qemu`, instead of the one of this workspace.
+    #[arg(long, value_name = "PATH")]
+    image: Option<PathBuf>,
+}
+
+#[derive(clap::ValueEnum, Clone, Copy, Debug)]
+enum Kind {
+    Sim,
+    Qemu,
+}
+
+/// The line that says where the controller can be reached; always the first on stdout.
+fn announce(path: &str) {
+    let mut stdout = std::io::stdout();
+    let _ = writeln!(stdout, "port: {path}");
+    let _ = stdout.flush();
+}
+
+/// Runs the command.
+pub fn run(args: Args, out: Output) -> Result<(), Failure> {
+    match args.kind {
+        Kind::Sim => match virtual_controller::serve(&mut announce)? {},
+        Kind::Qemu => {
+            let mut note = |text: &str| out.note(text);
+            let mut emulator = Emulator::start(args.image.as_deref(), Pace::Clock, &mut note)?;
+            announce(emulator.pty());
+            out.note(format_args!(
+                "set-points: {}",
+                emulator.stream_path().display()
+            ));
+            emulator.wait();
+            Err(Failure::controller("the emulator has ended"))
+        }
+    }
+}

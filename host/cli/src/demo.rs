@@ -1,0 +1,342 @@
+//! `giotto demo`: the whole loop on a bundled campaign and a simulated machine.
+use super::failure::{Failure, cannot_write};
+use super::output::Output;
+use crate::ring::{
+    DemoError, LEFT_M, Learned, Proof, REDUCTION_PERCENT, Size, bundled, learn, picture, prove,
+};
+use comfy_table::{CellAlignment, Table, presets};
+use giotto_link::{Controller, OpenOptions, Port, open};
+use giotto_shared::Direction;
+use indicatif::ProgressBar;
+use serde_json::{Value, json};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// Arguments of `giotto demo`.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    /// Controller that runs the circles: the firmware's library in this process, or its image in QEMU.
+    #[arg(long, value_enum, default_value = "sim")]
+    controller: Kind,
+    /// Firmware image for `qemu`, instead of the one of this workspace.
+    #[arg(long, value_name = "PATH")]
+    image: Option<PathBuf>,
+    /// Seed of every random draw: noise, set-up, spread, order of the runs.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Write a picture of a circle before and after here.
+    #[arg(long, value_name = "FILE.svg")]
+    svg: Option<PathBuf>,
+}
+
+#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Sim,
+    Qemu,
+}
+
+impl Kind {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Sim => "sim",
+            Self::Qemu => "qemu",
+        }
+    }
+
+    fn open(self, image: Option<PathBuf>, out: Output) -> Result<Controller, Failure> {
+        let port = match self {
+            Self::Sim => Port::Sim,
+            Self::Qemu => Port::Qemu,
+        };
+        Ok(open(
+            &port,
+            &OpenOptions {
+                image,
+                ..OpenOptions::default()
+            },
+            &mut |note| out.note(note),
+        )?)
+    }
+}
+
+impl From<DemoError> for Failure {
+    fn from(error: DemoError) -> Self {
+        match error {
+            DemoError::Controller(error) => error.into(),
+            other => Self::check(format_args!("the ring does not close: {other}")),
+        }
+    }
+}
+
+/// Runs the command.
+pub fn run(args: Args, out: Output) -> Result<(), Failure> {
+    let started = Instant::now();
+    let plan = bundled()?;
+    out.say(format_args!(
+        "The machine is SIMULATED: a {} and a ballbar with {:.1} µm noise. Controller: {}. Seed {}.",
+        plan.machine_name,
+        plan.instrument.noise_m * 1e6,
+        match args.controller {
+            Kind::Sim => "the firmware's library in this process",
+            Kind::Qemu => "the firmware's image in QEMU",
+        },
+        args.seed
+    ));
+    // A controller that is not there should not be found out last.
+    let mut controller = args.controller.open(args.image, out)?;
+    let learned = learn(&plan, args.seed)?;
+    show_learned(&learned, out);
+    let bar = if out.draws() {
+        ProgressBar::new_spinner()
+    } else {
+        ProgressBar::hidden()
+    };
+    bar.enable_steady_tick(Duration::from_millis(100));
+    let proof = prove(
+        &mut controller,
+        &plan,
+        &learned.table.table,
+        args.seed,
+        &mut |step| bar.set_message(step.to_owned()),
+    );
+    bar.finish_and_clear();
+    let proof = proof?;
+    if let Some(path) = &args.svg {
+        std::fs::write(path, picture(&proof)).map_err(|e| cannot_write(path, &e))?;
+        out.note(format_args!("picture written to {}", path.display()));
+    }
+    if out.json {
+        out.document(&document(
+            args.controller,
+            &plan.machine_name,
+            args.seed,
+            &proof,
+        ))?;
+    } else {
+        show_proof(&proof, out);
+        out.say(format_args!("{:.1} s", started.elapsed().as_secs_f64()));
+    }
+    if proof.holds() {
+        return Ok(());
+    }
+    Err(Failure::check(format_args!(
+        "the size error should fall by {REDUCTION_PERCENT} % or to {:.1} µm, and the out-of-roundness should fall",
+        LEFT_M * 1e6
+    )))
+}
+
+fn um(size: Size) -> Value {
+    json!({
+        "radius_error_rms_um": size.radius_error_rms_m * 1e6,
+        "out_of_roundness_um": size.out_of_roundness_m * 1e6,
+    })
+}
+
+const fn word(direction: Direction) -> &'static str {
+    match direction {
+        Direction::Ccw => "ccw",
+        Direction::Cw => "cw",
+    }
+}
+
+/// The contract's document; what the machine is, the seed and the form of each circle beside it.
+fn document(kind: Kind, machine: &str, seed: u64, proof: &Proof) -> Value {
+    let circles: Vec<Value> = proof
+        .circles
+        .iter()
+        .map(|pair| {
+            let (before, after) = (&pair.before.analysis, &pair.after.analysis);
+            json!({
+                "radius_mm": (before.radius_m * 1e9).round() / 1e6,
+                "feed_mm_s": (before.feed_m_s * 1e9).round() / 1e6,
+                "direction": word(before.direction),
+                "before_um": before.radius_error_m * 1e6,
+                "after_um": after.radius_error_m * 1e6,
+                "out_of_roundness_um": [before.out_of_roundness_m * 1e6, after.out_of_roundness_m * 1e6],
+            })
+        })
+        .collect();
+    json!({
+        "controller": kind.name(),
+        "simulated": true,
+        "machine": machine,
+        "seed": seed,
+        "before": um(proof.before()),
+        "after": um(proof.after()),
+        "reduction_percent": proof.reduction_percent(),
+        "circles": circles,
+    })
+}
+
+fn table(header: &[&str], left: usize) -> Table {
+    let mut table = Table::new();
+    table
+        .load_style(presets::NOTHING)
+        .set_header(header.iter().copied());
+    for (k, column) in table.column_iter_mut().enumerate() {
+        column.set_cell_alignment(if k < left {
+            CellAlignment::Left
+        } else {
+            CellAlignment::Right
+        });
+    }
+    table
+}
+
+fn show_learned(learned: &Learned, out: Output) {
+    let runs = &learned.report.runs;
+    let rms = |of: fn(&giotto::analysis::RunAnalysis) -> f64| {
+        (runs.iter().map(|r| of(r).powi(2)).sum::<f64>() / runs.len().max(1) as f64).sqrt() * 1e6
+    };
+    let range = |of: fn(&giotto::analysis::RunAnalysis) -> f64| {
+        let values = runs.iter().map(|r| of(r) * 1e3);
+        (
+            values.clone().fold(f64::INFINITY, f64::min),
+            values.fold(0.0, f64::max),
+        )
+    };
+    let ((r0, r1), (f0, f1)) = (range(|r| r.radius_m), range(|r| r.feed_m_s));
+    out.say(format_args!(
+        "\n1 analyse   {} circles, R {r0:.0} to {r1:.0} mm, {f0:.0} to {f1:.0} mm/s, both ways: size error {:.1} µm rms, out-of-roundness {:.1} µm",
+        runs.len(),
+        rms(|r| r.radius_error_m),
+        rms(|r| r.out_of_roundness_m)
+    ));
+    let fit = &learned.fit;
+    let half = fit.ci95.map(|[low, high]| 0.5e6 * (high - low));
+    out.say(format_args!(
+        "2 fit       ΔR = β1 f²/R + β2 f⁴/R³: β1 = {:.3} ± {:.3} ·10⁻⁶ s², β2 = {:.4} ± {:.4} ·10⁻⁶ s⁴",
+        fit.model.beta1_s2 * 1e6,
+        half[0],
+        fit.model.beta2_s4 * 1e6,
+        half[1]
+    ));
+    if let Some(heldout) = &fit.heldout {
+        out.say(format_args!(
+            "            predicts each radius from the others: {:.2} µm rms, {:.2} % explained",
+            heldout.rms_m * 1e6,
+            heldout.explained_percent
+        ));
+    }
+    let diagnosis = &learned.diagnosis;
+    out.say(format_args!(
+        "3 diagnose  against {}:",
+        diagnosis.baseline.name
+    ));
+    let mut found = table(
+        &[
+            "cause",
+            "axis",
+            "size",
+            "95 % from",
+            "to",
+            "unit",
+            "share %",
+            "correctable",
+        ],
+        2,
+    );
+    for f in &diagnosis.findings {
+        let axis = match f.axis {
+            Some(giotto_shared::Axis::X) => "x",
+            Some(giotto_shared::Axis::Y) => "y",
+            None => "",
+        };
+        found.add_row([
+            f.cause.model().words().name.to_owned(),
+            axis.to_owned(),
+            number(f.estimate.value),
+            number(f.estimate.ci95[0]),
+            number(f.estimate.ci95[1]),
+            f.estimate.unit.to_owned(),
+            format!("{:.1}", f.share_percent),
+            if f.compensable { "yes" } else { "no" }.to_owned(),
+        ]);
+    }
+    out.say(indented(&found));
+    if diagnosis.unexplained.present {
+        out.say(format_args!(
+            "            unexplained: {:.2} µm rms",
+            diagnosis.unexplained.rms_um
+        ));
+    }
+    out.say(format_args!(
+        "4 extend    on runs left out the simulation is off by {:.2} µm rms, before {:.2} (gain {:.1} %)",
+        diagnosis.extended.heldout_rms_um, diagnosis.baseline.heldout_rms_um, diagnosis.gain_percent
+    ));
+    let zone = learned.table.table.zones.first();
+    out.say(format_args!(
+        "            table: κ2, κ4 and {} terms{}",
+        zone.map_or(0, |zone| zone.terms.len()),
+        match learned.table.left_out.len() {
+            0 => String::new(),
+            n => format!("; {n} effects that no controller corrects are left out"),
+        }
+    ));
+}
+
+fn show_proof(proof: &Proof, out: Output) {
+    let flashed = &proof.flashed;
+    out.say(format_args!(
+        "5 flash     {} bytes in slot {}, read back, committed, confirmed as generation {}",
+        flashed.bytes, flashed.slot, flashed.generation
+    ));
+    out.say("6 run       circles whose radii and speeds are not in the campaign, last of the steady turns measured:");
+    let mut circles = table(
+        &[
+            "R mm",
+            "mm/s",
+            "",
+            "ΔR before",
+            "ΔR after",
+            "roundness before",
+            "after (µm)",
+        ],
+        0,
+    );
+    for pair in &proof.circles {
+        let (before, after) = (&pair.before.analysis, &pair.after.analysis);
+        circles.add_row([
+            format!("{:.0}", before.radius_m * 1e3),
+            format!("{:.0}", before.feed_m_s * 1e3),
+            word(before.direction).to_owned(),
+            format!("{:.2}", before.radius_error_m * 1e6),
+            format!("{:+.2}", after.radius_error_m * 1e6),
+            format!("{:.1}", before.out_of_roundness_m * 1e6),
+            format!("{:.1}", after.out_of_roundness_m * 1e6),
+        ]);
+    }
+    out.say(indented(&circles));
+    let (before, after) = (proof.before(), proof.after());
+    if proof.clamped > 0 {
+        out.say(format_args!(
+            "            {} set-points were clamped",
+            proof.clamped
+        ));
+    }
+    out.say(format_args!(
+        "7 measure   radius size error {:.2} → {:.2} µm rms ({:.2} % less); out-of-roundness {:.1} → {:.1} µm, noise included",
+        before.radius_error_rms_m * 1e6,
+        after.radius_error_rms_m * 1e6,
+        proof.reduction_percent(),
+        before.out_of_roundness_m * 1e6,
+        after.out_of_roundness_m * 1e6
+    ));
+}
+
+fn indented(table: &Table) -> String {
+    table
+        .lines()
+        .map(|line| format!("            {line}"))
+        .collect::<Vec<_>>()
+        .join("\n")
+}
+
+/// Four digits, in the form that is short.
+fn number(value: f64) -> String {
+    if value != 0.0 && value.abs() < 1e-2 {
+        format!("{value:.3e}")
+    } else {
+        format!("{value:.4}")
+    }
+}

@@ -1,0 +1,237 @@
+//! `giotto diagnose`: what the simulation gets wrong, why, the extended model, the gain.
+use super::failure::{Failure, cannot_write};
+use super::output::Output;
+use super::source::Source;
+use comfy_table::{CellAlignment, Table, presets};
+use giotto::diagnosis::{Diagnosis, Finding, Options, diagnose};
+use giotto::model_file::ModelFile;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `giotto diagnose`.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    #[command(flatten)]
+    source: Source,
+    /// Simulation to start from; without it one servo lag with fitted kv.
+    #[arg(long, value_name = "MODEL.toml")]
+    model: Option<PathBuf>,
+    /// Write the extended model here.
+    #[arg(short, long, value_name = "EXTENDED.toml")]
+    output: Option<PathBuf>,
+    /// Write an HTML report here.
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
+    /// Seed of the bootstrap.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+}
+
+/// Runs the command.
+pub fn run(args: Args, out: Output) -> Result<(), Failure> {
+    let campaign = args.source.read(out)?;
+    let model = args.model.as_deref().map(ModelFile::load).transpose()?;
+    let bar = out.spinner("diagnosing");
+    let diagnosis = diagnose(
+        &campaign,
+        &Options {
+            model,
+            seed: args.seed,
+        },
+    );
+    bar.finish_and_clear();
+    let diagnosis = diagnosis.map_err(|e| args.source.refused(&e))?;
+    if let Some(path) = &args.output {
+        diagnosis.model.save(path)?;
+        out.note(format_args!("wrote {}", path.display()));
+    }
+    if let Some(path) = &args.report {
+        let html = giotto_report::html(&campaign, &diagnosis).map_err(Failure::input)?;
+        std::fs::write(path, html).map_err(|e| cannot_write(path, &e))?;
+        out.note(format_args!("wrote {}", path.display()));
+    }
+    if out.json {
+        return out.document(&diagnosis);
+    }
+    show(&campaign.name, &diagnosis, args.output.as_deref(), &out);
+    Ok(())
+}
+
+/// The diagnosis as a person reads it.
+fn show(name: &str, d: &Diagnosis, extended: Option<&Path>, out: &Output) {
+    out.say(format_args!(
+        "Campaign {name}: noise {:.2} µm a sample, {:.2} µm between runs; seed {}",
+        d.noise_um, d.spread_um, d.seed
+    ));
+    out.say(format_args!("Simulation: {}", d.baseline.name));
+    let m = &d.misfit;
+    let mut table = Table::new();
+    table
+        .load_style(presets::NOTHING)
+        .set_header(["misfit of the simulation", "µm rms"]);
+    for (kind, value) in [
+        ("size of the circles", m.size_um),
+        ("  of which follows campaign time", m.drift_um),
+        ("harmonics 2–8, same both ways", m.harmonics_even_um),
+        ("harmonics 2–8, flip with direction", m.harmonics_odd_um),
+        ("at fixed places beyond these", m.localised_um),
+        ("periodic in time", m.periodic_um),
+        ("random and the rest", m.random_um),
+    ] {
+        table.add_row([kind.to_string(), format!("{value:.2}")]);
+    }
+    right(&mut table, 1);
+    out.say(&table);
+    if d.findings.is_empty() && !d.unexplained.present && d.cannot_tell.is_empty() {
+        out.say("Nothing found: the simulation explains the data.");
+    } else if !d.findings.is_empty() {
+        let mut table = Table::new();
+        table.load_style(presets::NOTHING).set_header([
+            "cause",
+            "axis",
+            "size",
+            "95 % interval",
+            "share",
+            "probability",
+            "correctable",
+        ]);
+        for f in &d.findings {
+            table.add_row(row(f));
+        }
+        right(&mut table, 2);
+        out.say("");
+        out.say(&table);
+        out.say("");
+        for f in &d.findings {
+            let words = f.cause.model().words();
+            out.say(format_args!(
+                "{}: {}. Usually {}. Remedy: {}.",
+                words.name, words.what, words.usual, words.adjust
+            ));
+            if let Some(note) = &f.note {
+                out.say(format_args!("  {note}."));
+            }
+            if !f.indistinguishable_from.is_empty() {
+                out.say(format_args!(
+                    "  Not to be told from: {}. Measure: {}.",
+                    f.indistinguishable_from.join(", "),
+                    f.next_measurement
+                ));
+            }
+            if let (false, Some(why)) = (f.compensable, words.not_compensable) {
+                out.say(format_args!("  The controller cannot correct it: {why}."));
+            }
+        }
+    }
+    if d.unexplained.present {
+        out.say(format_args!(
+            "Unexplained: {:.2} µm rms that match no cause in the list:",
+            d.unexplained.rms_um
+        ));
+        for words in &d.unexplained.signature.words {
+            out.say(format_args!("  {words}"));
+        }
+    }
+    for missing in &d.cannot_tell {
+        out.say(format_args!("Cannot tell: {missing}."));
+    }
+    if let Some(g) = &d.gain {
+        out.say(format_args!(
+            "On runs left out (each radius, each speed): {:.2} µm rms, before {:.2}; β1, β2 alone {:.2}; no model {:.2}.",
+            g.extended_rms_um, g.baseline_rms_um, g.beta_rms_um, g.no_model_rms_um
+        ));
+        out.say(format_args!(
+            "Gain {:.1} % ({:.1} to {:.1}), {:.1} % of what a perfect model would gain.",
+            g.percent, g.ci95_percent[0], g.ci95_percent[1], g.of_perfect_percent
+        ));
+    }
+    out.say(format_args!("Next: {}", recommendation(d, extended)));
+}
+
+/// Numbers to the right: every column from `first` on.
+fn right(table: &mut Table, first: usize) {
+    table
+        .column_iter_mut()
+        .skip(first)
+        .for_each(|column| column.set_cell_alignment(CellAlignment::Right));
+}
+
+fn row(f: &Finding) -> [String; 7] {
+    let e = &f.estimate;
+    let axis = f.axis.map_or("", |axis| {
+        if axis == giotto_shared::Axis::X {
+            "x"
+        } else {
+            "y"
+        }
+    });
+    [
+        f.cause.model().words().name.to_string(),
+        axis.to_string(),
+        format!("{} {}", number(e.value), e.unit),
+        format!("{} … {}", number(e.ci95[0]), number(e.ci95[1])),
+        format!("{:.0} %", f.share_percent),
+        format!("{:.3}", f.probability),
+        if f.compensable { "yes" } else { "no" }.to_string(),
+    ]
+}
+
+/// Four digits, in the form that is short.
+fn number(value: f64) -> String {
+    if value != 0.0 && (value.abs() < 1e-3 || value.abs() >= 1e5) {
+        return format!("{value:.3e}");
+    }
+    let before_point = if value == 0.0 {
+        0
+    } else {
+        value.abs().log10().floor() as i32
+    };
+    format!("{value:.*}", (3 - before_point).clamp(0, 6) as usize)
+}
+
+/// The one thing to do now, and what it should bring.
+fn recommendation(d: &Diagnosis, extended: Option<&Path>) -> String {
+    if let (true, Some(first)) = (d.findings.is_empty(), d.cannot_tell.first()) {
+        return first.clone();
+    }
+    let Some(first) = d.findings.first() else {
+        return if d.unexplained.present {
+            "look at the place and the law of what is unexplained; `giotto plan` lists the runs that would narrow it down".into()
+        } else {
+            "flash the fitted model: `giotto fit CAMPAIGN -o MODEL.toml`, `giotto flash MODEL.toml --port PORT`".into()
+        };
+    };
+    if !d.findings.iter().any(|f| f.compensable) {
+        return format!(
+            "{} ({:.1} µm rms of the circles' error, {:.0} % of the misfit)",
+            first.cause.model().words().adjust,
+            first.rms_um,
+            first.share_percent
+        );
+    }
+    let flash = match extended {
+        Some(path) => format!("flash it: `giotto flash {} --port PORT`", path.display()),
+        None => "write the extended model with -o EXTENDED.toml and flash it: `giotto flash EXTENDED.toml --port PORT`".into(),
+    };
+    match expected_um(d) {
+        Some([now, then]) if then < now => {
+            format!("{flash} (circles off by {now:.1} µm rms now, by {then:.1} expected)")
+        }
+        _ => flash,
+    }
+}
+
+/// Root mean square error of circles on runs left out, µm: as measured, and with the correction, which leaves
+/// what the extended model does not predict and what it predicts but no controller corrects.
+fn expected_um(d: &Diagnosis) -> Option<[f64; 2]> {
+    let gain = d.gain.as_ref()?;
+    let stays: f64 = d
+        .findings
+        .iter()
+        .filter(|f| !f.compensable)
+        .map(|f| f.rms_um.powi(2))
+        .sum();
+    Some([
+        gain.no_model_rms_um,
+        (gain.extended_rms_um.powi(2) + stays).sqrt(),
+    ])
+}

@@ -1,0 +1,154 @@
+//! The command line: one file a command; arguments in, tables or one JSON document out.
+#![forbid(unsafe_code)]
+
+mod analyze;
+mod bypass;
+mod choice;
+mod compensate;
+mod completions;
+mod controller;
+mod demo;
+mod diagnose;
+mod fit;
+mod flash;
+mod import;
+mod key;
+mod man;
+mod monitor;
+mod plan;
+mod port;
+mod report;
+mod rollback;
+mod run;
+mod simulate;
+mod status;
+mod table;
+mod table_file;
+mod verify;
+mod welcome;
+
+pub mod failure;
+pub mod output;
+pub mod ring;
+pub mod source;
+
+pub use failure::Failure;
+pub use output::Output;
+
+use clap::{CommandFactory, Parser, Subcommand};
+use std::process::ExitCode;
+
+/// True circles from robots and machine tools: measure, explain, compensate, prove.
+#[derive(Parser, Debug)]
+#[command(name = "giotto", version, about, propagate_version = true)]
+struct Cli {
+    /// Print one JSON document on stdout and nothing else.
+    #[arg(long, global = true)]
+    json: bool,
+    /// Print results and errors only.
+    #[arg(long, short, global = true)]
+    quiet: bool,
+    /// Never ask and never draw progress, whatever the terminal.
+    #[arg(long, global = true)]
+    non_interactive: bool,
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Foreign measurements into a campaign.
+    Import(import::Args),
+    /// Least-squares circle, radius size error, out-of-roundness, harmonics, ISO 230-4 of each run.
+    Analyze(analyze::Args),
+    /// The radius model of the paper: stepwise partial F, intervals, prediction of other radii.
+    Fit(fit::Args),
+    /// A simulated machine runs the circles of a plan and writes a campaign.
+    Simulate(simulate::Args),
+    /// What the simulation gets wrong, why, the extended model, the gain.
+    Diagnose(diagnose::Args),
+    /// The next runs that would best separate what cannot be told apart yet.
+    Plan(plan::Args),
+    /// Self-contained HTML report with plots.
+    Report(report::Args),
+    /// Rewrite the arcs of an NC program with the inverse correction.
+    Compensate(compensate::Args),
+    /// Model to controller table, and back to words.
+    Table(table::Args),
+    /// Write a table to a controller: inactive slot, read back, commit, confirm.
+    Flash(flash::Args),
+    /// Keys that tables are signed with.
+    Key(key::Args),
+    /// The controller's state and slots.
+    Status(status::Args),
+    /// Return to the last good table.
+    Rollback(rollback::Args),
+    /// Compare the table on the controller with a file.
+    Verify(verify::Args),
+    /// Switch the correction off or on.
+    Bypass(bypass::Args),
+    /// Execute a path on the controller and record its set-points.
+    Run(run::Args),
+    /// Live view of the controller in the terminal.
+    Monitor(monitor::Args),
+    /// Start a virtual controller.
+    Controller(controller::Args),
+    /// The whole loop on a bundled campaign and a simulated machine.
+    Demo(demo::Args),
+    /// Script that completes commands and options in a shell.
+    Completions(completions::Args),
+    /// Manual pages, one a command.
+    Man(man::Args),
+}
+
+fn dispatch(command: Command, out: Output) -> Result<(), Failure> {
+    match command {
+        Command::Import(args) => import::run(args, out),
+        Command::Analyze(args) => analyze::run(args, out),
+        Command::Fit(args) => fit::run(args, out),
+        Command::Simulate(args) => simulate::run(args, out),
+        Command::Diagnose(args) => diagnose::run(args, out),
+        Command::Plan(args) => plan::run(args, out),
+        Command::Report(args) => report::run(args, out),
+        Command::Compensate(args) => compensate::run(args, out),
+        Command::Table(args) => table::run(args, out),
+        Command::Flash(args) => flash::run(args, out),
+        Command::Key(args) => key::run(args, out),
+        Command::Status(args) => status::run(args, out),
+        Command::Rollback(args) => rollback::run(args, out),
+        Command::Verify(args) => verify::run(args, out),
+        Command::Bypass(args) => bypass::run(args, out),
+        Command::Run(args) => run::run(args, out),
+        Command::Monitor(args) => monitor::run(args, out),
+        Command::Controller(args) => controller::run(args, out),
+        Command::Demo(args) => demo::run(args, out),
+        Command::Completions(args) => completions::run(args, Cli::command(), out),
+        Command::Man(args) => man::run(args, Cli::command(), out),
+    }
+}
+
+/// Runs the command line of this process.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let out = Output {
+        json: cli.json,
+        quiet: cli.quiet,
+        non_interactive: cli.non_interactive,
+    };
+    let Some(command) = cli.command else {
+        let words = welcome::words(std::path::Path::new("."));
+        if out.json {
+            return shown(out.document(&serde_json::json!({ "words": words })));
+        }
+        out.say(words);
+        return ExitCode::SUCCESS;
+    };
+    shown(dispatch(command, out))
+}
+
+fn shown(result: Result<(), Failure>) -> ExitCode {
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.report(),
+    }
+}

@@ -1,0 +1,60 @@
+//! `--port` and what goes with it, and a controller's errors in words.
+use super::{Failure, Output};
+use giotto_link::port::BAUD;
+use giotto_link::{Controller, ControllerError, OpenOptions, Pace, Port, open};
+use std::path::PathBuf;
+
+/// Which controller.
+#[derive(clap::Args, Debug)]
+pub(super) struct PortArgs {
+    /// Serial device, `sim` (virtual controller in this process) or `qemu` (boots the firmware image).
+    #[arg(long, value_name = "PORT", value_parser = clap::builder::NonEmptyStringValueParser::new())]
+    port: String,
+    /// Firmware image for `qemu`, instead of the one of this workspace.
+    #[arg(long, value_name = "PATH")]
+    image: Option<PathBuf>,
+    /// Baud rate of a serial device.
+    #[arg(long, default_value_t = BAUD, value_name = "BAUD")]
+    baud: u32,
+}
+
+impl PortArgs {
+    /// Opens the controller and its session.
+    pub(super) fn open(&self, out: Output) -> Result<Controller, Failure> {
+        Ok(self.connect(out)?)
+    }
+
+    /// As [`Self::open`], for those who look at the error.
+    pub(super) fn connect(&self, out: Output) -> Result<Controller, ControllerError> {
+        self.connect_at(Pace::Fast, out)
+    }
+
+    /// As [`Self::connect`], with the emulator's time going so fast.
+    pub(super) fn connect_at(
+        &self,
+        pace: Pace,
+        out: Output,
+    ) -> Result<Controller, ControllerError> {
+        let Ok(port) = self.port.parse::<Port>();
+        let options = OpenOptions {
+            image: self.image.clone(),
+            baud: self.baud,
+            pace,
+        };
+        open(&port, &options, &mut |note| out.note(note))
+    }
+}
+
+impl From<ControllerError> for Failure {
+    fn from(error: ControllerError) -> Self {
+        let failure = match &error {
+            // The table came from a file: that is where the fault is.
+            ControllerError::Table(_) => Self::input(&error),
+            _ => Self::controller(&error),
+        };
+        match error.help() {
+            Some(help) => failure.help(help),
+            None => failure,
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! What a run says of itself, and the file of its set-points.
+use crate::failure::cannot_write;
+use crate::{Failure, Output};
+use giotto_link::{Controller, Recording};
+use serde_json::{Value, json};
+use std::fs::OpenOptions;
+use std::path::{Path, PathBuf};
+
+/// What is recorded of a run.
+#[derive(clap::Args, Debug)]
+pub(super) struct Record {
+    /// Record every so many ticks' set-point.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..), value_name = "N")]
+    pub(super) every: u16,
+    /// Where to write the set-points.
+    #[arg(short, long, value_name = "SETPOINTS.csv")]
+    output: Option<PathBuf>,
+}
+
+impl Record {
+    /// Says before anything moves that the file cannot be written.
+    pub(super) fn ready(&self) -> Result<(), Failure> {
+        let Some(path) = &self.output else {
+            return Ok(());
+        };
+        let new = !path.exists();
+        let open = OpenOptions::new().append(true).create(true).open(path);
+        open.map_err(|error| cannot_write(path, &error))?;
+        if new {
+            std::fs::remove_file(path).map_err(|error| cannot_write(path, &error))?;
+        }
+        Ok(())
+    }
+
+    /// Writes the set-points and says what they were; `more` goes into the document.
+    pub(super) fn report(
+        &self,
+        controller: &Controller,
+        recording: &Recording,
+        more: &[(&str, Value)],
+        out: Output,
+    ) -> Result<(), Failure> {
+        if let Some(path) = &self.output {
+            write(path, recording)?;
+        }
+        let largest = recording
+            .points
+            .iter()
+            .map(|point| offset_m(point.programmed_m, point.corrected_m));
+        let largest_um = largest.fold(0.0, f64::max) * 1e6;
+        let seconds = recording.points.last().map_or(0.0, |point| point.time_s);
+        if out.json {
+            let mut document = json!({
+                "port": controller.port(),
+                "set_points": recording.points.len(),
+                "dt_s": recording.dt_s,
+                "duration_s": seconds,
+                "largest_offset_um": largest_um,
+                "output": self.output,
+            });
+            for (name, value) in more {
+                document[*name] = value.clone();
+            }
+            return out.document(&document);
+        }
+        out.say(format_args!(
+            "{}: {} set-points in {seconds:.3} s, largest correction {largest_um:.3} um{}",
+            controller.port(),
+            recording.points.len(),
+            self.output
+                .as_ref()
+                .map_or(String::new(), |path| format!(", in {}", path.display()))
+        ));
+        Ok(())
+    }
+}
+
+fn offset_m(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (b - a) * (b - a))
+        .sum::<f64>()
+        .sqrt()
+}
+
+/// Writes `time_s,x_mm,y_mm,z_mm,corrected_x_mm,corrected_y_mm,corrected_z_mm`.
+fn write(path: &Path, recording: &Recording) -> Result<(), Failure> {
+    let failed = |error: csv::Error| cannot_write(path, &std::io::Error::other(error));
+    let mut writer = csv::Writer::from_path(path).map_err(failed)?;
+    let header = [
+        "time_s",
+        "x_mm",
+        "y_mm",
+        "z_mm",
+        "corrected_x_mm",
+        "corrected_y_mm",
+        "corrected_z_mm",
+    ];
+    writer.write_record(header).map_err(failed)?;
+    for point in &recording.points {
+        // Nanometres and microseconds, to the last digit.
+        let places = point.programmed_m.iter().chain(&point.corrected_m);
+        let row = std::iter::once(format!("{:.6}", point.time_s))
+            .chain(places.map(|metres| format!("{:.6}", metres * 1e3)));
+        writer.write_record(row).map_err(failed)?;
+    }
+    writer.flush().map_err(|error| cannot_write(path, &error))
+}

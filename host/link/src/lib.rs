@@ -1,0 +1,43 @@
+//! The client side of the wire: opening a port, the virtual controller, the emulated image, and what is done
+//! with them.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`client`] | requests and replies over any [`link`](link::Link): status, slots, runs |
+//! | `series` | requests of which several are on their way at once |
+//! | [`flash`] | a table onto a controller, and the proof that it is there |
+//! | [`recording`] | circles run, set-points received |
+//! | [`program`], [`streaming`] | programs and set-points, sent ahead of the machine |
+//! | [`port`] | what `--port` may name, and opening it |
+//! | [`serial`] | a serial device |
+//! | [`virtual_controller`] | the firmware's library in this process, in simulated time, or behind a pty |
+//! | [`emulator`] | the firmware image in QEMU |
+//! | [`image`] | finding or building that image |
+#![forbid(unsafe_code)]
+
+pub mod client;
+pub mod emulator;
+pub mod error;
+pub mod flash;
+pub mod image;
+pub mod link;
+pub mod port;
+pub mod program;
+pub mod recording;
+pub mod serial;
+mod series;
+pub mod signing;
+pub mod streaming;
+pub mod virtual_controller;
+
+#[cfg(test)]
+mod tests;
+
+pub use client::Controller;
+pub use emulator::Pace;
+pub use error::ControllerError;
+pub use giotto_shared::path::{CircleRun, Segment, Step};
+pub use image::Board;
+pub use port::{OpenOptions, Port, open};
+pub use program::ProgramError;
+pub use recording::{Recording, SetPointRecord, circle};

@@ -1,0 +1,148 @@
+//! The circle to program so that the machine makes the wanted one.
+use super::transition::Response;
+use super::{Keep, Left, Options};
+use giotto::model_file::{ModelFile, Servo};
+use giotto_shared::model::{Cumulants, Element, RadiusModel};
+
+/// The inverse of a model's radius law and where it may be used.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Inverse {
+    servo: Servo,
+    keep: Keep,
+    /// Largest angular rate that the fit has seen, rad/s.
+    omega_max: f64,
+    max_offset_mm: f64,
+}
+
+/// A circle to program.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Twin {
+    /// Change of the radius, mm.
+    pub(super) delta_mm: f64,
+    /// Factor on the feed.
+    pub(super) feed_factor: f64,
+}
+
+/// The law holds by ω, so that the largest ω of the fit bounds it; a little more is rounding of the file.
+const OMEGA_MARGIN: f64 = 1.001;
+/// Largest share of the radius that a correction may take.
+const MAX_SHARE: f64 = 0.1;
+
+impl Inverse {
+    pub(super) fn new(model: &ModelFile, options: &Options) -> Self {
+        Self {
+            servo: model.servo,
+            keep: options.keep,
+            omega_max: OMEGA_MARGIN * model.valid.feed_mm_s[1] / model.valid.radius_mm[0],
+            max_offset_mm: options.max_offset_mm,
+        }
+    }
+
+    fn cumulants(&self) -> Cumulants<f64> {
+        match (self.servo, self.element()) {
+            (
+                Servo::Beta {
+                    beta1_s2, beta2_s4, ..
+                },
+                _,
+            ) => {
+                let kappa2_s2 = -2.0 * beta1_s2;
+                Cumulants {
+                    kappa2_s2,
+                    kappa4_s4: 24.0 * beta2_s4 - 3.0 * kappa2_s2 * kappa2_s2,
+                }
+            }
+            (_, Some(element)) => element.cumulants(),
+            (_, None) => Cumulants::default(),
+        }
+    }
+
+    /// √|κ2|, s: the time over which the machine averages its command.
+    pub(super) fn response_s(&self) -> f64 {
+        self.cumulants().kappa2_s2.abs().sqrt()
+    }
+
+    /// The response beyond its size, for the steps at joints.
+    pub(super) fn response(&self) -> Response {
+        Response::of(&self.cumulants())
+    }
+
+    fn element(&self) -> Option<Element<f64>> {
+        match self.servo {
+            Servo::Lag { kv_per_s } => Some(Element::Lag { kv_per_s }),
+            Servo::SecondOrder {
+                omega_n_rad_s,
+                zeta,
+            } => Some(Element::SecondOrder {
+                omega_n_rad_s,
+                zeta,
+            }),
+            Servo::Beta { .. } => None,
+        }
+    }
+
+    /// Circle to program for a wanted one of radius and feed in mm and mm/s.
+    pub(super) fn twin(&self, radius_mm: f64, feed_mm_s: f64) -> Result<Twin, Left> {
+        let omega = feed_mm_s / radius_mm;
+        let (r, f) = (radius_mm * 1e-3, feed_mm_s * 1e-3);
+        let solved = match (self.servo, self.element()) {
+            (
+                Servo::Beta {
+                    beta1_s2, beta2_s4, ..
+                },
+                _,
+            ) => {
+                let law = RadiusModel { beta1_s2, beta2_s4 };
+                let programmed = match self.keep {
+                    Keep::Omega => law.inverse_keeping_omega(r, f),
+                    Keep::Feed => law.inverse_keeping_feed(r, f),
+                };
+                programmed.ok().map(|p| p.radius_m)
+            }
+            (_, Some(element)) => match self.keep {
+                Keep::Omega => Some(r / element.gain(omega)),
+                Keep::Feed => keeping_feed(r, f, |w| element.gain(w)),
+            },
+            (_, None) => None,
+        };
+        let radius = solved
+            .filter(|r| r.is_finite() && *r > 0.0)
+            .ok_or(Left::NoInverse)?;
+        let delta_mm = radius * 1e3 - radius_mm;
+        if delta_mm == 0.0 {
+            return Ok(Twin {
+                delta_mm,
+                feed_factor: 1.0,
+            });
+        }
+        if omega > self.omega_max {
+            return Err(Left::BeyondModel);
+        }
+        if delta_mm.abs() > self.max_offset_mm.min(MAX_SHARE * radius_mm) {
+            return Err(Left::OffsetTooLarge);
+        }
+        let feed_factor = if self.keep == Keep::Omega {
+            radius * 1e3 / radius_mm
+        } else {
+            1.0
+        };
+        Ok(Twin {
+            delta_mm,
+            feed_factor,
+        })
+    }
+}
+
+/// Solves Rp·|G(f/Rp)| = R by the secant method; the correction is small, so that it converges in a few steps.
+fn keeping_feed(r: f64, f: f64, gain: impl Fn(f64) -> f64) -> Option<f64> {
+    let miss = |p: f64| p * gain(f / p) - r;
+    let (mut a, mut b) = (r, r / gain(f / r));
+    for _ in 0..60 {
+        let (ma, mb) = (miss(a), miss(b));
+        if mb.abs() <= 1e-15 * r || ma == mb {
+            break;
+        }
+        (a, b) = (b, b - mb * (b - a) / (mb - ma));
+    }
+    (miss(b).abs() <= 1e-12 * r).then_some(b)
+}

@@ -1,8 +1,0 @@
-//! The `giotto` command: a thin face over the library.
-#![forbid(unsafe_code)]
-
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    giotto::cli::main()
-}
