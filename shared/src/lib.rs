@@ -2,6 +2,7 @@
 //!
 //! | module | holds |
 //! |---|---|
+//! | [`Actuator`], [`Plane`], [`Frame`] | the drives of a machine, and where a circle lies in it |
 //! | [`circle`] | mergeable moments of a point set, algebraic and geometric circle, plane of 3-D points |
 //! | [`model`] | the radius model ΔR = β1 f²/R + β2 f⁴/R³ (Eq. 15 of the source paper), cumulants, inverse |
 //! | [`term`] | the profile terms that diagnosis fits, the table carries and the engine evaluates |
@@ -19,10 +20,12 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+mod actuator;
 pub mod angle;
 pub mod circle;
 pub mod direction;
 pub mod fixed;
+mod frame;
 pub mod law;
 pub mod model;
 pub mod path;
@@ -30,4 +33,6 @@ pub mod table;
 pub mod term;
 pub mod wire;
 
+pub use actuator::Actuator;
 pub use direction::{Axis, Direction};
+pub use frame::{Frame, Plane};
