@@ -14,14 +14,6 @@ const LEAST_SLEW_M_S: f64 = 1e-3;
 /// Why a model has no table.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ModelTableError {
-    /// A compensable effect without a number that its term needs.
-    #[error("effect {cause:?}: `{name}` is missing")]
-    MissingParameter {
-        /// The effect.
-        cause: Cause,
-        /// The parameter's name in the file.
-        name: &'static str,
-    },
     /// More terms than a zone holds.
     #[error("{count} compensable effects, a table holds {}", table::MAX_TERMS)]
     TooManyTerms {
@@ -83,20 +75,13 @@ enum Share {
     Nothing,
 }
 
-fn share(effect: &Effect) -> Result<Share, ModelTableError> {
-    let model = effect.cause.model();
-    let one_axis = model.axes().iter().all(Option::is_some);
-    if one_axis && effect.axis.is_none() && model.words().not_compensable.is_none() {
-        return Err(ModelTableError::MissingParameter {
-            cause: effect.cause,
-            name: "axis",
-        });
-    }
-    Ok(match (effect.cause, model.term(effect)) {
-        (Cause::HigherOrderDynamics, _) => Share::Kappa4(24.0 * effect.value),
+fn share(effect: &Effect) -> Share {
+    let cause = effect.cause();
+    match (cause, cause.model().term(effect)) {
+        (Cause::HigherOrderDynamics, _) => Share::Kappa4(24.0 * effect.value()),
         (_, Some(term)) => Share::Term(term),
         (_, None) => Share::Nothing,
-    })
+    }
 }
 
 /// The table of a model.
@@ -108,10 +93,10 @@ pub fn table_from_model(model: &ModelFile) -> Result<ModelTable, ModelTableError
     let mut terms: Vec<Term<f64>> = Vec::new();
     let mut left_out = Vec::new();
     for effect in &model.effects {
-        match share(effect)? {
+        match share(effect) {
             Share::Term(term) => terms.push(term),
             Share::Kappa4(kappa4) => cumulants.kappa4_s4 += kappa4,
-            Share::Nothing => left_out.push(effect.cause),
+            Share::Nothing => left_out.push(effect.cause()),
         }
     }
     let count = terms.len();
@@ -194,8 +179,9 @@ fn cut(name: &str) -> heapless::String<32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::causes::Site;
     use crate::model_file::{FORMAT, Valid};
-    use giotto_shared::{Actuator, Axis, Plane};
+    use giotto_shared::{Actuator, Plane};
 
     fn paper() -> ModelFile {
         ModelFile {
@@ -245,18 +231,12 @@ mod tests {
 
     #[test]
     fn effects_become_terms_in_si() {
-        let effect = |cause, axis, value| Effect {
-            cause,
-            axis,
-            value,
-            ci95: [0.0; 2],
-            params: Default::default(),
-        };
+        let effect = |cause, site, value| Effect::new(cause, site, value, [0.0; 2], []).unwrap();
         let mut model = paper();
         model.effects = vec![
-            effect(Cause::Squareness, None, 120.0),
-            effect(Cause::Backlash, Some(Axis::Y), 0.01),
-            effect(Cause::Vibration, None, 40.0),
+            effect(Cause::Squareness, Site::Pair(Plane::Xy), 120.0),
+            effect(Cause::Backlash, Site::One(Actuator::Y), 0.01),
+            effect(Cause::Vibration, Site::Machine, 40.0),
         ];
         let ModelTable { table, left_out } = table_from_model(&model).unwrap();
         let expected = [
@@ -274,12 +254,6 @@ mod tests {
             (table.zones[0].terms.len(), left_out),
             (2, vec![Cause::Vibration])
         );
-        model.effects[1].axis = None;
-        let missing = ModelTableError::MissingParameter {
-            cause: Cause::Backlash,
-            name: "axis",
-        };
-        assert_eq!(table_from_model(&model), Err(missing));
     }
 
     #[test]

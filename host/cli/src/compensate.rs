@@ -189,7 +189,7 @@ fn document(result: &Compensated, model: &ModelFile) -> Document {
         not_applied: model
             .effects
             .iter()
-            .map(|e| e.cause.id().to_owned())
+            .map(|e| e.cause().id().to_owned())
             .collect(),
         arcs,
     }

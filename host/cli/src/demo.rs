@@ -237,14 +237,9 @@ fn show_learned(learned: &Learned, out: Output) {
         2,
     );
     for f in &diagnosis.findings {
-        let axis = match f.axis {
-            Some(giotto_shared::Axis::X) => "x",
-            Some(giotto_shared::Axis::Y) => "y",
-            None => "",
-        };
         found.add_row([
             f.cause.model().words().name.to_owned(),
-            axis.to_owned(),
+            f.place(),
             number(f.estimate.value),
             number(f.estimate.ci95[0]),
             number(f.estimate.ci95[1]),

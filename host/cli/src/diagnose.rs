@@ -157,16 +157,9 @@ fn right(table: &mut Table, first: usize) {
 
 fn row(f: &Finding) -> [String; 7] {
     let e = &f.estimate;
-    let axis = f.axis.map_or("", |axis| {
-        if axis == giotto_shared::Axis::X {
-            "x"
-        } else {
-            "y"
-        }
-    });
     [
         f.cause.model().words().name.to_string(),
-        axis.to_string(),
+        f.place(),
         format!("{} {}", number(e.value), e.unit),
         format!("{} … {}", number(e.ci95[0]), number(e.ci95[1])),
         format!("{:.0} %", f.share_percent),

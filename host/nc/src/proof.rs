@@ -18,7 +18,7 @@ fn machines() -> [(&'static str, Machine, ModelFile); 2] {
         [PositionLoop {
             kv_per_s,
             feed_forward: 0.0,
-        }; 2]
+        }; 3]
     };
     let lag = Machine {
         servo: loops(43.3),
@@ -190,19 +190,23 @@ fn travelled(machine: &Machine, chain: &[Stretch]) -> Vec<[f64; 2]> {
     };
     let n = ((end_s + 0.5) / DT_S) as usize;
     let position_m: Vec<_> = (0..n)
-        .map(|k| place(way(k as f64 * DT_S)).map(|v| v * 1e-3))
+        .map(|k| {
+            let [x, y] = place(way(k as f64 * DT_S)).map(|v| v * 1e-3);
+            [x, y, 0.0]
+        })
         .collect();
     let set_points = SetPoints {
         dt_s: DT_S,
         position_m: &position_m,
-        centre_m: [0.0; 2],
+        centre_m: [0.0; 3],
+        frame: giotto_shared::Frame::default(),
         started_s: 0.0,
         hold: Hold::Cubic,
     };
     drive(machine, &set_points)
         .position_m
         .into_iter()
-        .map(|p| p.map(|v| v * 1e3))
+        .map(|[x, y, _]| [x * 1e3, y * 1e3])
         .collect()
 }
 

@@ -31,8 +31,8 @@ fn measured(radii_m: &[f64], feeds_m_s: &[f64], samples: usize) -> (Campaign, Di
         name: HOSTILE.into(),
         machine_name: HOSTILE.into(),
         machine: Machine {
-            servo: [servo; 2],
-            squareness_rad: 60e-6,
+            servo: [servo; 3],
+            squareness_rad: [60e-6, 0.0, 0.0],
             ..Machine::default()
         },
         instrument: Instrument::ballbar(),

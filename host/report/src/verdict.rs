@@ -2,19 +2,23 @@
 use super::number::{fixed, number};
 use giotto::causes::Cause;
 use giotto::diagnosis::{Diagnosis, Finding};
-use giotto_shared::Axis;
 
 /// The three sentences.
 pub fn sentences(d: &Diagnosis, runs: usize) -> [String; 3] {
     [misfit(d, runs), cause(d), action(d)]
 }
 
-/// Name of the axis in words, with a leading space; nothing for the machine as a whole.
-pub fn axis(finding: &Finding) -> &'static str {
-    match finding.axis {
-        Some(Axis::X) => " of X",
-        Some(Axis::Y) => " of Y",
-        None => "",
+/// Names of the actuators in words, with a leading space; nothing for the machine as a whole.
+pub fn axis(finding: &Finding) -> String {
+    let names: Vec<String> = finding
+        .actuators
+        .iter()
+        .map(|actuator| actuator.name().to_uppercase().replace("JOINT", "joint "))
+        .collect();
+    if names.is_empty() {
+        String::new()
+    } else {
+        format!(" of {}", names.join(" and "))
     }
 }
 

@@ -1,8 +1,7 @@
 //! X longer than Y: `r = ½R(sx − sy)cos2ψ`, the same both ways.
-use super::{Cause, CauseModel, Effect, Harmonics, RunView, Words};
+use super::{Cause, CauseModel, Effect, Harmonics, Parameter, RunView, Seat, Site, Words};
 use crate::simulation::machine::Machine;
 use giotto_shared::term::Term;
-use giotto_shared::{Axis, Plane};
 
 /// See the module.
 pub struct ScaleMismatch;
@@ -19,6 +18,13 @@ const WORDS: Words = Words {
     not_compensable: None,
 };
 
+/// In the contract's unit.
+const SIZE: Parameter = Parameter::needed(
+    "value",
+    [-1e4, 1e4],
+    "µm/m: 1 %, as much as a table may correct",
+);
+
 impl CauseModel for ScaleMismatch {
     fn cause(&self) -> Cause {
         Cause::ScaleMismatch
@@ -28,19 +34,35 @@ impl CauseModel for ScaleMismatch {
         &WORDS
     }
 
-    fn harmonics(&self, _axis: Option<Axis>, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
-        Some(Harmonics::wave(2, [0.5e-6 * view.radius_m, 0.0]))
+    fn size(&self) -> &'static Parameter {
+        &SIZE
+    }
+
+    fn seat(&self) -> Seat {
+        Seat::Pair
+    }
+
+    fn harmonics(&self, site: Site, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
+        let Site::Pair(plane) = site else { return None };
+        let [first, second] = plane.axes().map(|axis| view.cosine(axis).squared());
+        Some(first.minus(&second).times(0.5e-6 * view.radius_m))
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
-        machine.scale[0] += 0.5e-6 * effect.value;
-        machine.scale[1] -= 0.5e-6 * effect.value;
+        if let Site::Pair(plane) = effect.site() {
+            let [first, second] = plane.axes().map(|axis| axis.index());
+            machine.scale[first] += 0.5e-6 * effect.value();
+            machine.scale[second] -= 0.5e-6 * effect.value();
+        }
     }
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
+        let Site::Pair(plane) = effect.site() else {
+            return None;
+        };
         Some(Term::ScaleMismatch {
-            plane: Plane::Xy,
-            relative: effect.value * 1e-6,
+            plane,
+            relative: effect.value() * 1e-6,
         })
     }
 }

@@ -15,7 +15,7 @@ use super::survey::{Lag, Prepared, Response, Survey, misfit};
 use super::tangent;
 use super::tone::{self, Tone};
 use crate::campaign::Campaign;
-use crate::causes::{ALL, Cause, Evidence, Harmonics};
+use crate::causes::{ALL, Cause, Evidence, Harmonics, Site};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -276,7 +276,7 @@ fn enter(found: &mut Explained, start: &Start, kinds: &[Kind]) {
     if start.own_fourth_order {
         let fourth = Kind::Cause {
             cause: Cause::HigherOrderDynamics,
-            axis: None,
+            site: Site::Machine,
             shape: Vec::new(),
         };
         let columns = fourth.columns_over(&runs);
@@ -292,14 +292,14 @@ fn enter(found: &mut Explained, start: &Start, kinds: &[Kind]) {
             continue;
         }
         let shapes = model.shapes(&views);
-        for &axis in model.axes() {
+        for site in model.seat().sites(&views) {
             let known = kinds.iter().any(
-                |kind| matches!(kind, Kind::Cause { cause, axis: at, .. } if *cause == model.cause() && *at == axis),
+                |kind| matches!(kind, Kind::Cause { cause, site: at, .. } if *cause == model.cause() && *at == site),
             );
             if let (false, Some(first)) = (known, shapes.first()) {
                 let kind = Kind::Cause {
                     cause: model.cause(),
-                    axis,
+                    site,
                     shape: first.clone(),
                 };
                 further.push((kind, shapes.len()));

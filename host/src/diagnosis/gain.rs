@@ -55,7 +55,7 @@ pub fn machine(response: &Response, effects: &[Effect], lag_s: Option<f64>) -> M
             kv_per_s: response.a_s2.powf(-0.5),
             feed_forward: 0.0,
         };
-        machine.servo = [servo; 2];
+        machine.servo = [servo; 3];
         if response.b_s4 != 0.0 {
             machine.add_beta2(-0.5 * response.b_s4);
         }
@@ -68,12 +68,12 @@ pub fn machine(response: &Response, effects: &[Effect], lag_s: Option<f64>) -> M
             Some(mechanics) => 2.0 * mechanics.zeta / mechanics.omega_n_rad_s,
             None => 0.0,
         } + (1.0 - machine.servo[0].feed_forward) / machine.servo[0].kv_per_s;
-        machine.dead_time_s = [(lag_s - own).max(0.0); 2];
+        machine.dead_time_s = [(lag_s - own).max(0.0); 3];
     }
     for effect in effects {
         // Already in the response.
-        if effect.cause != Cause::HigherOrderDynamics {
-            effect.cause.model().apply(effect, &mut machine);
+        if effect.cause() != Cause::HigherOrderDynamics {
+            effect.cause().model().apply(effect, &mut machine);
         }
     }
     machine
@@ -108,7 +108,7 @@ fn fitted(found: &Explained, weights: &[f64], set: &[usize]) -> Option<(Response
     }
     let mut effects = Vec::new();
     for &item in set {
-        let Kind::Cause { cause, axis, .. } = &found.items[item].kind else {
+        let Kind::Cause { cause, .. } = &found.items[item].kind else {
             continue;
         };
         let values: Vec<f64> = found.items[item]
@@ -124,19 +124,11 @@ fn fitted(found: &Explained, weights: &[f64], set: &[usize]) -> Option<(Response
         } else {
             values[0]
         };
-        let mut params = super::verdict::parameters(found, item);
-        if values.len() == 2 {
-            params.insert("phase_rad".into(), values[1].atan2(values[0]));
-        }
-        effects.push(Effect {
-            cause: *cause,
-            axis: *axis,
-            value: size,
-            ci95: [size; 2],
-            params,
-        });
+        effects.extend(super::verdict::effect_with(
+            found, item, &values, size, [size; 2],
+        ));
     }
-    effects.extend(found.teeth.iter().map(super::verdict::teeth_effect));
+    effects.extend(found.teeth.iter().filter_map(super::verdict::teeth_effect));
     Some((response, effects))
 }
 
@@ -397,7 +389,7 @@ pub fn extended_model(campaign: &Campaign, found: &Explained, effects: Vec<Effec
         },
         effects: effects
             .into_iter()
-            .filter(|e| e.cause != Cause::HigherOrderDynamics)
+            .filter(|e| e.cause() != Cause::HigherOrderDynamics)
             .collect(),
     }
 }

@@ -3,8 +3,7 @@ use super::basis::Low;
 use super::column::Column;
 use super::pattern::Pattern;
 use super::survey::Prepared;
-use crate::causes::{Cause, Harmonics};
-use giotto_shared::Axis;
+use crate::causes::{Cause, Harmonics, Site};
 
 /// Price of one listed column: ln(78 runs) + 2·ln(25 competitors), about 11, and a margin for the scatter
 /// being estimated.
@@ -34,7 +33,7 @@ pub enum Kind {
         /// Which.
         cause: Cause,
         /// Where.
-        axis: Option<Axis>,
+        site: Site,
         /// Its shape parameters, in the order of the cause's names.
         shape: Vec<f64>,
     },
@@ -78,7 +77,7 @@ impl Kind {
 
     fn harmonics(&self, index: usize, run: &Prepared) -> Option<Harmonics> {
         match self {
-            Self::Cause { cause, axis, shape } => cause.model().harmonics(*axis, shape, &run.view),
+            Self::Cause { cause, site, shape } => cause.model().harmonics(*site, shape, &run.view),
             Self::Pattern(pattern) => pattern.harmonics(index, run),
         }
     }
@@ -86,8 +85,8 @@ impl Kind {
     /// All columns at each sample of one run.
     pub fn samples(&self, run: &Prepared, out: &mut [&mut [f64]]) {
         match self {
-            Self::Cause { cause, axis, shape } => {
-                cause.model().signatures(*axis, shape, &run.view, out)
+            Self::Cause { cause, site, shape } => {
+                cause.model().signatures(*site, shape, &run.view, out)
             }
             Self::Pattern(pattern) => out.iter_mut().for_each(|out| pattern.samples(run, out)),
         }

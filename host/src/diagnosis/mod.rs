@@ -266,7 +266,7 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
 fn knows_clamp(known: &[Effect]) -> bool {
     known
         .iter()
-        .any(|effect| effect.cause == crate::causes::Cause::FeedClamp)
+        .any(|effect| effect.cause() == crate::causes::Cause::FeedClamp)
 }
 
 /// The campaign with what the given effects do taken out, by the simulation with and without them.

@@ -1,5 +1,6 @@
 //! The circles that may be run.
-use crate::campaign::{Campaign, Direction};
+use crate::campaign::{Campaign, Direction, Plane, Run};
+use giotto_shared::Frame;
 
 /// What machine and instrument allow; what is not said follows from the campaign.
 #[derive(Clone, Debug, Default)]
@@ -21,6 +22,8 @@ pub struct Circle {
     pub feed_m_s: f64,
     /// Direction.
     pub direction: Direction,
+    /// Plane.
+    pub plane: Plane,
 }
 
 /// Radii beside the smallest and largest that were measured.
@@ -35,6 +38,19 @@ fn round(value: f64) -> f64 {
     let unit = 10f64.powf(value.abs().max(1e-9).log10().floor() - 1.0);
     // Through a decimal fraction of a micrometre, so that 0.1 m stays 100 mm.
     ((value / unit).round() * unit * 1e6).round() / 1e6
+}
+
+/// The coordinate plane nearest to that of a run.
+pub fn plane_of(run: &Run) -> Plane {
+    let normal = run.frame.normal();
+    let along = |plane: &Plane| {
+        let other = Frame::of(*plane).normal();
+        normal.iter().zip(other).map(|(a, b)| a * b).sum::<f64>()
+    };
+    Plane::ALL
+        .into_iter()
+        .max_by(|a, b| along(a).total_cmp(&along(b)))
+        .unwrap_or_default()
 }
 
 /// Every circle within the limits.
@@ -66,17 +82,24 @@ pub fn circles(campaign: &Campaign, limits: &Limits) -> Vec<Circle> {
         list.sort_by(f64::total_cmp);
         list.dedup_by(|a, b| (*a - *b).abs() < 0.03 * b.abs());
     }
+    // An operator goes on in the planes that were measured.
+    let mut planes: Vec<Plane> = runs().map(plane_of).collect();
+    planes.sort_unstable();
+    planes.dedup();
     let mut out = Vec::new();
     for &radius_m in &radii {
         for &feed_m_s in &feeds {
             let within = feed_m_s * feed_m_s / radius_m <= acceleration * (1.0 + 1e-9);
             if within && std::f64::consts::TAU * radius_m / feed_m_s <= LONGEST_TURN_S {
-                for direction in [Direction::Ccw, Direction::Cw] {
-                    out.push(Circle {
-                        radius_m,
-                        feed_m_s,
-                        direction,
-                    });
+                for &plane in &planes {
+                    for direction in [Direction::Ccw, Direction::Cw] {
+                        out.push(Circle {
+                            radius_m,
+                            feed_m_s,
+                            direction,
+                            plane,
+                        });
+                    }
                 }
             }
         }

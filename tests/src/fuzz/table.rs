@@ -82,9 +82,18 @@ fn encoded() -> [Vec<u8>; 2] {
     let plane = Plane::Zx;
     let terms = [
         Term::RadiusOffset { offset_m: 1e-5 },
-        Term::ScaleMismatch { plane, relative: 1e-4 },
-        Term::Squareness { plane, shear_rad: 1e-4 },
-        Term::ServoMismatch { plane, delta_tau_s: 1e-4 },
+        Term::ScaleMismatch {
+            plane,
+            relative: 1e-4,
+        },
+        Term::Squareness {
+            plane,
+            shear_rad: 1e-4,
+        },
+        Term::ServoMismatch {
+            plane,
+            delta_tau_s: 1e-4,
+        },
         Term::Backlash {
             actuator,
             step_m: 1e-5,
