@@ -22,45 +22,42 @@ const CUMULANTS: Cumulants<f32> = Cumulants {
     kappa4_s4: -5.5265e-6,
 };
 
-/// Eight profile terms, the dearest there are: reversal pulses and play of both axes, a periodic error.
+/// Eight profile terms, the dearest there are for the tick: periodic errors and reversal pulses of all three slides, a bow,
+/// and one that goes with the rate (those that are linear cost the same for one as for all).
 pub const TERMS: [Term<f32>; 8] = [
-    Term::Squareness {
-        plane: Plane::Xy,
-        shear_rad: 80e-6,
-    },
     Term::ServoMismatch {
-        plane: Plane::Xy,
+        plane: Plane::Zx,
         delta_tau_s: 100e-6,
     },
-    Term::BandwidthMismatch {
-        plane: Plane::Xy,
-        delta_kappa2_s2: 5e-6,
-    },
-    Term::Backlash {
+    Term::Straightness {
         actuator: Actuator::X,
-        step_m: 10e-6,
+        across: Actuator::Z,
+        curvature_per_m: 1e-4,
     },
-    Term::Backlash {
-        actuator: Actuator::Y,
-        step_m: 12e-6,
-    },
+    spike(Actuator::X, 8e-6),
+    spike(Actuator::Y, 6e-6),
+    spike(Actuator::Z, 4e-6),
+    cyclic(Actuator::X, 2e-6),
+    cyclic(Actuator::Y, 1e-6),
+    cyclic(Actuator::Z, 1e-6),
+];
+
+const fn spike(actuator: Actuator, peak_m: f32) -> Term<f32> {
     Term::ReversalSpike {
-        actuator: Actuator::X,
-        peak_m: 8e-6,
+        actuator,
+        peak_m,
         decay_s: 0.05,
-    },
-    Term::ReversalSpike {
-        actuator: Actuator::Y,
-        peak_m: 6e-6,
-        decay_s: 0.04,
-    },
+    }
+}
+
+const fn cyclic(actuator: Actuator, amplitude_m: f32) -> Term<f32> {
     Term::Cyclic {
-        actuator: Actuator::X,
-        amplitude_m: 2e-6,
+        actuator,
+        amplitude_m,
         pitch_m: 0.01,
         phase_rad: 0.5,
-    },
-];
+    }
+}
 
 fn table(extended: bool) -> Table {
     let terms = if extended {
