@@ -168,6 +168,7 @@ fn run_ticks(as_json: bool) -> Result<ExitCode, ControllerError> {
             "arc_extended_steady": range(&counts, "arc_extended_steady"),
             "stream": range(&counts, "stream"),
             "naive_libm": range(&counts, "naive_libm"),
+            "interrupt": range(&counts, "interrupt"),
             "naive_nalgebra": range(&counts, "naive_nalgebra"),
             "naive_idsp": range(&counts, "naive_idsp"),
             "image": { "text_bytes": image.text, "ram_bytes": image.ram, "stack_bytes": image.stack },

@@ -56,7 +56,7 @@ fn end_nm(from_nm: [i32; 3], segments: &[Segment]) -> Result<[i32; 3], Trouble> 
 
 /// Runs a program from a place and records every set-point. A host that is busy elsewhere may not take them as fast as an
 /// emulator makes them: then once more.
-fn recorded(
+pub(crate) fn recorded(
     controller: &mut Controller,
     start_nm: [i32; 3],
     segments: &[Segment],

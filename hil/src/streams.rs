@@ -1,5 +1,6 @@
 //! Scenarios of streams: set-points sent one a tick, and the contour that comes of them.
 use crate::contour;
+use crate::planes;
 use crate::programs::{self, TRIES};
 use crate::scenarios::{Scenario, Trouble, ensure, holds};
 use giotto_link::streaming::Streamed;
@@ -9,7 +10,7 @@ use giotto_shared::wire::{Command, FaultCause, MotionState};
 use std::f64::consts::TAU;
 
 /// Every set-point is sent or recorded. In an emulator they need a time that a busy host can keep up with.
-pub const ALL: [Scenario; 5] = [
+pub const ALL: [Scenario; 6] = [
     (
         "a program ends where its segments do, to the nanometre",
         programs::ends_exactly,
@@ -17,6 +18,10 @@ pub const ALL: [Scenario; 5] = [
     (
         "flash, programs: contour of arcs between lines, through a machine",
         programs::contour,
+    ),
+    (
+        "flash: contour of a ZX and a tilted circle, through a machine with a bad Z",
+        planes::contour,
     ),
     ("a stream is followed set-point by set-point", followed),
     (

@@ -10,6 +10,7 @@
 //! | [`angle`], [`fixed`] | integer phases, sine and cosine, fixed-point products of the tick |
 //! | [`bounds`] | what no table may ask for |
 //! | [`law`] | the compensating operator p − (κ2/2) p″ + (κ2²/8 − κ4/24) p⁗ |
+//! | [`encoding`] | values as bytes, CRC-32 |
 //! | [`table`] | the correction table: layout, bounds, CRC |
 //! | [`wire`] | messages and frames between host and controller |
 //!
@@ -26,6 +27,7 @@ pub mod angle;
 pub mod bounds;
 pub mod circle;
 pub mod direction;
+pub mod encoding;
 pub mod fixed;
 mod frame;
 pub mod law;

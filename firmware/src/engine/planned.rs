@@ -172,8 +172,6 @@ pub struct Planned {
     pub(crate) kind: Kind,
     /// A zone of the table applies.
     pub(crate) corrected: bool,
-    /// The planner proved that the change of the offset stays within its bound.
-    pub(crate) proven: bool,
     /// The zone has profile terms.
     pub(crate) extended: bool,
     /// Segments planned before a stop carry an older one.

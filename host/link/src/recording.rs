@@ -1,20 +1,21 @@
 //! Runs on a controller, and the set-points it made of them.
 use super::client::Controller;
 use super::error::ControllerError;
-use giotto_shared::Direction;
 use giotto_shared::path::CircleRun;
 use giotto_shared::wire::{Command, MotionState, Pose, SUPERVISE_MS};
+use giotto_shared::{Direction, Plane};
 use std::time::Duration;
 
 /// How often the controller hears from us during a run, by the link's clock, so that it does not take us for dead.
 const KEEP_ALIVE: Duration = Duration::from_millis(SUPERVISE_MS as u64 / 4);
 
-/// `laps` turns about the origin from polar angle 0; SI.
+/// `laps` turns about the origin in XY from polar angle 0; SI.
 pub const fn circle(radius_m: f64, feed_m_s: f64, direction: Direction, laps: u32) -> CircleRun {
     CircleRun {
         centre_m: [0.0; 3],
         radius_m,
         feed_m_s,
+        plane: Plane::Xy,
         direction,
         laps,
         start_rad: 0.0,

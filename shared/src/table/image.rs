@@ -15,7 +15,7 @@
 //! The CRC is ISO-HDLC (the one of Ethernet and zip). The order of checks is magic, length, CRC, version,
 //! flags, schema, body, numbers: a flipped bit is called a flipped bit, not a newer version.
 use super::{Limits, MAX_TERMS, MAX_ZONES, Table, TableError, Zone};
-use crate::wire::{Crc32, crc32, take};
+use crate::encoding::{Crc32, crc32, take};
 
 /// First four bytes of a table.
 pub const MAGIC: [u8; 4] = *b"GIOT";

@@ -1,8 +1,7 @@
 //! Set-points of a stream in few bytes: for each axis the change of the step from one to the next. At 1 kHz and 5 m/s² that
 //! is two bytes, where the place itself takes five.
 use super::Chunk;
-use super::reader::take;
-use super::writer::Writer;
+use crate::encoding::{Writer, take};
 use serde::Serialize;
 
 /// How far a stream has come.

@@ -60,6 +60,7 @@ impl Bench {
             centre_m: [0.0; 3],
             radius_m,
             feed_m_s: 0.3,
+            plane: giotto_shared::Plane::Xy,
             direction: Direction::Ccw,
             laps: 1,
             start_rad: 0.0,

@@ -12,20 +12,8 @@ impl Executor {
         let (before, wrapped) = self.phase.overflowing_sub(self.segment.timing.step);
         (self.phase, self.turns) = (before, self.turns.wrapping_sub(i32::from(wrapped)));
         self.left = self.segment.timing.cruise_ticks.wrapping_add(1);
-        let mut out = match self.mode {
-            Mode::ArcRise => {
-                self.mode = Mode::ArcCruise;
-                self.arc_cruise::<false>()
-            }
-            Mode::TermRise => {
-                self.mode = Mode::TermCruise;
-                self.arc_cruise::<true>()
-            }
-            _ => {
-                self.mode = Mode::Cruise;
-                self.cruise()
-            }
-        };
+        self.mode = Mode::Cruise;
+        let mut out = self.cruise();
         // The last tick of the ramp is not yet one at constant feed.
         out.flags &= !flag::CRUISE;
         out
@@ -48,11 +36,7 @@ impl Executor {
 
     #[inline(always)]
     pub(super) fn begin_fall(&mut self) {
-        self.mode = match self.mode {
-            Mode::ArcCruise => Mode::ArcFall,
-            Mode::TermCruise => Mode::TermFall,
-            _ => Mode::Fall,
-        };
+        self.mode = Mode::Fall;
         self.clock = Clock::falling(self.segment.timing.clock_step);
         // So that the sum of steps less half the last one is the phase.
         self.advance(self.segment.timing.step >> 1);
@@ -91,13 +75,7 @@ impl Executor {
             let (c, s) = self.weights((self.segment.timing.start >> 32) as u32);
             if self.segment.extended {
                 let extra = &self.segment.extra;
-                // A line moves from its first tick on as it does at its end.
-                let ahead = if self.segment.kind == Kind::Line {
-                    (i32::MAX, 0)
-                } else {
-                    (c, s)
-                };
-                self.sides.begin(extra, extra.ahead_at(ahead.0, ahead.1));
+                self.sides.begin(extra, extra.ahead_at(c, s));
             }
             self.target_nm = self.standing_offset(c, s);
         }
@@ -130,13 +108,8 @@ impl Executor {
         self.mode = match self.segment.kind {
             _ if self.segment.epoch != self.epoch => Mode::Rest,
             Kind::Dwell | Kind::Clear => Mode::Dwell,
-            Kind::Arc if self.segment.proven && self.segment.extended => Mode::TermRise,
-            Kind::Arc if self.segment.proven => Mode::ArcRise,
             Kind::Arc | Kind::Line | Kind::Helix => Mode::Rise,
         };
-        if self.mode.proven() {
-            self.guard.rely_on_plan();
-        }
         self.clock = Clock::rising(timing.clock_step);
         self.phase = timing.start;
         self.turns = 0;

@@ -17,7 +17,6 @@
 //! These are arcs whose bounds the planner proved; all else (lines, helices, arcs at their bounds, stops in a ramp,
 //! engagement) runs in `curve` and `between` and takes longer: a helix 455 at most, 522 with the same eight terms; between
 //! two ticks of 8 kHz at 25 MHz are 3125.
-mod arc;
 mod between;
 mod curve;
 mod phase;
@@ -56,18 +55,6 @@ enum Mode {
     Settle,
     /// Stands still for a time.
     Dwell,
-    /// Arc without profile terms at constant rate, its bounds proven by the planner.
-    ArcCruise,
-    /// The same in a rising ramp.
-    ArcRise,
-    /// The same in a falling ramp.
-    ArcFall,
-    /// Arc with profile terms at constant rate.
-    TermCruise,
-    /// The same in a rising ramp.
-    TermRise,
-    /// The same in a falling ramp.
-    TermFall,
     /// Any segment at constant rate.
     Cruise,
     /// Any segment in a rising ramp.
@@ -77,21 +64,6 @@ enum Mode {
     /// Stopped while rising: the rising ramp runs on, a falling one is laid over it. Each has four continuous
     /// derivatives, so their sum has; it never runs backwards because the second is never ahead of the first.
     Both,
-}
-
-impl Mode {
-    /// Whether the planner proved the bounds of what runs.
-    fn proven(self) -> bool {
-        matches!(
-            self,
-            Self::ArcRise
-                | Self::ArcCruise
-                | Self::ArcFall
-                | Self::TermRise
-                | Self::TermCruise
-                | Self::TermFall
-        )
-    }
 }
 
 /// The engine's fast half: what runs in the timer interrupt.
@@ -120,11 +92,6 @@ pub struct Executor {
     /// Offset wanted there, before engagement, and what the next segment wants there.
     rest_offset_nm: [i32; 3],
     target_nm: [i32; 3],
-    /// Programmed position and wanted offset of a tick with profile terms, while it is being made.
-    at_nm: [i32; 3],
-    wanted_nm: [i32; 3],
-    /// Of the vectors of an arc, as long: radial and tangential, and what X and Y take with opposite signs.
-    shares: [i32; 4],
     sides: Sides,
     /// Segments planned before the last stop or fault carry an older epoch and are thrown away.
     epoch: u8,
@@ -155,9 +122,6 @@ impl Executor {
             rest_nm: position_nm,
             rest_offset_nm: [0; 3],
             target_nm: [0; 3],
-            at_nm: [0; 3],
-            wanted_nm: [0; 3],
-            shares: [0; 4],
             sides: Sides::default(),
             epoch: 0,
             halting: false,
@@ -250,12 +214,12 @@ impl Executor {
         self.counters.stops = self.counters.stops.wrapping_add(1);
         let timing = &self.segment.timing;
         match self.mode {
-            Mode::ArcCruise | Mode::TermCruise | Mode::Cruise => {
+            Mode::Cruise => {
                 let distance = (timing.step >> 1).wrapping_mul(u64::from(timing.ramp_ticks));
                 self.end = self.phase.wrapping_add(distance);
                 self.begin_fall();
             }
-            Mode::ArcRise | Mode::TermRise | Mode::Rise => {
+            Mode::Rise => {
                 // ∫ of the two ramps together: one step for each tick between their starts.
                 let apart = self.clock.elapsed();
                 self.end = timing
@@ -284,12 +248,6 @@ impl Executor {
     #[inline]
     pub fn tick(&mut self, inbox: &mut impl Inbox) -> Output {
         match self.mode {
-            Mode::ArcCruise => self.arc_cruise::<false>(),
-            Mode::ArcRise => self.arc_ramp::<false, false>(),
-            Mode::ArcFall => self.arc_ramp::<false, true>(),
-            Mode::TermCruise => self.arc_cruise::<true>(),
-            Mode::TermRise => self.arc_ramp::<true, false>(),
-            Mode::TermFall => self.arc_ramp::<true, true>(),
             Mode::Cruise => self.cruise(),
             Mode::Rise => self.any_ramp(false),
             Mode::Fall => self.any_ramp(true),
@@ -315,9 +273,6 @@ impl Executor {
         let wanted = self.engage.apply(wanted);
         let (offset, verdict) = self.guard.pass(wanted);
         self.guard.watch(!self.engage.full());
-        if self.mode.proven() {
-            self.guard.rely_on_plan_if_easy();
-        }
         let mut flags = flags;
         if verdict.offset_cut | verdict.slew_cut {
             self.counters.offset_cuts = self

@@ -23,6 +23,7 @@ fn circle(feed_m_s: f64) -> CircleRun {
         centre_m,
         radius_m: 0.05,
         feed_m_s,
+        plane: giotto_shared::Plane::Xy,
         direction: Direction::Ccw,
         laps: 1,
         start_rad: PI,
@@ -454,7 +455,9 @@ fn numbers_that_are_none_and_programs_out_of_bounds_are_refused() {
         phase_rad: 0.0,
     };
     let mut table = table(KAPPA[0], KAPPA[1]);
-    table.zones[0].terms.extend([cyclic; 3]);
+    table.zones[0]
+        .terms
+        .extend([cyclic; giotto_shared::law::MAX_CYCLIC + 1]);
     assert!(engine.load(Some(&table)).is_err());
 }
 

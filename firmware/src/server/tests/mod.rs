@@ -284,6 +284,7 @@ fn circle() -> Command {
         centre_m: [0.0; 3],
         radius_m: 0.1,
         feed_m_s: 0.2,
+        plane: giotto_shared::Plane::Xy,
         direction: Direction::Ccw,
         laps: 1,
         start_rad: 0.0,

@@ -146,6 +146,7 @@ fn golden_frame() {
         centre_m: [-0.29, 0.0, 0.0],
         radius_m: 0.1,
         feed_m_s: 0.5,
+        plane: crate::Plane::Xy,
         direction: Direction::Cw,
         laps: 2,
         start_rad: core::f64::consts::FRAC_PI_2,
@@ -164,7 +165,7 @@ fn golden_frame() {
         0xff, 0xb1, 0xc8, 0x94, 0x02, 0, 0,             // centre -290 mm, 0, 0 in nanometres
         0x80, 0x88, 0xde, 0xbe, 0x01,                   // radius 100 mm in half nanometres
         0, 0, 0, 0x3f,                                  // feed 0.5 m/s
-        1, 2,                                           // clockwise, two laps
+        0, 1, 2,                                        // plane XY, clockwise, two laps
         0x80, 0x80, 0x80, 0x80, 0x04,                   // from a quarter turn
     ];
     let mut accumulator = Accumulator::new();
