@@ -140,6 +140,11 @@ pub trait CauseModel: Sync {
         Seat::Machine
     }
 
+    /// The sites that these runs can tell of.
+    fn sites(&self, views: &[RunView]) -> Vec<Site> {
+        self.seat().sites(views)
+    }
+
     /// Its size in the contract's unit: what a real machine can have.
     fn size(&self) -> &'static Parameter;
 

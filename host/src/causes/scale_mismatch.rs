@@ -1,4 +1,5 @@
 //! X longer than Y: `r = ½R(sx − sy)cos2ψ`, the same both ways.
+use super::site::in_one_plane;
 use super::{Cause, CauseModel, Effect, Harmonics, Parameter, RunView, Seat, Site, Words};
 use crate::simulation::machine::Machine;
 use giotto_shared::term::Term;
@@ -40,6 +41,15 @@ impl CauseModel for ScaleMismatch {
 
     fn seat(&self) -> Seat {
         Seat::Pair
+    }
+
+    /// Circles in several planes show the scale of each slide: what differs then follows.
+    fn sites(&self, views: &[RunView]) -> Vec<Site> {
+        if in_one_plane(views) {
+            self.seat().sites(views)
+        } else {
+            Vec::new()
+        }
     }
 
     fn harmonics(&self, site: Site, _shape: &[f64], view: &RunView) -> Option<Harmonics> {

@@ -97,7 +97,7 @@ impl Seat {
 }
 
 /// Whether all circles move the same slides.
-fn in_one_plane(views: &[RunView]) -> bool {
+pub(super) fn in_one_plane(views: &[RunView]) -> bool {
     let moved = |view: &RunView| Actuator::SLIDES.map(|slide| view.moves(slide));
     views
         .windows(2)

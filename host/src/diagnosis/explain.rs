@@ -292,7 +292,7 @@ fn enter(found: &mut Explained, start: &Start, kinds: &[Kind]) {
             continue;
         }
         let shapes = model.shapes(&views);
-        for site in model.seat().sites(&views) {
+        for site in model.sites(&views) {
             let known = kinds.iter().any(
                 |kind| matches!(kind, Kind::Cause { cause, site: at, .. } if *cause == model.cause() && *at == site),
             );

@@ -3,7 +3,7 @@ use super::basis::Low;
 use super::column::Column;
 use super::pattern::Pattern;
 use super::survey::Prepared;
-use crate::causes::{Cause, Harmonics, Site};
+use crate::causes::{Cause, Harmonics, Seat, Site};
 
 /// Price of one listed column: ln(78 runs) + 2·ln(25 competitors), about 11, and a margin for the scatter
 /// being estimated.
@@ -12,6 +12,8 @@ const PRICE: f64 = 14.0;
 const PRICE_OF_PHASE: f64 = 5.0;
 /// Further price of a pattern: there are hundreds of them, and a name is worth more.
 const PRICE_OF_PATTERN: f64 = 14.0;
+/// Further price of the machine as a whole where its slides can be told apart.
+const PRICE_OF_VAGUENESS: f64 = 0.5;
 /// An explanation the search may choose.
 #[derive(Clone, Debug)]
 pub struct Item {
@@ -96,7 +98,12 @@ impl Kind {
     pub fn price(&self, shapes: usize) -> f64 {
         let phase = PRICE_OF_PHASE * (self.columns() - 1) as f64;
         match self {
-            Self::Cause { .. } => PRICE + phase + 2.0 * (shapes.max(1) as f64).ln(),
+            Self::Cause { cause, site, .. } => {
+                let shapes = 2.0 * (shapes.max(1) as f64).ln();
+                // Of two ways to say the same, the one that names the axes.
+                let vague = *site == Site::Machine && cause.model().seat() == Seat::MachineOrOne;
+                PRICE + phase + shapes + if vague { PRICE_OF_VAGUENESS } else { 0.0 }
+            }
             Self::Pattern(_) => PRICE + PRICE_OF_PATTERN + phase,
         }
     }

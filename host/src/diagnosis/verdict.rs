@@ -463,7 +463,8 @@ fn join_axes(findings: Vec<Finding>) -> Vec<Finding> {
     let mut out: Vec<Finding> = Vec::new();
     for finding in findings {
         let twin = out.iter_mut().find(|other| {
-            other.cause == finding.cause && other.axis.is_some() && finding.axis.is_some()
+            let one_of_several = other.axis.is_some() || other.actuators.len() > 1;
+            other.cause == finding.cause && one_of_several && finding.axis.is_some()
         });
         match twin {
             Some(twin) if alike(twin, &finding) => {

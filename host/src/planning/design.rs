@@ -146,7 +146,7 @@ fn columns_of(cause: Cause, views: &[RunView]) -> Vec<Column> {
         return Vec::new();
     };
     let mut out = Vec::new();
-    for site in model.seat().sites(views) {
+    for site in model.sites(views) {
         for at in 0..model.columns() {
             out.push(Column {
                 cause: Some(cause),

@@ -92,7 +92,7 @@ fn signatures_are_what_the_machine_does() {
                 .iter()
                 .filter(|model| model.evidence() == Evidence::Signature)
             {
-                for site in model.seat().sites(std::slice::from_ref(&view)) {
+                for site in model.sites(std::slice::from_ref(&view)) {
                     let Some((effect, shape, share)) = example(model.cause(), site) else {
                         continue;
                     };
@@ -146,7 +146,7 @@ fn signatures_are_what_the_machine_does() {
 fn an_axis_that_stands_still_has_no_site() {
     let flat = [view(&CircleTest::new(0.1, 0.15, Direction::Ccw))];
     for model in ALL {
-        for site in model.seat().sites(&flat) {
+        for site in model.sites(&flat) {
             assert!(
                 !site.actuators().contains(&giotto_shared::Actuator::Z),
                 "{site:?}"
