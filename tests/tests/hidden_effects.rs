@@ -6,7 +6,7 @@
     reason = "helpers of a test fail as the test does"
 )]
 use giotto::diagnosis::{Options, diagnose};
-use giotto_tests::effects::{Case, Keep, Kind, Null};
+use giotto_tests::effects::{Case, Keep, Kind, Null, Seat};
 use giotto_tests::files;
 use giotto_tests::machine::base::Variety;
 use giotto_tests::study::{Outcome, Verdict, judge};
@@ -22,6 +22,14 @@ fn ask(kind: &Kind, strength: f64, seed: u64) -> (Case, Verdict) {
     let case = Case::new(kind, strength, seed, Variety::Small).unwrap();
     let verdict = judge(&case, &answer(&case));
     (case, verdict)
+}
+
+/// The slide that the first effect sits on.
+fn slide(case: &Case) -> usize {
+    match case.truth[0].seat {
+        Seat::Slide(slide) => slide,
+        other => panic!("{other:?} is no slide"),
+    }
 }
 
 fn effects(names: &[&str]) -> Kind {
@@ -101,16 +109,14 @@ fn shapes_are_climbed_to_the_truth() {
     };
     for seed in [1, 2, 3] {
         let (case, spike) = found("reversal_spike", seed);
-        let friction = case.machine.axes[case.truth[0].axis.unwrap_or(0)]
-            .friction
-            .unwrap();
+        let friction = case.machine.axes[slide(&case)].friction.unwrap();
         let decay = spike.params["decay_s"] / friction.decay_s;
         assert!(
             (decay - 1.0).abs() < 0.05,
             "decay, seed {seed}: {decay} of the truth"
         );
         let (case, cyclic) = found("cyclic_error", seed);
-        let truth = case.machine.geometry.cyclic[case.truth[0].axis.unwrap_or(0)].unwrap();
+        let truth = case.machine.geometry.cyclic[slide(&case)].unwrap();
         let pitch = 1e-3 * cyclic.params["pitch_mm"] / truth.pitch_m;
         assert!(
             (pitch - 1.0).abs() < 1e-3,

@@ -1,7 +1,7 @@
 //! A hidden campaign from a seed: a laboratory, its effects, and the truth about them.
-use super::{Effect, listed, scaled, unlisted};
+use super::{Effect, Seat, Slides, listed_on, scaled, unlisted};
 use crate::machine::base::{Lab, Variety};
-use crate::machine::{Instrument, Machine, Plan, Spread};
+use crate::machine::{Instrument, Machine, Plan, Plane, Spread};
 use giotto::campaign::Campaign;
 
 /// What a campaign hides.
@@ -35,10 +35,12 @@ pub struct Truth {
     pub effect: String,
     /// Causes that count as right.
     pub accept: Vec<String>,
-    /// Axis, 0 X, 1 Y.
-    pub axis: Option<usize>,
-    /// True value.
+    /// What it belongs to.
+    pub seat: Seat,
+    /// True value, of a pair that of the pair it was hidden on.
     pub value: f64,
+    /// Values for the pairs XY, YZ and ZX, where it belongs to two slides: another pair may show it too.
+    pub by_pair: Option<[f64; 3]>,
     /// Its unit.
     pub unit: String,
     /// Misfit it causes alone, m.
@@ -75,8 +77,36 @@ impl Case {
     /// Draws a laboratory under `seed`, hides `kind` in it at `strength` times the sample noise, measures.
     /// `None` if an effect has no such name.
     pub fn new(kind: &Kind, strength: f64, seed: u64, variety: Variety) -> Option<Self> {
-        let lab = Lab::drawn(seed, variety);
+        Self::on(
+            kind,
+            strength,
+            seed,
+            Lab::drawn(seed, variety),
+            &[Slides::XY],
+        )
+    }
+
+    /// The same with circles in other planes, three radii and half of the feeds in each; effects sit on `slides`, one
+    /// after the other (the last for all that are left).
+    pub fn in_space(
+        kind: &Kind,
+        strength: f64,
+        seed: u64,
+        planes: &[Plane],
+        slides: &[Slides],
+    ) -> Option<Self> {
+        let mut lab = Lab::drawn(seed, Variety::Small);
+        lab.grid.planes = planes.to_vec();
+        Self::on(kind, strength, seed, lab, slides)
+    }
+
+    /// Hides `kind` in a laboratory.
+    pub fn on(kind: &Kind, strength: f64, seed: u64, lab: Lab, slides: &[Slides]) -> Option<Self> {
         let (mut base, mut instrument) = (lab.machine, lab.instrument);
+        let seat_of = |index: usize| {
+            let place = index.min(slides.len().saturating_sub(1));
+            slides.get(place).copied().unwrap_or(Slides::XY)
+        };
         let plan = lab.grid.plan(seed ^ 0x706c_616e);
         let mut model = None;
         let effects: Vec<Effect> = match kind {
@@ -112,14 +142,14 @@ impl Case {
                     .iter()
                     .zip(1_u64..)
                     .map(|(n, i)| {
-                        listed(n, seed.wrapping_mul(31) + i)
+                        listed_on(n, seed.wrapping_mul(31) + i, seat_of(i as usize - 1))
                             .or_else(|| unlisted(n, seed.wrapping_mul(31) + i))
                     })
                     .collect();
                 effects?
             }
             Kind::Permuted(name) => {
-                vec![listed(name, seed).or_else(|| unlisted(name, seed))?]
+                vec![listed_on(name, seed, seat_of(0)).or_else(|| unlisted(name, seed))?]
             }
         };
         let mut machine = base.clone();
@@ -129,11 +159,17 @@ impl Case {
             let wanted_m = strength * instrument.noise_m;
             let (alone, misfit_m) = scaled(effect, &base, &plan, wanted_m);
             machine = merged(machine, &base, &alone);
+            let pair = match effect.seat {
+                Seat::Pair(pair) => pair,
+                _ => Plane::PAIRS[0],
+            };
             truth.push(Truth {
                 effect: effect.name.to_owned(),
                 accept: effect.accept.iter().map(|s| (*s).to_owned()).collect(),
-                axis: effect.axis,
-                value: (effect.value)(&alone, &plan),
+                seat: effect.seat,
+                value: (effect.value)(&alone, &plan, pair),
+                by_pair: matches!(effect.seat, Seat::Pair(_))
+                    .then(|| Plane::PAIRS.map(|pair| (effect.value)(&alone, &plan, pair))),
                 unit: effect.unit.to_owned(),
                 misfit_m,
             });
@@ -202,18 +238,20 @@ fn fraction(seed: u64, salt: u64) -> f64 {
 fn merged(mut machine: Machine, base: &Machine, alone: &Machine) -> Machine {
     macro_rules! take {
         ($($field:ident).+) => { if alone.$($field).+ != base.$($field).+ { machine.$($field).+ = alone.$($field).+.clone(); } };
-        (add $($field:ident).+ [$i:expr]) => { machine.$($field).+[$i] += alone.$($field).+[$i] - base.$($field).+[$i] };
+        (add $($field:ident).+ $([$i:expr])+) => { machine.$($field).+$([$i])+ += alone.$($field).+$([$i])+ - base.$($field).+$([$i])+ };
     }
     take!(interpolation_s);
     take!(centripetal_limit_m_s2);
     take!(vibration);
     take!(thermal);
-    take!(geometry.squareness_rad);
     machine.radius_offset_m += alone.radius_offset_m - base.radius_offset_m;
-    for i in 0..2 {
+    for i in 0..3 {
         take!(add geometry.scale[i]);
-        take!(add geometry.bow_per_m[i]);
-        take!(add lateral_play_m[i]);
+        take!(add geometry.squareness_rad[i]);
+        for j in 0..3 {
+            take!(add geometry.bow_per_m[i][j]);
+            take!(add lateral_play_m[i][j]);
+        }
         if alone.geometry.cyclic[i].is_some() {
             machine.geometry.cyclic[i] = alone.geometry.cyclic[i];
         }

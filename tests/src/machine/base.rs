@@ -47,7 +47,7 @@ impl Lab {
             ..AxisChain::default()
         };
         let machine = Machine {
-            axes: [axis.clone(), axis],
+            axes: [axis.clone(), axis.clone(), axis],
             ..Machine::default()
         };
         let noise_m = if broad {

@@ -54,7 +54,7 @@ pub struct Instrument {
     pub resolution_m: f64,
     /// Spread between runs.
     pub spread: Spread,
-    /// Where the centre of measurement lies off the centre of the circles, m.
+    /// Where the centre of measurement lies off the centre of the circles, in their plane, m.
     pub offset_m: [f64; 2],
     /// How far out of the plane of the circle it lies, m.
     pub height_m: f64,
@@ -120,6 +120,8 @@ impl Instrument {
     fn record(&self, lap: &Lap, test: &Test, index: usize, rng: &mut ChaCha8Rng) -> Run {
         let n = lap.position_m.len();
         let s = self.spread;
+        // A tilted plane is known from points alone.
+        let sees_angle = self.sees_angle || test.plane.is_tilted();
         let size = s.radius_m * s.shape.draw(rng);
         let wobble: Vec<[f64; 2]> = [s.oval_m, s.lobes_m, s.lobes_m]
             .iter()
@@ -134,8 +136,9 @@ impl Instrument {
         for (k, p) in lap.position_m.iter().enumerate() {
             let share = k as f64 / n as f64;
             let even = test.start_angle_rad + test.sign() * 2.0 * PI * share;
-            let seen = [p[0] - self.offset_m[0], p[1] - self.offset_m[1]];
-            let mut r = seen[0].hypot(seen[1]).hypot(self.height_m) - test.radius_m
+            let [x, y, across] = test.plane.coordinates(*p);
+            let seen = [x - self.offset_m[0], y - self.offset_m[1]];
+            let mut r = seen[0].hypot(seen[1]).hypot(across - self.height_m) - test.radius_m
                 + size
                 + drift * (share - 0.5);
             for (order, [c, q]) in (2..).zip(&wobble) {
@@ -157,7 +160,7 @@ impl Instrument {
             // A measured angle is that of the measured point, unwrapped along the even one.
             let own = seen[1].atan2(seen[0]);
             let own = own + 2.0 * PI * ((even - own) / (2.0 * PI)).round();
-            angle_rad.push(if self.sees_angle { own } else { even });
+            angle_rad.push(if sees_angle { own } else { even });
         }
         Run {
             file: format!("run{index:03}.csv"),
@@ -167,14 +170,14 @@ impl Instrument {
             start_angle_rad: test.start_angle_rad,
             started_s: self.knows_start.then_some(test.started_s),
             temperature_c: None,
-            centre_m: None,
-            frame: giotto::campaign::Frame::default(),
+            centre_m: (test.centre_m != [0.0; 3]).then_some(test.centre_m),
+            frame: test.plane.frame(),
             setup: None,
             samples: Samples {
                 angle_rad,
                 deviation_m,
                 time_s: Some(time_s),
-                angle_inferred: !self.sees_angle,
+                angle_inferred: !sees_angle,
             },
         }
     }

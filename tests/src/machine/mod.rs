@@ -4,7 +4,7 @@
 //! put there by the code under test. The chain of one axis is
 //! command → interpolator → acc/dec filter → position loop → mechanics → friction → hysteresis,
 //! then geometry and play couple the axes, then the instrument looks ([`instrument`]).
-//! SI units throughout; index 0 is X, 1 is Y.
+//! SI units throughout; index 0 is X, 1 is Y, 2 is Z. A circle may lie in any plane ([`Plane`]).
 pub mod base;
 pub mod command;
 pub mod friction;
@@ -14,6 +14,7 @@ pub mod instrument;
 pub mod linear;
 pub mod pattern;
 pub mod plan;
+pub mod plane;
 pub mod run;
 
 pub use friction::{Friction, StickSlip};
@@ -21,6 +22,7 @@ pub use geometry::{Cyclic, Geometry};
 pub use instrument::{Instrument, Shape, Spread};
 pub use pattern::Pattern;
 pub use plan::{Plan, Test};
+pub use plane::Plane;
 pub use run::simulate;
 
 /// Everything that shapes the motion; the default is a perfect machine.
@@ -30,12 +32,12 @@ pub struct Machine {
     pub interpolation_s: f64,
     /// Largest centripetal acceleration on arcs, m/s².
     pub centripetal_limit_m_s2: f64,
-    /// The two axes.
-    pub axes: [AxisChain; 2],
+    /// The three slides.
+    pub axes: [AxisChain; 3],
     /// Position-dependent errors.
     pub geometry: Geometry,
-    /// Sideways shift of the other axis with the direction of travel of this one, m.
-    pub lateral_play_m: [f64; 2],
+    /// Sideways shift of the slide of the second index with the direction of travel of the first, m.
+    pub lateral_play_m: [[f64; 3]; 3],
     /// Travel over which the sideways shift changes over, m.
     pub lateral_travel_m: f64,
     /// Vibrations of the structure.
@@ -53,9 +55,9 @@ impl Default for Machine {
         Self {
             interpolation_s: 0.0,
             centripetal_limit_m_s2: f64::INFINITY,
-            axes: [AxisChain::default(), AxisChain::default()],
+            axes: Default::default(),
             geometry: Geometry::default(),
-            lateral_play_m: [0.0; 2],
+            lateral_play_m: [[0.0; 3]; 3],
             lateral_travel_m: 10e-6,
             vibration: None,
             thermal: None,

@@ -17,8 +17,8 @@ const START_M_S2: f64 = 4.0;
 /// What the machine did on one lap: samples at even spacing, without instrument.
 #[derive(Clone, Debug)]
 pub struct Lap {
-    /// Deviation from the programmed radius about the true centre, and position, m.
-    pub position_m: Vec<[f64; 2]>,
+    /// Place in the machine's axes, seen from the programmed centre, m.
+    pub position_m: Vec<[f64; 3]>,
     /// Duration of the turn, s.
     pub turn_s: f64,
 }
@@ -138,19 +138,24 @@ pub fn simulate(machine: &Machine, test: &Test, campaign_s: f64, vibration_rad: 
     );
     // One an axis: each follows the chords by a delay of its own.
     let mut interpolators = (machine.interpolation_s > 0.0)
-        .then(|| [0, 1].map(|_| Interpolator::new(command, machine.interpolation_s)));
-    let rest = command.position_m(command.begin_s());
+        .then(|| [0, 1, 2].map(|_| Interpolator::new(command, machine.interpolation_s)));
+    let plane = test.plane;
+    let moving = [0, 1, 2].map(|i| plane.moves(i));
+    let along = |i: usize, p: [f64; 2]| plane.u[i] * p[0] + plane.v[i] * p[1];
+    let begin = command.position_m(command.begin_s());
+    let rest = [0, 1, 2].map(|i| along(i, begin));
     let loss = line_loss(rate, step_s);
-    let gain = [0, 1].map(|i| {
+    let gain = [0, 1, 2].map(|i| {
         if machine.interpolation_s > 0.0 {
             1.0
         } else {
             loss.powi(-Chain::lines(&machine.axes[i]))
         }
     });
-    let mut chains = [0, 1].map(|i| Chain::new(&machine.axes[i], step_s, gain[i] * rest[i]));
-    let mut senses = [Sense::new(machine.lateral_travel_m); 2];
-    let dead = [machine.axes[0].dead_time_s, machine.axes[1].dead_time_s];
+    let mut chains = [0, 1, 2].map(|i| Chain::new(&machine.axes[i], step_s, gain[i] * rest[i]));
+    let mut senses = [Sense::new(machine.lateral_travel_m); 3];
+    let dead = [0, 1, 2].map(|i| machine.axes[i].dead_time_s);
+    let together = dead[0] == dead[1] && dead[1] == dead[2];
 
     let mut position_m = Vec::with_capacity(n);
     let mut last = rest;
@@ -158,23 +163,28 @@ pub fn simulate(machine: &Machine, test: &Test, campaign_s: f64, vibration_rad: 
     let end = ((n - 1) * per_sample) as i64;
     for k in first..=end {
         let t = k as f64 * step_s;
-        let wanted = match &mut interpolators {
-            Some([x, y]) => [x.position_m(t - dead[0])[0], y.position_m(t - dead[1])[1]],
-            None if dead[0] == dead[1] => command.position_m(t - dead[0]),
-            None => [
-                command.position_m(t - dead[0])[0],
-                command.position_m(t - dead[1])[1],
-            ],
-        };
-        let mut p = [0, 1].map(|i| chains[i].step(gain[i] * wanted[i], step_s));
-        let sense = [0, 1].map(|i| senses[i].step(p[i] - last[i]));
+        let common = (together && interpolators.is_none()).then(|| command.position_m(t - dead[0]));
+        let mut p = [0.0; 3];
+        // A slide across the plane stands still.
+        for i in (0..3).filter(|i| moving[*i]) {
+            let wanted = match (&mut interpolators, common) {
+                (Some(each), _) => each[i].position_m(t - dead[i]),
+                (None, Some(common)) => common,
+                (None, None) => command.position_m(t - dead[i]),
+            };
+            p[i] = chains[i].step(gain[i] * along(i, wanted), step_s);
+        }
+        let sense = [0, 1, 2].map(|i| senses[i].step(p[i] - last[i]));
         last = p;
         if k < 0 || !(k as usize).is_multiple_of(per_sample) {
             continue;
         }
-        p = machine.geometry.place(p);
-        p[1] += 0.5 * machine.lateral_play_m[0] * sense[0];
-        p[0] -= 0.5 * machine.lateral_play_m[1] * sense[1];
+        p = machine.geometry.from_centre(test.centre_m, p);
+        for (mover, sense) in sense.iter().enumerate() {
+            // To the left of the travel in the plane from the mover to the next slide, to the right in the other.
+            p[(mover + 1) % 3] += 0.5 * machine.lateral_play_m[mover][(mover + 1) % 3] * sense;
+            p[(mover + 2) % 3] -= 0.5 * machine.lateral_play_m[mover][(mover + 2) % 3] * sense;
+        }
         position_m.push(outside(
             machine,
             test,
@@ -212,13 +222,13 @@ fn slowest_s(a: &AxisChain) -> f64 {
 fn outside(
     machine: &Machine,
     test: &Test,
-    p: [f64; 2],
+    p: [f64; 3],
     t: f64,
     turn_s: f64,
     campaign_s: f64,
     vibration_rad: f64,
     angle_rad: f64,
-) -> [f64; 2] {
+) -> [f64; 3] {
     let mut p = p;
     let share = (test.started_s + t) / campaign_s;
     let mut radial = machine.radius_offset_m;
@@ -246,6 +256,6 @@ fn outside(
         .iter()
         .map(|q| q.radial_m(&here))
         .sum::<f64>();
-    let longer = 1.0 + radial / p[0].hypot(p[1]);
+    let longer = 1.0 + radial / p[0].hypot(p[1]).hypot(p[2]);
     p.map(|x| x * longer)
 }

@@ -9,8 +9,8 @@ use std::path::Path;
 pub struct Finding {
     /// Cause.
     pub cause: String,
-    /// `x`, `y` or none.
-    pub axis: Option<String>,
+    /// What it sits on: `actuators`, or `axis` where there is no such field.
+    pub actuators: Vec<String>,
     /// Stated probability.
     pub probability: f64,
     /// Estimate, in `unit`.
@@ -74,7 +74,19 @@ fn finding(json: &Value) -> Option<Finding> {
     let ci = estimate.get("ci95")?.as_array()?;
     Some(Finding {
         cause: json.get("cause")?.as_str()?.to_owned(),
-        axis: json.get("axis")?.as_str().map(str::to_owned),
+        actuators: match json.get("actuators") {
+            Some(list) => list
+                .as_array()?
+                .iter()
+                .map(|a| a.as_str().map(str::to_owned))
+                .collect::<Option<_>>()?,
+            None => json
+                .get("axis")?
+                .as_str()
+                .map(str::to_owned)
+                .into_iter()
+                .collect(),
+        },
         probability: json.get("probability")?.as_f64()?,
         value: estimate.get("value")?.as_f64()?,
         // An interval may be open.

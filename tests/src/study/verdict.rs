@@ -1,6 +1,6 @@
 //! One campaign judged: was the truth found, and nothing else?
-use super::Outcome;
-use crate::effects::{Case, Truth};
+use super::{Finding, Outcome};
+use crate::effects::{Case, Seat, Truth};
 use crate::machine::Instrument;
 use giotto::campaign::Run;
 
@@ -80,7 +80,7 @@ pub fn judge(case: &Case, outcome: &Outcome) -> Verdict {
         .findings
         .iter()
         .map(|f| {
-            let axis = f.axis.as_deref().map_or(String::new(), |a| format!(" {a}"));
+            let axis: String = f.actuators.iter().map(|a| format!(" {a}")).collect();
             format!(
                 "{}{axis} {:.3e} [{:.3e}, {:.3e}] {} p {:.2}",
                 f.cause, f.value, f.ci95[0], f.ci95[1], f.unit, f.probability
@@ -90,7 +90,6 @@ pub fn judge(case: &Case, outcome: &Outcome) -> Verdict {
         .collect::<Vec<_>>()
         .join("; ");
     for truth in &case.truth {
-        let name = truth.axis.map(|a| ["x", "y"][a]);
         let mut same = outcome
             .findings
             .iter()
@@ -98,15 +97,13 @@ pub fn judge(case: &Case, outcome: &Outcome) -> Verdict {
         let Some(first) = same.clone().next() else {
             continue;
         };
-        if name.is_some() {
-            verdict
-                .axis
-                .push(same.clone().any(|f| f.axis.as_deref() == name));
+        if truth.seat != Seat::Whole {
+            let right = |f: &Finding| sits(truth, &f.actuators);
+            verdict.axis.push(same.clone().all(right));
         }
-        let at = same
-            .find(|f| name.is_none() || f.axis.as_deref() == name)
-            .unwrap_or(first);
-        let inside = at.ci95[0] <= truth.value && truth.value <= at.ci95[1];
+        let at = same.find(|f| sits(truth, &f.actuators)).unwrap_or(first);
+        let value = value_for(truth, &at.actuators);
+        let inside = at.ci95[0] <= value && value <= at.ci95[1];
         verdict.covered.push((truth.effect.clone(), inside));
     }
     if !case.truth.is_empty() && !unlisted {
@@ -119,6 +116,49 @@ pub fn judge(case: &Case, outcome: &Outcome) -> Verdict {
     }
     verdict.false_findings = false_findings;
     verdict
+}
+
+/// Names of the slides.
+const SLIDES: [&str; 3] = ["x", "y", "z"];
+
+/// Place among the pairs XY, YZ, ZX of two slides by name, and whether they come in the order of the plane.
+fn pair_of(actuators: &[String]) -> Option<(usize, bool)> {
+    let [a, b] = actuators else { return None };
+    let index = |name: &str| SLIDES.iter().position(|s| *s == name);
+    let (a, b) = (index(a)?, index(b)?);
+    match (b + 3 - a) % 3 {
+        1 => Some((a, true)),
+        2 => Some((b, false)),
+        _ => None,
+    }
+}
+
+/// Whether a finding with these actuators sits where the truth does. A finding that names none can only mean the
+/// one plane there was.
+fn sits(truth: &Truth, actuators: &[String]) -> bool {
+    match truth.seat {
+        Seat::Whole => true,
+        Seat::Slide(axis) => actuators.iter().any(|a| a == SLIDES[axis]),
+        Seat::Pair(_) if actuators.is_empty() => true,
+        // Of a slide that differs from both others two pairs tell.
+        Seat::Pair(_) => pair_of(actuators).is_some_and(|(pair, _)| {
+            truth
+                .by_pair
+                .is_some_and(|v| v[pair].abs() > 1e-3 * truth.value.abs())
+        }),
+    }
+}
+
+/// The true value of what a finding with these actuators names.
+fn value_for(truth: &Truth, actuators: &[String]) -> f64 {
+    match (truth.by_pair, pair_of(actuators)) {
+        // A right angle has no order; a difference has.
+        (Some(values), Some((pair, in_order))) if in_order || truth.effect == "squareness" => {
+            values[pair]
+        }
+        (Some(values), Some((pair, _))) => -values[pair],
+        _ => truth.value,
+    }
 }
 
 /// What the true machine leaves of the measurement, rms over all samples, each run's centre removed, µm. The phase of
@@ -184,12 +224,11 @@ mod tests {
     use super::*;
     use crate::effects::Kind;
     use crate::machine::base::Variety;
-    use crate::study::Finding;
 
-    fn finding(cause: &str, axis: Option<&str>, ci95: [f64; 2]) -> Finding {
+    fn finding(cause: &str, actuators: &[&str], ci95: [f64; 2]) -> Finding {
         Finding {
             cause: cause.into(),
-            axis: axis.map(str::to_owned),
+            actuators: actuators.iter().map(|a| (*a).to_owned()).collect(),
             probability: 0.9,
             value: 0.5 * (ci95[0] + ci95[1]),
             ci95,
@@ -221,7 +260,11 @@ mod tests {
     fn right_wrong_and_beside() {
         let case = case(&["reversal_spike"]);
         let t = case.truth[0].clone();
-        let axis = t.axis.map(|a| ["x", "y"][a]);
+        let axis: &[&str] = match t.seat {
+            Seat::Slide(slide) => &SLIDES[slide..=slide],
+            // On both slides of the pair.
+            _ => &["x"],
+        };
         let around = [0.9 * t.value, 1.1 * t.value];
         let v = judge(
             &case,
@@ -230,7 +273,7 @@ mod tests {
         assert!(v.top_right && v.exact && v.covered[0].1);
         let both = vec![
             finding("reversal_spike", axis, around),
-            finding("higher_order_dynamics", None, [0.0, 1.0]),
+            finding("higher_order_dynamics", &[], [0.0, 1.0]),
         ];
         let v = judge(&case, &answer(both.clone(), false));
         assert!(
@@ -244,7 +287,7 @@ mod tests {
         );
         let v = judge(
             &case,
-            &answer(vec![finding("backlash", Some("x"), [0.0, 1.0])], false),
+            &answer(vec![finding("backlash", &["x"], [0.0, 1.0])], false),
         );
         assert!(
             !v.top_right
@@ -265,7 +308,7 @@ mod tests {
     #[test]
     fn sets_nulls_and_the_unlisted() {
         let pair = case(&["squareness", "thermal_drift"]);
-        let [a, b] = ["squareness", "thermal_drift"].map(|c| finding(c, None, [0.0, 1.0]));
+        let [a, b] = ["squareness", "thermal_drift"].map(|c| finding(c, &[], [0.0, 1.0]));
         assert!(judge(&pair, &answer(vec![a.clone(), b], false)).exact);
         assert!(!judge(&pair, &answer(vec![a.clone()], false)).exact);
         let unlisted = case(&["unknown_bump"]);
