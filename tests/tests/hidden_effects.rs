@@ -24,11 +24,11 @@ fn ask(kind: &Kind, strength: f64, seed: u64) -> (Case, Verdict) {
     (case, verdict)
 }
 
-/// The slide that the first effect sits on.
+/// The slide that the first effect sits on; X if it is on both.
 fn slide(case: &Case) -> usize {
     match case.truth[0].seat {
         Seat::Slide(slide) => slide,
-        other => panic!("{other:?} is no slide"),
+        _ => 0,
     }
 }
 
@@ -197,12 +197,12 @@ fn campaigns_too_poor_to_tell_get_no_guess() {
     }
 }
 
-/// The six open campaigns, where `GIOTTO_CAMPAIGNS` says they are.
+/// Open campaigns with their truth, where `GIOTTO_CAMPAIGNS` says they are.
 #[test]
+#[ignore = "needs GIOTTO_CAMPAIGNS, a folder of campaigns with truth.json"]
 fn open_campaigns_come_out_as_their_truth_says() {
-    let Some(root) = std::env::var_os("GIOTTO_CAMPAIGNS").map(std::path::PathBuf::from) else {
-        return;
-    };
+    let root = std::env::var_os("GIOTTO_CAMPAIGNS").expect("GIOTTO_CAMPAIGNS names a folder");
+    let root = std::path::PathBuf::from(root);
     let mut seen = 0;
     for entry in std::fs::read_dir(&root).unwrap().filter_map(Result::ok) {
         let Ok(truth) = std::fs::read_to_string(entry.path().join("truth.json")) else {

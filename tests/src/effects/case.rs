@@ -174,6 +174,7 @@ impl Case {
                 misfit_m,
             });
         }
+        together(&mut truth);
         let measured_with = seed ^ 0x6d65_6173;
         let mut campaign = instrument.measure(&machine, &plan, measured_with);
         if matches!(kind, Kind::Permuted(_)) {
@@ -193,6 +194,26 @@ impl Case {
             campaign,
             model,
         })
+    }
+}
+
+/// Effects of one name on several pairs add up in each pair: two slides with scales of their own make a third
+/// difference.
+fn together(truth: &mut [Truth]) {
+    let all: Vec<(String, [f64; 3])> = truth
+        .iter()
+        .filter_map(|t| t.by_pair.map(|v| (t.effect.clone(), v)))
+        .collect();
+    for t in truth {
+        let (Some(values), Seat::Pair(pair)) = (&mut t.by_pair, t.seat) else {
+            continue;
+        };
+        *values = [0, 1, 2].map(|k| {
+            let same = all.iter().filter(|(name, _)| *name == t.effect);
+            same.map(|(_, v)| v[k]).sum()
+        });
+        // A pair has the number of its first slide.
+        t.value = values[pair[0]];
     }
 }
 

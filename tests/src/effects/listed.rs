@@ -158,7 +158,8 @@ pub fn listed_on(name: &str, seed: u64, slides: Slides) -> Option<Effect> {
             Box::new(move |m, _, _| 1e3 * m.lateral_play_m[axis][other]),
         ),
         "reversal_spike" => {
-            let both = rng.random_bool(0.5);
+            // An effect that is asked for on one slide is on no other.
+            let both = rng.random_bool(0.5) && slides.axis.is_none();
             let decay_s = rng.random_range(0.015..0.1);
             let rise_s = decay_s * rng.random_range(0.02..0.25);
             let presliding_m = rng.random_range(0.5e-6..25e-6);

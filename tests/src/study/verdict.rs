@@ -99,9 +99,15 @@ pub fn judge(case: &Case, outcome: &Outcome) -> Verdict {
         };
         if truth.seat != Seat::Whole {
             let right = |f: &Finding| sits(truth, &f.actuators);
-            verdict.axis.push(same.clone().all(right));
+            // Each right angle is one of its own; scales and lags of three slides are told by two differences.
+            let named = truth.effect != "squareness" || same.clone().any(|f| own(truth, f));
+            verdict.axis.push(named && same.clone().all(right));
         }
-        let at = same.find(|f| sits(truth, &f.actuators)).unwrap_or(first);
+        let at = same
+            .clone()
+            .find(|f| own(truth, f))
+            .or_else(|| same.find(|f| sits(truth, &f.actuators)))
+            .unwrap_or(first);
         let value = value_for(truth, &at.actuators);
         let inside = at.ci95[0] <= value && value <= at.ci95[1];
         verdict.covered.push((truth.effect.clone(), inside));
@@ -146,6 +152,16 @@ fn sits(truth: &Truth, actuators: &[String]) -> bool {
                 .by_pair
                 .is_some_and(|v| v[pair].abs() > 1e-3 * truth.value.abs())
         }),
+    }
+}
+
+/// Whether a finding names the very pair that the effect was hidden on.
+fn own(truth: &Truth, finding: &Finding) -> bool {
+    match truth.seat {
+        Seat::Pair(pair) if !finding.actuators.is_empty() => {
+            pair_of(&finding.actuators).is_some_and(|(k, _)| k == pair[0])
+        }
+        _ => sits(truth, &finding.actuators),
     }
 }
 
