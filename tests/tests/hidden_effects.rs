@@ -14,13 +14,13 @@ use rayon::prelude::*;
 
 fn answer(case: &Case) -> Outcome {
     let dir = tempfile::tempdir().unwrap();
-    files::write(case, dir.path()).unwrap();
+    files::write(&case.hidden(), dir.path()).unwrap();
     Outcome::of(dir.path()).unwrap()
 }
 
 fn ask(kind: &Kind, strength: f64, seed: u64) -> (Case, Verdict) {
     let case = Case::new(kind, strength, seed, Variety::Small).unwrap();
-    let verdict = judge(&case, &answer(&case));
+    let verdict = judge(&case.hidden(), &answer(&case));
     (case, verdict)
 }
 
@@ -150,7 +150,7 @@ fn a_loud_vibration_beside_teeth_is_named() {
             Variety::Broad,
         )
         .unwrap();
-        let verdict = judge(&case, &answer(&case));
+        let verdict = judge(&case.hidden(), &answer(&case));
         assert!(
             verdict.exact && verdict.false_findings.is_empty(),
             "seed {seed}: {}",
@@ -164,7 +164,7 @@ fn a_loud_vibration_beside_teeth_is_named() {
 fn a_piece_of_what_has_no_name_gets_none() {
     for seed in [1_910_744_070_355_028_229, 1_910_744_070_355_028_237] {
         let case = Case::new(&effects(&["unknown_transient"]), 3.0, seed, Variety::Usual).unwrap();
-        let verdict = judge(&case, &answer(&case));
+        let verdict = judge(&case.hidden(), &answer(&case));
         assert!(
             verdict.exact && verdict.false_findings.is_empty(),
             "seed {seed}: {}",

@@ -18,7 +18,7 @@ const Z: Slides = Slides {
 
 fn answer(case: &Case) -> Outcome {
     let dir = tempfile::tempdir().unwrap();
-    files::write(case, dir.path()).unwrap();
+    files::write(&case.hidden(), dir.path()).unwrap();
     Outcome::of(dir.path()).unwrap()
 }
 
@@ -26,7 +26,7 @@ fn ask(names: &[&str], seed: u64, planes: &[Plane], slides: &[Slides]) -> (Outco
     let kind = Kind::Effects(names.iter().map(|s| (*s).to_owned()).collect());
     let case = Case::in_space(&kind, 3.0, seed, planes, slides).unwrap();
     let outcome = answer(&case);
-    let verdict = judge(&case, &outcome);
+    let verdict = judge(&case.hidden(), &outcome);
     (outcome, verdict)
 }
 
@@ -153,7 +153,7 @@ fn nothing_is_found_in_three_planes_of_a_healthy_machine() {
             .filter_map(|seed| {
                 let kind = Kind::Null(giotto_tests::effects::Null::Lag);
                 let case = Case::in_space(&kind, 0.0, seed, &Plane::ALL, &[Slides::XY]).unwrap();
-                let v = judge(&case, &answer(&case));
+                let v = judge(&case.hidden(), &answer(&case));
                 (!v.stated.is_empty() || v.said.ends_with("unexplained"))
                     .then(|| format!("seed {seed}: {}", v.said))
             })

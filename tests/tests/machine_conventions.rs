@@ -359,6 +359,7 @@ fn heat_and_vibration_belong_to_time() {
         thermal: Some(Thermal {
             total: 100e-6,
             curvature: 0.0,
+            hook: 0.0,
         }),
         ..Machine::default()
     };
@@ -374,6 +375,7 @@ fn heat_and_vibration_belong_to_time() {
     let warm = Thermal {
         total: 100e-6,
         curvature: 2.0,
+        hook: 0.0,
     };
     near(
         warm.growth(1.0),

@@ -168,7 +168,7 @@ fn campaigns_of_several_planes_come_back_from_their_files() {
         let case = Case::on(&kind, 3.0, 3, lab, &[slides]).unwrap();
         assert_eq!(case.truth[0].seat, Seat::Slide(2));
         let dir = tempfile::tempdir().unwrap();
-        files::write(&case, dir.path()).unwrap();
+        files::write(&case.hidden(), dir.path()).unwrap();
         let read = giotto::campaign::read(dir.path()).unwrap();
         assert_eq!(read.runs.len(), 16);
         for (run, written) in read.runs.iter().zip(&case.campaign.runs) {

@@ -118,7 +118,7 @@ fn main() -> std::process::ExitCode {
             if let Some(keep) = args.keep {
                 keep.thin(&mut case.campaign);
             }
-            files::write(&case, dir)
+            files::write(&case.hidden(), dir)
                 .err()
                 .map(|e| format!("{}: {e}", dir.display()))
         })

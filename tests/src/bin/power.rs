@@ -76,6 +76,7 @@ fn line(row: &Row) -> String {
 /// Draws the campaign of `job`, has it diagnosed as a user would from its files, judges the answer.
 fn ask(job: &Job, variety: Variety) -> Result<Row, String> {
     let case = Case::new(&job.kind, job.strength, job.seed, variety).ok_or("no such effect")?;
+    let case = case.hidden();
     let dir = tempfile::tempdir().map_err(|e| e.to_string())?;
     files::write(&case, dir.path()).map_err(|e| e.to_string())?;
     let start = Instant::now();

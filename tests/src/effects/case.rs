@@ -1,8 +1,8 @@
 //! A hidden campaign from a seed: a laboratory, its effects, and the truth about them.
-use super::{Effect, Seat, Slides, listed_on, scaled, unlisted};
+use super::{Effect, Hidden, Seat, Slides, left_um, listed_on, other_law, scaled, unlisted};
 use crate::machine::base::{Lab, Variety};
 use crate::machine::{Instrument, Machine, Plan, Plane, Spread};
-use giotto::campaign::Campaign;
+use giotto::campaign::{Campaign, Run};
 
 /// What a campaign hides.
 #[derive(Clone, Debug, PartialEq)]
@@ -131,6 +131,7 @@ impl Case {
                         radius_m: 0.0,
                         oval_m: 0.0,
                         lobes_m: 0.0,
+                        high_m: 0.0,
                         ..instrument.spread
                     };
                     instrument.drift_m = 0.0;
@@ -144,6 +145,7 @@ impl Case {
                     .map(|(n, i)| {
                         listed_on(n, seed.wrapping_mul(31) + i, seat_of(i as usize - 1))
                             .or_else(|| unlisted(n, seed.wrapping_mul(31) + i))
+                            .or_else(|| other_law(n, seed.wrapping_mul(31) + i))
                     })
                     .collect();
                 effects?
@@ -217,6 +219,67 @@ fn together(truth: &mut [Truth]) {
     }
 }
 
+impl Case {
+    /// What is handed over, with its truth.
+    pub fn hidden(&self) -> Hidden {
+        Hidden {
+            name: self.name.clone(),
+            seed: self.seed,
+            strength: self.strength,
+            noise_m: self.instrument.noise_m,
+            scatter_m: self.instrument.spread.radius_m,
+            truth: self.truth.clone(),
+            campaign: self.campaign.clone(),
+            perfect_um: (self.campaign.runs.len() == self.plan.tests.len())
+                .then(|| self.perfect_um()),
+            model: self.model,
+            kinematics: None,
+            spoilt: None,
+        }
+    }
+
+    /// What the true machine leaves of the measurement, rms over all samples, each run's centre removed, µm. The phase of
+    /// a vibration, the places of teeth and where on the circle a polygon has its corners are new in each run: no model
+    /// could foretell them, so they count as left (of a polygon all but its mean).
+    pub fn perfect_um(&self) -> f64 {
+        let case = self;
+        let perfect = Instrument {
+            noise_m: 0.0,
+            resolution_m: 0.0,
+            drift_m: 0.0,
+            jitter_s: 0.0,
+            ..case.instrument
+        };
+        let perfect = Instrument {
+            spread: crate::machine::Spread {
+                radius_m: 0.0,
+                oval_m: 0.0,
+                lobes_m: 0.0,
+                high_m: 0.0,
+                ..perfect.spread
+            },
+            ..perfect
+        };
+        let mut machine = case.machine.clone();
+        machine.vibration = None;
+        machine
+            .axes
+            .iter_mut()
+            .for_each(|axis| axis.stick_slip = None);
+        let polygon = perfect.measure(&machine, &case.plan, case.measured_with);
+        machine.interpolation_s = 0.0;
+        let mut clean = perfect.measure(&machine, &case.plan, case.measured_with);
+        for (run, polygon) in clean.runs.iter_mut().zip(&polygon.runs) {
+            let mean = |run: &Run| {
+                run.samples.deviation_m.iter().sum::<f64>() / run.samples.deviation_m.len() as f64
+            };
+            let shift = mean(polygon) - mean(run);
+            run.samples.deviation_m.iter_mut().for_each(|x| *x += shift);
+        }
+        left_um(&case.campaign, &clean)
+    }
+}
+
 /// What a laboratory without much time would have measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Keep {
@@ -265,9 +328,11 @@ fn merged(mut machine: Machine, base: &Machine, alone: &Machine) -> Machine {
     take!(centripetal_limit_m_s2);
     take!(vibration);
     take!(thermal);
+    take!(override_share);
     machine.radius_offset_m += alone.radius_offset_m - base.radius_offset_m;
     for i in 0..3 {
         take!(add geometry.scale[i]);
+        take!(add geometry.sense_scale[i]);
         take!(add geometry.squareness_rad[i]);
         for j in 0..3 {
             take!(add geometry.bow_per_m[i][j]);
@@ -284,6 +349,7 @@ fn merged(mut machine: Machine, base: &Machine, alone: &Machine) -> Machine {
         to.backlash_m += from.backlash_m - was.backlash_m;
         to.mechanics = from.mechanics.or(to.mechanics);
         to.friction = from.friction.or(to.friction);
+        to.two_mass = from.two_mass.or(to.two_mass);
         to.stick_slip = from.stick_slip.or(to.stick_slip);
     }
     machine.patterns.extend(alone.patterns.iter().copied());

@@ -268,6 +268,7 @@ pub fn listed_on(name: &str, seed: u64, slides: Slides) -> Option<Effect> {
                     m.thermal = Some(Thermal {
                         total: sign * size,
                         curvature,
+                        hook: 0.0,
                     })
                 }),
                 // What can be known: the growth between the first run and the last.

@@ -1,10 +1,14 @@
 //! Effects to hide: what they do to a machine, what they are called, how large they truly are.
 mod case;
+mod hidden;
+mod laws;
 mod listed;
 mod strength;
 mod unlisted;
 
 pub use case::{Case, Keep, Kind, Null, Truth};
+pub use hidden::{Hidden, left_um};
+pub use laws::{OTHER_LAWS, other_law};
 pub use listed::{LISTED, listed, listed_on};
 pub use strength::{misfit_m, scaled};
 pub use unlisted::{UNLISTED, unlisted};
@@ -42,6 +46,8 @@ pub enum Seat {
     Slide(usize),
     /// Two slides.
     Pair([usize; 2]),
+    /// One joint, from 0.
+    Joint(usize),
 }
 
 /// One error that can be hidden. Its size is a positive number that the misfit grows with; what the size

@@ -5,6 +5,8 @@
 pub struct Geometry {
     /// Relative scale error of X, Y and Z, m/m.
     pub scale: [f64; 3],
+    /// Scale error with the sense of travel, m/m: a slide that runs back reads shorter than one that runs forth.
+    pub sense_scale: [f64; 3],
     /// Squareness ε of the pairs XY, YZ, ZX: the first moves by `ε·second`, rad.
     pub squareness_rad: [f64; 3],
     /// Curvature of a guide: the place along the first index moves the slide of the second, 1/m.

@@ -16,6 +16,7 @@ pub mod pattern;
 pub mod plan;
 pub mod plane;
 pub mod run;
+pub mod two_mass;
 
 pub use friction::{Friction, StickSlip};
 pub use geometry::{Cyclic, Geometry};
@@ -24,6 +25,7 @@ pub use pattern::Pattern;
 pub use plan::{Plan, Test};
 pub use plane::Plane;
 pub use run::simulate;
+pub use two_mass::TwoMass;
 
 /// Everything that shapes the motion; the default is a perfect machine.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,6 +50,8 @@ pub struct Machine {
     pub radius_offset_m: f64,
     /// Errors without a name in the contract.
     pub patterns: Vec<Pattern>,
+    /// Share of the programmed feed that is driven: the override, 1 at 100 %.
+    pub override_share: f64,
 }
 
 impl Default for Machine {
@@ -63,6 +67,7 @@ impl Default for Machine {
             thermal: None,
             radius_offset_m: 0.0,
             patterns: Vec::new(),
+            override_share: 1.0,
         }
     }
 }
@@ -84,6 +89,8 @@ pub struct AxisChain {
     pub mechanics: Option<[f64; 2]>,
     /// Friction that an integrating loop works off.
     pub friction: Option<Friction>,
+    /// Friction at the end of a spring, another law than `friction`.
+    pub two_mass: Option<TwoMass>,
     /// Sticking and slipping at low speed.
     pub stick_slip: Option<StickSlip>,
     /// Lost motion, m; negative: the controller's backlash compensation is set too high.
@@ -136,6 +143,8 @@ pub struct Thermal {
     pub total: f64,
     /// 0: linear in time; above: `(1−exp(−c·t/T))/(1−exp(−c))`, a warm-up.
     pub curvature: f64,
+    /// A hump on top, `4·hook·u(1−u)`: the machine warms, the hall cools.
+    pub hook: f64,
 }
 
 impl Thermal {
@@ -146,6 +155,6 @@ impl Thermal {
         } else {
             (-self.curvature * u).exp_m1() / (-self.curvature).exp_m1()
         };
-        self.total * share
+        self.total * (share + 4.0 * self.hook * u * (1.0 - u))
     }
 }

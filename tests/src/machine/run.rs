@@ -4,6 +4,7 @@ use super::friction::{FrictionState, StickState};
 use super::hysteresis::{Play, Sense};
 use super::linear::{Average, Lag, SecondOrder, line_loss};
 use super::pattern::Here;
+use super::two_mass::TwoMassState;
 use super::{AxisChain, Machine, Test};
 use std::f64::consts::PI;
 
@@ -23,13 +24,14 @@ pub struct Lap {
     pub turn_s: f64,
 }
 
-/// The linear elements of one axis, at rest.
-struct Chain {
+/// The elements of one axis or joint, at rest.
+pub(crate) struct Chain {
     average: Option<Average>,
     exponential: Option<Lag>,
     lag: Option<Lag>,
     mechanics: Option<SecondOrder>,
     friction: Option<FrictionState>,
+    two_mass: Option<TwoMassState>,
     stick: Option<StickState>,
     play: Option<Play>,
     over_m: f64,
@@ -38,7 +40,7 @@ struct Chain {
 }
 
 impl Chain {
-    fn new(a: &AxisChain, step_s: f64, at: f64) -> Self {
+    pub(crate) fn new(a: &AxisChain, step_s: f64, at: f64) -> Self {
         Self {
             average: (a.average_s > 0.0).then(|| Average::new(a.average_s, step_s, at)),
             exponential: (a.exponential_s > 0.0)
@@ -46,6 +48,7 @@ impl Chain {
             lag: (a.lag_s > 0.0).then(|| Lag::new(a.lag_s, a.feed_forward, step_s, at)),
             mechanics: a.mechanics.map(|[w, z]| SecondOrder::new(w, z, step_s, at)),
             friction: a.friction.as_ref().map(|f| FrictionState::new(f, step_s)),
+            two_mass: a.two_mass.as_ref().map(|f| TwoMassState::new(f, step_s)),
             stick: a.stick_slip.as_ref().map(|s| StickState::new(s, step_s)),
             play: (a.backlash_m > 0.0).then(|| Play::new(a.backlash_m, at)),
             over_m: a.backlash_m.min(0.0),
@@ -67,7 +70,7 @@ impl Chain {
         .sum()
     }
 
-    fn step(&mut self, command: f64, step_s: f64) -> f64 {
+    pub(crate) fn step(&mut self, command: f64, step_s: f64) -> f64 {
         let mut x = command;
         if let Some(e) = &mut self.average {
             x = e.step(x);
@@ -86,6 +89,9 @@ impl Chain {
         if let Some(f) = &mut self.friction {
             x += f.step(travel);
         }
+        if let Some(f) = &mut self.two_mass {
+            x += f.step(travel);
+        }
         if let Some(s) = &mut self.stick {
             x += s.step(travel, step_s);
         }
@@ -101,7 +107,7 @@ impl Chain {
 
 /// Feed the controller really drives, m/s.
 pub fn real_feed(machine: &Machine, test: &Test) -> f64 {
-    test.feed_m_s
+    (machine.override_share * test.feed_m_s)
         .min((machine.centripetal_limit_m_s2 * test.radius_m).sqrt())
 }
 
@@ -117,7 +123,7 @@ pub fn simulate(machine: &Machine, test: &Test, campaign_s: f64, vibration_rad: 
         || machine
             .axes
             .iter()
-            .any(|a| a.friction.is_some() || a.stick_slip.is_some());
+            .any(|a| a.friction.is_some() || a.two_mass.is_some() || a.stick_slip.is_some());
     let largest = if nonlinear {
         FINE_STEP_S
     } else {
@@ -179,7 +185,11 @@ pub fn simulate(machine: &Machine, test: &Test, campaign_s: f64, vibration_rad: 
         if k < 0 || !(k as usize).is_multiple_of(per_sample) {
             continue;
         }
+        let read = p;
         p = machine.geometry.from_centre(test.centre_m, p);
+        for i in 0..3 {
+            p[i] += machine.geometry.sense_scale[i] * sense[i] * read[i];
+        }
         for (mover, sense) in sense.iter().enumerate() {
             // To the left of the travel in the plane from the mover to the next slide, to the right in the other.
             p[(mover + 1) % 3] += 0.5 * machine.lateral_play_m[mover][(mover + 1) % 3] * sense;
@@ -200,15 +210,17 @@ pub fn simulate(machine: &Machine, test: &Test, campaign_s: f64, vibration_rad: 
 }
 
 /// Longest time constant of a chain, s.
-fn slowest_s(a: &AxisChain) -> f64 {
+pub(crate) fn slowest_s(a: &AxisChain) -> f64 {
     let mechanics = a.mechanics.map_or(0.0, |[w, z]| 1.0 / (w * z.min(1.0 / z)));
     let friction = a.friction.map_or(0.0, |f| f.decay_s);
+    let two_mass = a.two_mass.map_or(0.0, |f| f.decay_s);
     [
         a.average_s / 10.0,
         a.exponential_s,
         a.lag_s,
         mechanics,
         friction,
+        two_mass,
     ]
     .into_iter()
     .fold(0.0, f64::max)

@@ -34,6 +34,10 @@ pub struct Outcome {
     pub baseline_um: f64,
     /// Extended simulation on runs left out, rms, µm.
     pub extended_um: f64,
+    /// Flashing is recommended.
+    pub flash: bool,
+    /// Files of the runs that were left out.
+    pub left_out: Vec<String>,
 }
 
 impl Outcome {
@@ -65,6 +69,16 @@ impl Outcome {
             unexplained: json.pointer("/unexplained/present")?.as_bool()?,
             baseline_um: json.pointer("/baseline/heldout_rms_um")?.as_f64()?,
             extended_um: json.pointer("/extended/heldout_rms_um")?.as_f64()?,
+            flash: json
+                .pointer("/recommendation/action")
+                .is_some_and(|action| action == "flash"),
+            left_out: json
+                .get("left_out")
+                .and_then(Value::as_array)
+                .into_iter()
+                .flatten()
+                .filter_map(|run| run.get("file")?.as_str().map(str::to_owned))
+                .collect(),
         })
     }
 }
