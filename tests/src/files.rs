@@ -37,7 +37,7 @@ pub fn write(case: &Hidden, dir: &Path) -> std::io::Result<()> {
             let _ = writeln!(toml, "centre_mm = {:?}", centre.map(|c| rounded(c * 1e3)));
         }
         if let Some(arc) = run.samples.arc_rad() {
-            let _ = writeln!(toml, "arc_deg = {:?}", rounded(arc.to_degrees()));
+            let _ = writeln!(toml, "arc_deg = {:.1}", arc.to_degrees().round());
         }
         if let Some(setup) = &run.setup {
             let _ = writeln!(toml, "setup = \"{setup}\"");
@@ -50,7 +50,7 @@ pub fn write(case: &Hidden, dir: &Path) -> std::io::Result<()> {
         "noise_um": case.noise_m * 1e6, "spread_um": case.scatter_m * 1e6, "spoilt": case.spoilt,
         "truth": case.truth.iter().map(|t| json!({
             "effect": t.effect, "accept": t.accept, "value": t.value.is_finite().then_some(t.value), "unit": t.unit,
-            "actuators": actuators(t.seat), "misfit_um": t.misfit_m * 1e6,
+            "actuators": actuators(t.seat), "misfit_um": t.misfit_m.is_finite().then_some(t.misfit_m * 1e6),
         })).collect::<Vec<_>>(),
     });
     std::fs::write(dir.join("truth.json"), format!("{truth:#}\n"))?;

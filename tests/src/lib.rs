@@ -11,5 +11,6 @@ pub mod files;
 pub mod fuzz;
 pub mod machine;
 pub mod noise;
+pub mod nuisance;
 pub mod paper;
 pub mod study;

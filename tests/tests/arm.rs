@@ -25,6 +25,7 @@ fn test(radius_m: f64, feed_m_s: f64, direction: Direction, centre_m: [f64; 3]) 
         samples: N,
         plane: Plane::XY,
         centre_m,
+        from_rest: false,
     }
 }
 

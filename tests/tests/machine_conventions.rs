@@ -25,6 +25,7 @@ fn test(radius_m: f64, feed_m_s: f64, direction: Direction) -> Test {
         samples: N,
         plane: Plane::XY,
         centre_m: [0.0; 3],
+        from_rest: false,
     }
 }
 

@@ -24,6 +24,7 @@ fn test(plane: Plane, radius_m: f64, feed_m_s: f64, direction: Direction) -> Tes
         samples: N,
         plane,
         centre_m: [0.0; 3],
+        from_rest: false,
     }
 }
 

@@ -70,5 +70,9 @@ pub fn simulate(arm: &Arm, test: &Test) -> Option<Lap> {
         let p = arm.real.forward(&q);
         position_m.push([0, 1, 2].map(|i| p[i] - test.centre_m[i]));
     }
-    Some(Lap { position_m, turn_s })
+    Some(Lap {
+        position_m,
+        turn_s,
+        angle_rad: None,
+    })
 }

@@ -164,8 +164,8 @@ impl Instrument {
     ) -> Run {
         let n = lap.position_m.len();
         let s = self.spread.grown(test);
-        // A tilted plane is known from points alone.
-        let sees_angle = self.sees_angle || test.plane.is_tilted();
+        // A tilted plane is known from points alone, and so is a start from rest.
+        let sees_angle = self.sees_angle || test.plane.is_tilted() || test.from_rest;
         let size = s.radius_m * s.shape.draw(rng);
         let wobble: Vec<[f64; 2]> = [s.oval_m, s.lobes_m, s.lobes_m]
             .iter()
@@ -194,7 +194,10 @@ impl Instrument {
         for k in 0..n {
             let p = self.place_at(lap, k, rng);
             let share = k as f64 / n as f64;
-            let even = test.start_angle_rad + test.sign() * 2.0 * PI * share;
+            let even = match &lap.angle_rad {
+                Some(angles) => angles[k],
+                None => test.start_angle_rad + test.sign() * 2.0 * PI * share,
+            };
             let [x, y, across] = test.plane.coordinates(p);
             let seen = [x - offset_m[0], y - offset_m[1]];
             let mut r = seen[0].hypot(seen[1]).hypot(across - self.height_m) - test.radius_m
@@ -211,7 +214,11 @@ impl Instrument {
                 r = (r / self.resolution_m).round() * self.resolution_m;
             }
             deviation_m.push(r);
-            let t = lap.turn_s * share;
+            // Samples of a turn are spread over it; those from rest to rest come as often.
+            let t = match lap.angle_rad {
+                Some(_) => lap.turn_s * k as f64 / test.samples as f64,
+                None => lap.turn_s * share,
+            };
             time_s.push(if self.tick_s > 0.0 {
                 (t / self.tick_s).round() * self.tick_s
             } else {

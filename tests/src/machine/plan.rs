@@ -25,6 +25,8 @@ pub struct Test {
     pub plane: Plane,
     /// Its centre in the machine, m.
     pub centre_m: [f64; 3],
+    /// The turn begins and ends at rest, and all of it is recorded.
+    pub from_rest: bool,
 }
 
 impl Test {
@@ -60,6 +62,8 @@ pub struct Grid {
     pub sorted: bool,
     /// Planes, each with the whole grid.
     pub planes: Vec<Plane>,
+    /// Runs are recorded from rest to rest.
+    pub from_rest: bool,
 }
 
 impl Grid {
@@ -77,6 +81,7 @@ impl Grid {
             start_angle_rad: 0.0,
             sorted: false,
             planes: vec![Plane::XY],
+            from_rest: false,
         }
     }
 
@@ -103,6 +108,7 @@ impl Grid {
             start_angle_rad: [0.0, PI / 4.0, PI / 2.0, PI, -PI / 2.0][rng.random_range(0..5)],
             sorted: false,
             planes: vec![Plane::XY],
+            from_rest: false,
         }
     }
 
@@ -124,6 +130,7 @@ impl Grid {
                             samples: self.samples.min((turn_s * self.rate_hz) as usize).max(32),
                             plane,
                             centre_m: [0.0; 3],
+                            from_rest: self.from_rest,
                         });
                     }
                 }

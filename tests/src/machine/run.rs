@@ -22,6 +22,8 @@ pub struct Lap {
     pub position_m: Vec<[f64; 3]>,
     /// Duration of the turn, s.
     pub turn_s: f64,
+    /// Commanded polar angle of each sample where they are more than one turn at a constant rate, rad.
+    pub angle_rad: Option<Vec<f64>>,
 }
 
 /// The elements of one axis or joint, at rest.
@@ -134,14 +136,16 @@ pub fn simulate(machine: &Machine, test: &Test, campaign_s: f64, vibration_rad: 
 
     let slow = machine.axes.iter().map(slowest_s).fold(0.0, f64::max);
     let settle_s = (25.0 * slow).max(0.3);
-    let command = Command::new(
-        test.radius_m,
-        rate,
-        test.start_angle_rad,
-        (feed / START_M_S2).max(0.05),
+    let ramp_s = (feed / START_M_S2).max(0.05);
+    let command = if test.from_rest {
+        // One turn from rest to rest: half a ramp's way is lost at either end.
+        let start_rad = test.start_angle_rad + 0.5 * rate * ramp_s;
+        Command::new(test.radius_m, rate, start_rad, ramp_s, 0.0).stopping(turn_s - ramp_s)
+    } else {
         // On the grid of steps, so that the lap begins on a step.
-        (settle_s / step_s).ceil() * step_s,
-    );
+        let settle_s = (settle_s / step_s).ceil() * step_s;
+        Command::new(test.radius_m, rate, test.start_angle_rad, ramp_s, settle_s)
+    };
     // One an axis: each follows the chords by a delay of its own.
     let mut interpolators = (machine.interpolation_s > 0.0)
         .then(|| [0, 1, 2].map(|_| Interpolator::new(command, machine.interpolation_s)));
@@ -166,7 +170,12 @@ pub fn simulate(machine: &Machine, test: &Test, campaign_s: f64, vibration_rad: 
     let mut position_m = Vec::with_capacity(n);
     let mut last = rest;
     let first = (command.begin_s() / step_s).floor() as i64;
-    let end = ((n - 1) * per_sample) as i64;
+    let end = if test.from_rest {
+        (command.end_s() / step_s) as i64
+    } else {
+        ((n - 1) * per_sample) as i64
+    };
+    let mut angle_rad = test.from_rest.then(Vec::new);
     for k in first..=end {
         let t = k as f64 * step_s;
         let common = (together && interpolators.is_none()).then(|| command.position_m(t - dead[0]));
@@ -182,8 +191,12 @@ pub fn simulate(machine: &Machine, test: &Test, campaign_s: f64, vibration_rad: 
         }
         let sense = [0, 1, 2].map(|i| senses[i].step(p[i] - last[i]));
         last = p;
-        if k < 0 || !(k as usize).is_multiple_of(per_sample) {
+        let before = k < 0 && !test.from_rest;
+        if before || k.rem_euclid(per_sample as i64) != 0 {
             continue;
+        }
+        if let Some(angles) = &mut angle_rad {
+            angles.push(command.angle_rad(t));
         }
         let read = p;
         p = machine.geometry.from_centre(test.centre_m, p);
@@ -206,7 +219,11 @@ pub fn simulate(machine: &Machine, test: &Test, campaign_s: f64, vibration_rad: 
             command.angle_rad(t),
         ));
     }
-    Lap { position_m, turn_s }
+    Lap {
+        position_m,
+        turn_s,
+        angle_rad,
+    }
 }
 
 /// Longest time constant of a chain, s.
