@@ -114,7 +114,8 @@ pub fn hidden(setting: &Setting, seed: u64) -> Option<Hidden> {
     })
 }
 
-fn name(setting: &Setting) -> String {
+/// Its name in a list.
+pub fn name(setting: &Setting) -> String {
     let what = if setting.effects.is_empty() {
         "sound".to_owned()
     } else {

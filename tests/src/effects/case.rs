@@ -47,6 +47,21 @@ pub struct Truth {
     pub misfit_m: f64,
 }
 
+impl Truth {
+    /// An effect that no cause of the list names.
+    pub fn nameless(effect: String) -> Self {
+        Self {
+            effect,
+            accept: Vec::new(),
+            seat: Seat::Whole,
+            value: f64::NAN,
+            by_pair: None,
+            unit: String::new(),
+            misfit_m: f64::NAN,
+        }
+    }
+}
+
 /// A hidden campaign.
 pub struct Case {
     /// Name.

@@ -1,25 +1,11 @@
-//! The same faults by other laws than the host's formulas, and effects that its dictionary of patterns does not hold.
+//! The same faults by other laws than the host's formulas, and an effect that its dictionary does not hold.
 use super::{Effect, Seat};
-use crate::machine::{Pattern, Thermal, TwoMass};
+use crate::machine::{Thermal, TwoMass};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::f64::consts::PI;
 
 /// Names of the effects that [`other_law`] can hide.
-pub const OTHER_LAWS: [&str; 4] = [
-    "two_mass_friction",
-    "thermal_hook",
-    "unlisted_sense_scale",
-    "unlisted_any_order",
-];
-
-/// What a listed cause makes of order, parity, exponents of f and of R: those are no patterns without a name.
-const LISTED_WAVES: [(i32, bool, i32, i32); 4] = [
-    (2, false, 0, 1),
-    (2, false, 2, -1),
-    (2, true, 1, 0),
-    (3, false, 0, 2),
-];
+pub const OTHER_LAWS: [&str; 3] = ["two_mass_friction", "thermal_hook", "unlisted_sense_scale"];
 
 /// The effect called `name`, drawn under `seed`.
 pub fn other_law(name: &str, seed: u64) -> Option<Effect> {
@@ -75,37 +61,11 @@ pub fn other_law(name: &str, seed: u64) -> Option<Effect> {
                 first: 30e-6,
             }
         }
-        "unlisted_sense_scale" => nameless(
+        _ => nameless(
             name,
             Box::new(move |m, size| m.geometry.sense_scale[axis] = sign * size),
             30e-6,
         ),
-        _ => {
-            let (order, odd, feed, radius) = loop {
-                let drawn = (
-                    rng.random_range(2..=40),
-                    rng.random_bool(0.5),
-                    rng.random_range(0..=4),
-                    rng.random_range(-2..=2),
-                );
-                if !LISTED_WAVES.contains(&drawn) {
-                    break drawn;
-                }
-            };
-            let phase_rad = rng.random_range(0.0..2.0 * PI);
-            let pattern = move |size: f64| Pattern::Lobes {
-                order: f64::from(order),
-                amplitude_m: size,
-                phase_rad,
-                odd,
-                reach: [f64::from(feed), f64::from(radius)],
-            };
-            nameless(
-                name,
-                Box::new(move |m, size| m.patterns.push(pattern(size))),
-                3e-6,
-            )
-        }
     };
     Some(effect)
 }
