@@ -11,6 +11,7 @@ pub mod planning;
 pub mod simulation;
 pub mod table_from_model;
 pub mod toml_file;
+pub mod whole_file;
 
 // The guide, page by page; its sources are `guide/*.md`.
 #[cfg(doc)]

@@ -1,5 +1,6 @@
 //! `giotto demo`: the whole loop on a bundled campaign and a simulated machine.
-use super::failure::{Failure, cannot_write};
+use super::destination::{Destination, Kind as FileKind};
+use super::failure::Failure;
 use super::output::Output;
 use crate::ring::{
     DemoError, LEFT_M, Learned, Proof, REDUCTION_PERCENT, Size, bundled, learn, picture, prove,
@@ -71,6 +72,7 @@ impl From<DemoError> for Failure {
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let started = Instant::now();
+    let drawing = Destination::maybe(args.svg.as_deref(), FileKind::Svg, &[])?;
     let plan = bundled()?;
     out.say(format_args!(
         "The machine is SIMULATED: a {} and a ballbar with {:.1} µm noise. Controller: {}. Seed {}.",
@@ -101,9 +103,10 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     );
     bar.finish_and_clear();
     let proof = proof?;
-    if let Some(path) = &args.svg {
-        std::fs::write(path, picture(&proof)).map_err(|e| cannot_write(path, &e))?;
-        out.note(format_args!("picture written to {}", path.display()));
+    if let Some(drawing) = &drawing {
+        drawing.write(picture(&proof))?;
+        let path = drawing.path().display();
+        out.note(format_args!("picture written to {path}"));
     }
     if out.json {
         out.document(&document(

@@ -1,5 +1,6 @@
 //! `giotto diagnose`: what the simulation gets wrong, why, the extended model, the gain.
-use super::failure::{Failure, cannot_write};
+use super::destination::{Destination, Kind};
+use super::failure::Failure;
 use super::output::Output;
 use super::source::Source;
 use comfy_table::{CellAlignment, Table, presets};
@@ -28,6 +29,9 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
+    let inputs = args.source.inputs(args.model.as_deref());
+    Destination::maybe(args.output.as_deref(), Kind::Model, &inputs)?;
+    let page = Destination::maybe(args.report.as_deref(), Kind::Html, &inputs)?;
     let campaign = args.source.read(out)?;
     let model = args.model.as_deref().map(ModelFile::load).transpose()?;
     let bar = out.spinner("diagnosing");
@@ -44,10 +48,10 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         diagnosis.model.save(path)?;
         out.note(format_args!("wrote {}", path.display()));
     }
-    if let Some(path) = &args.report {
+    if let Some(page) = &page {
         let html = giotto_report::html(&campaign, &diagnosis).map_err(Failure::input)?;
-        std::fs::write(path, html).map_err(|e| cannot_write(path, &e))?;
-        out.note(format_args!("wrote {}", path.display()));
+        page.write(html)?;
+        out.note(format_args!("wrote {}", page.path().display()));
     }
     if out.json {
         return out.document(&diagnosis);

@@ -1,4 +1,5 @@
 //! `giotto fit`: the radius model of the paper: stepwise partial F, intervals, prediction of other radii.
+use super::destination::{Destination, Kind};
 use super::failure::cannot_write;
 use super::source::Source;
 use super::{Failure, Output};
@@ -77,6 +78,8 @@ impl From<FitError> for Failure {
 
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
+    let inputs = args.source.inputs(None);
+    Destination::maybe(args.output.as_deref(), Kind::Model, &inputs)?;
     let manifest = &args.source.open(out)?;
     let bar = if out.draws() {
         indicatif::ProgressBar::new(manifest.runs.len() as u64).with_message("runs")
@@ -155,7 +158,7 @@ fn draw(fit: &RadiusFit, runs: &[Observation], directory: &Path) -> Result<(), F
         giotto_report::figures::figures(&fit.points(runs), &fit.model).map_err(Failure::input)?
     {
         let path = directory.join(figure.file);
-        std::fs::write(&path, figure.svg).map_err(|e| cannot_write(&path, &e))?;
+        Destination::new(&path, Kind::Svg, &[])?.write(figure.svg)?;
     }
     Ok(())
 }

@@ -7,6 +7,7 @@ mod choice;
 mod compensate;
 mod completions;
 mod controller;
+pub mod destination;
 mod demo;
 mod diagnose;
 mod fit;
@@ -129,7 +130,10 @@ fn dispatch(command: Command, out: Output) -> Result<(), Failure> {
 
 /// Runs the command line of this process.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(words) => return told(&words),
+    };
     let out = Output {
         json: cli.json,
         quiet: cli.quiet,
@@ -141,13 +145,24 @@ pub fn main() -> ExitCode {
             return shown(out.document(&serde_json::json!({ "words": words })));
         }
         out.say(words);
-        return ExitCode::SUCCESS;
+        return shown(Ok(()));
     };
     shown(dispatch(command, out))
 }
 
+/// Help, version or wrong usage: to stdout or stderr, with the exit code that belongs to it.
+fn told(words: &clap::Error) -> ExitCode {
+    match words.print() {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            Failure::input(format_args!("stdout: {error}")).report()
+        }
+        _ if words.use_stderr() => ExitCode::from(2),
+        _ => shown(Ok(())),
+    }
+}
+
 fn shown(result: Result<(), Failure>) -> ExitCode {
-    match result {
+    match result.and_then(|()| output::finish()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(),
     }

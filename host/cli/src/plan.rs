@@ -1,4 +1,5 @@
 //! `giotto plan`: the next runs that would best separate what cannot be told apart yet.
+use super::destination::{Destination, Kind as FileKind};
 use super::source::{Source, length};
 use super::{Failure, Output};
 use comfy_table::{CellAlignment, Table, presets};
@@ -7,7 +8,7 @@ use giotto::causes::Cause;
 use giotto::diagnosis::{Options, diagnose};
 use giotto::model_file::ModelFile;
 use giotto::planning::{self, Limits, Plan, Purpose};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Arguments of `giotto plan`.
 #[derive(clap::Args, Debug)]
@@ -45,6 +46,13 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
+    let inputs = args.source.inputs(args.model.as_deref());
+    let place = |path: &Option<PathBuf>, kind| Destination::maybe(path.as_deref(), kind, &inputs);
+    let file = place(&args.output, FileKind::Plan)?;
+    let programs = [
+        place(&args.gcode, FileKind::Text)?,
+        place(&args.rapid, FileKind::Text)?,
+    ];
     let campaign = args.source.read(out)?;
     let model = args.model.as_deref().map(ModelFile::load).transpose()?;
     let bar = out.spinner("diagnosing");
@@ -73,20 +81,21 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         return Err(Failure::check(why)
             .help("leave out -o, --gcode and --rapid to see what the campaign tells"));
     }
-    if let Some(path) = &args.output {
+    if let Some(file) = &file {
         let text = toml::to_string(&plan.file(&campaign))
-            .map_err(|e| Failure::input(format_args!("{}: {e}", path.display())))?;
+            .map_err(|e| Failure::input(format_args!("{}: {e}", file.path().display())))?;
         let text = format!(
             "# The next measurement, in this order. Warm up before it: {} turns of the first circle.\n# To simulate it, name the machine here: model = \"MODEL.toml\"\n{text}",
             plan.warm_up_turns
         );
-        write(path, &text, out)?;
+        write(file, &text, out)?;
     }
-    if let Some(path) = &args.gcode {
-        write(path, &plan.gcode(&campaign.name), out)?;
+    let [gcode, rapid] = &programs;
+    if let Some(file) = gcode {
+        write(file, &plan.gcode(&campaign.name), out)?;
     }
-    if let Some(path) = &args.rapid {
-        write(path, &plan.rapid(&campaign.name), out)?;
+    if let Some(file) = rapid {
+        write(file, &plan.rapid(&campaign.name), out)?;
     }
     if out.json {
         return out.document(&plan);
@@ -95,9 +104,9 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     Ok(())
 }
 
-fn write(path: &Path, text: &str, out: Output) -> Result<(), Failure> {
-    giotto::campaign::replace(path, text)?;
-    out.note(format_args!("wrote {}", path.display()));
+fn write(file: &Destination, text: &str, out: Output) -> Result<(), Failure> {
+    file.write(text)?;
+    out.note(format_args!("wrote {}", file.path().display()));
     Ok(())
 }
 

@@ -1,5 +1,6 @@
 //! `giotto report`: self-contained HTML report with plots.
-use super::failure::{Failure, cannot_write};
+use super::destination::{Destination, Kind};
+use super::failure::Failure;
 use super::output::Output;
 use super::source::Source;
 use giotto::diagnosis::{Options, diagnose};
@@ -33,6 +34,8 @@ struct Document<'a> {
 
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
+    let inputs = args.source.inputs(args.model.as_deref());
+    let page = Destination::new(&args.output, Kind::Html, &inputs)?;
     let campaign = args.source.read(out)?;
     let model = args.model.as_deref().map(ModelFile::load).transpose()?;
     let bar = out.spinner("diagnosing");
@@ -46,7 +49,7 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     bar.finish_and_clear();
     let diagnosis = diagnosis.map_err(|e| args.source.refused(&e))?;
     let html = giotto_report::html(&campaign, &diagnosis).map_err(Failure::input)?;
-    std::fs::write(&args.output, &html).map_err(|e| cannot_write(&args.output, &e))?;
+    page.write(&html)?;
     if out.json {
         return out.document(&Document {
             report: &args.output,

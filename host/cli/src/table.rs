@@ -1,5 +1,5 @@
 //! `giotto table`: model to controller table, and back to words.
-use super::failure::cannot_write;
+use super::destination::{Destination, Kind};
 use super::table_file::{self, TableFile};
 use super::{Failure, Output};
 use giotto_shared::table::{Header, SCHEMA_HASH, Table, image};
@@ -34,8 +34,9 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     match (args.command, args.model, args.output) {
         (Some(Show::Show { table }), ..) => show(&table_file::read(&table, out)?, out),
         (None, Some(model), Some(output)) => {
+            let place = Destination::new(&output, Kind::Table, &[&model])?;
             let made = table_file::from_model(&model, out)?;
-            std::fs::write(&output, &made.image).map_err(|error| cannot_write(&output, &error))?;
+            place.write(&made.image)?;
             if out.json {
                 return out.document(&json!({ "table": output, "bytes": made.image.len() }));
             }
