@@ -240,6 +240,7 @@ fn show_learned(learned: &Learned, out: Output) {
         2,
     );
     for f in &diagnosis.findings {
+        let shown = giotto::units::shown(f.estimate.value, f.estimate.ci95, f.estimate.unit);
         let axis = match f.axis {
             Some(giotto_shared::Axis::X) => "x",
             Some(giotto_shared::Axis::Y) => "y",
@@ -248,10 +249,10 @@ fn show_learned(learned: &Learned, out: Output) {
         found.add_row([
             f.cause.model().words().name.to_owned(),
             axis.to_owned(),
-            number(f.estimate.value),
-            number(f.estimate.ci95[0]),
-            number(f.estimate.ci95[1]),
-            f.estimate.unit.to_owned(),
+            shown.value,
+            shown.low,
+            shown.high,
+            shown.unit,
             format!("{:.1}", f.share_percent),
             if f.compensable { "yes" } else { "no" }.to_owned(),
         ]);
@@ -333,13 +334,4 @@ fn indented(table: &Table) -> String {
         .map(|line| format!("            {line}"))
         .collect::<Vec<_>>()
         .join("\n")
-}
-
-/// Four digits, in the form that is short.
-fn number(value: f64) -> String {
-    if value != 0.0 && value.abs() < 1e-2 {
-        format!("{value:.3e}")
-    } else {
-        format!("{value:.4}")
-    }
 }

@@ -110,7 +110,9 @@ impl Kind {
         } else if runs_have("file") {
             Self::Campaign
         } else if document.contains_key("campaign")
-            && ["run", "grid", "machine"].iter().any(|key| document.contains_key(key))
+            && ["run", "grid", "machine"]
+                .iter()
+                .any(|key| document.contains_key(key))
         {
             Self::Plan
         } else {
@@ -259,7 +261,11 @@ mod tests {
             (model, "a", Some(Kind::Model)),
             (campaign, "a", Some(Kind::Campaign)),
             (plan, "a", Some(Kind::Plan)),
-            ("[package]\nname = \"a\"\n", "Cargo.toml", Some(Kind::OtherToml)),
+            (
+                "[package]\nname = \"a\"\n",
+                "Cargo.toml",
+                Some(Kind::OtherToml),
+            ),
             ("<!DOCTYPE html><p>", "a", Some(Kind::Html)),
             ("<svg xmlns=\"\">", "a", Some(Kind::Svg)),
             ("G0 X20 Y0\nG3 I-20 F1500\n", "plate.nc", Some(Kind::Text)),

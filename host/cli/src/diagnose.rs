@@ -1,5 +1,5 @@
 //! `giotto diagnose`: what the simulation gets wrong, why, the extended model, the gain.
-use super::destination::{Destination, Kind};
+use super::destination::{Destination, Kind, quoted};
 use super::failure::Failure;
 use super::output::Output;
 use super::source::Source;
@@ -161,6 +161,7 @@ fn right(table: &mut Table, first: usize) {
 
 fn row(f: &Finding) -> [String; 7] {
     let e = &f.estimate;
+    let shown = giotto::units::shown(e.value, e.ci95, e.unit);
     let axis = f.axis.map_or("", |axis| {
         if axis == giotto_shared::Axis::X {
             "x"
@@ -171,25 +172,12 @@ fn row(f: &Finding) -> [String; 7] {
     [
         f.cause.model().words().name.to_string(),
         axis.to_string(),
-        format!("{} {}", number(e.value), e.unit),
-        format!("{} … {}", number(e.ci95[0]), number(e.ci95[1])),
+        format!("{} {}", shown.value, shown.unit),
+        format!("{} … {}", shown.low, shown.high),
         format!("{:.0} %", f.share_percent),
         format!("{:.3}", f.probability),
         if f.compensable { "yes" } else { "no" }.to_string(),
     ]
-}
-
-/// Four digits, in the form that is short.
-fn number(value: f64) -> String {
-    if value != 0.0 && (value.abs() < 1e-3 || value.abs() >= 1e5) {
-        return format!("{value:.3e}");
-    }
-    let before_point = if value == 0.0 {
-        0
-    } else {
-        value.abs().log10().floor() as i32
-    };
-    format!("{value:.*}", (3 - before_point).clamp(0, 6) as usize)
 }
 
 /// The one thing to do now, and what it should bring.
@@ -213,7 +201,7 @@ fn recommendation(d: &Diagnosis, extended: Option<&Path>) -> String {
         );
     }
     let flash = match extended {
-        Some(path) => format!("flash it: `giotto flash {} --port PORT`", path.display()),
+        Some(path) => format!("flash it: `giotto flash {} --port PORT`", quoted(path)),
         None => "write the extended model with -o EXTENDED.toml and flash it: `giotto flash EXTENDED.toml --port PORT`".into(),
     };
     match expected_um(d) {

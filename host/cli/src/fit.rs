@@ -6,10 +6,13 @@ use super::{Failure, Output};
 use clap::ValueEnum;
 use comfy_table::{CellAlignment, Table, presets};
 use giotto::analysis;
+use giotto::campaign::{Direction, Manifest, Run};
 use giotto::fit::{
-    Action, FitError, Observation, Offset, Options, PartialF, RadiusFit, Step, TERMS,
+    Action, FitError, Observation, Offset, Options, PartialF, Point, RadiusFit, Step, TERMS,
 };
 use giotto::model_file::{FORMAT, ModelFile, Servo, Valid};
+use giotto_report::figures::Figure;
+use giotto_report::forms::Form;
 use giotto_shared::model::Element;
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
@@ -37,7 +40,7 @@ pub struct Args {
     /// Write the model here.
     #[arg(short, long, value_name = "MODEL.toml")]
     output: Option<PathBuf>,
-    /// Draw the paper's Figures 8 to 11 as SVG into this directory.
+    /// Draw the paper's Figures 2 to 11 into this directory, as SVG with the numbers that they draw as CSV.
     #[arg(long, value_name = "DIR")]
     figures: Option<PathBuf>,
 }
@@ -134,7 +137,14 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
             })?;
     }
     if let Some(directory) = &args.figures {
-        draw(&fit, &observations, directory)?;
+        let points = fit.points(&observations);
+        let directions = directions(&points, &observations, &report);
+        let mut figures = giotto_report::forms::forms(&forms(manifest)?);
+        figures.extend(
+            giotto_report::figures::figures(&points, &directions, &fit.model)
+                .map_err(Failure::input)?,
+        );
+        draw(&figures, directory)?;
     }
     if out.json {
         return out.document(&document(&fit));
@@ -145,22 +155,63 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     }
     if let Some(directory) = &args.figures {
         out.say(format_args!(
-            "figures 8 to 11 written to {}",
+            "figures 2 to 11 written to {}",
             directory.display()
         ));
     }
     Ok(())
 }
 
-fn draw(fit: &RadiusFit, runs: &[Observation], directory: &Path) -> Result<(), Failure> {
+fn draw(figures: &[Figure], directory: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(directory).map_err(|e| cannot_write(directory, &e))?;
-    for figure in
-        giotto_report::figures::figures(&fit.points(runs), &fit.model).map_err(Failure::input)?
-    {
-        let path = directory.join(figure.file);
-        Destination::new(&path, Kind::Svg, &[])?.write(figure.svg)?;
+    for figure in figures {
+        let path = directory.join(&figure.file);
+        Destination::new(&path, Kind::Svg, &[])?.write(&figure.svg)?;
+        let path = path.with_extension("csv");
+        Destination::new(&path, Kind::Csv, &[])?.write(&figure.csv)?;
     }
     Ok(())
+}
+
+/// The direction of each point; points stand radius by radius, runs as they were measured.
+fn directions(
+    points: &[Point],
+    observations: &[Observation],
+    report: &analysis::Report,
+) -> Vec<Direction> {
+    let mut taken = vec![false; observations.len()];
+    let of = |point: &Point| {
+        let found = (0..observations.len())
+            .find(|&i| !taken[i] && observations[i] == point.observation)
+            .unwrap_or(0);
+        taken[found] = true;
+        report.runs[found].direction
+    };
+    points.iter().map(of).collect()
+}
+
+/// The form errors of the runs: deviations from the nominal circle about the least-squares centre.
+fn forms(manifest: &Manifest) -> Result<Vec<Form>, Failure> {
+    let (campaign, _) = manifest.read()?;
+    let form = |run: Run| {
+        let centre = analysis::of_run(&run, None).map_or([0.0; 2], |a| a.set_up_m);
+        let place = |(angle, deviation): (&f64, &f64)| {
+            let ((sin, cos), r) = (angle.sin_cos(), run.radius_m + deviation);
+            let (x, y) = (r * cos - centre[0], r * sin - centre[1]);
+            (y.atan2(x), x.hypot(y) - run.radius_m)
+        };
+        let samples = run.samples.angle_rad.iter().zip(&run.samples.deviation_m);
+        let (angle_rad, deviation_m) = samples.map(place).unzip();
+        Form {
+            file: run.file.clone(),
+            radius_m: run.radius_m,
+            feed_m_s: run.feed_m_s,
+            direction: run.direction,
+            angle_rad,
+            deviation_m,
+        }
+    };
+    Ok(campaign.runs.into_iter().map(form).collect())
 }
 
 fn model_file(fit: &RadiusFit, runs: &[Observation], campaign: &str, machine: &str) -> ModelFile {

@@ -4,14 +4,17 @@
 mod analyze;
 mod bypass;
 mod choice;
+mod compare;
 mod compensate;
 mod completions;
 mod controller;
-pub mod destination;
 mod demo;
+pub mod destination;
 mod diagnose;
 mod fit;
 mod flash;
+mod grid;
+mod history;
 mod import;
 mod key;
 mod man;
@@ -70,6 +73,10 @@ enum Command {
     Diagnose(diagnose::Args),
     /// The next runs that would best separate what cannot be told apart yet.
     Plan(plan::Args),
+    /// What changed between campaigns, figure by figure, cause by cause, with intervals.
+    Compare(compare::Args),
+    /// Every campaign of a folder diagnosed and kept; what drifts, what stepped.
+    History(history::Args),
     /// Self-contained HTML report with plots.
     Report(report::Args),
     /// Rewrite the arcs of an NC program with the inverse correction.
@@ -110,6 +117,8 @@ fn dispatch(command: Command, out: Output) -> Result<(), Failure> {
         Command::Simulate(args) => simulate::run(args, out),
         Command::Diagnose(args) => diagnose::run(args, out),
         Command::Plan(args) => plan::run(args, out),
+        Command::Compare(args) => compare::run(args, out),
+        Command::History(args) => history::run(args, out),
         Command::Report(args) => report::run(args, out),
         Command::Compensate(args) => compensate::run(args, out),
         Command::Table(args) => table::run(args, out),

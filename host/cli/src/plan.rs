@@ -27,9 +27,13 @@ pub struct Args {
     /// Simulation to start from; without it one servo lag with fitted kv.
     #[arg(long, value_name = "MODEL.toml")]
     model: Option<PathBuf>,
-    /// Radii that the instrument has, separated by commas; without it half to three times those measured.
+    /// Radii that the instrument has, separated by commas; without it those measured and the lengths of usual bars (50,
+    /// 100, 150 mm, …) up to the largest measured.
     #[arg(long, value_name = "MM,MM", value_delimiter = ',', value_parser = length)]
     radii: Vec<f64>,
+    /// Largest radius; without it the largest of the campaign.
+    #[arg(long, value_name = "MM", value_parser = length)]
+    max_radius: Option<f64>,
     /// Highest feed; without it the highest of the campaign.
     #[arg(long, value_name = "MM_S", value_parser = length)]
     max_feed: Option<f64>,
@@ -68,6 +72,7 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let options = planning::Options {
         limits: Limits {
             radii_m: args.radii.iter().map(|mm| mm * 1e-3).collect(),
+            largest_radius_m: args.max_radius.map(|mm| mm * 1e-3),
             highest_feed_m_s: args.max_feed.map(|mm| mm * 1e-3),
             highest_acceleration_m_s2: args.max_acceleration.map(|mm| mm * 1e-3),
         },
@@ -77,8 +82,7 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let plan = planning::propose(&campaign, &diagnosis, &options);
     let asked = args.output.is_some() || args.gcode.is_some() || args.rapid.is_some();
     if asked && plan.runs.is_empty() {
-        let why = "no runs to plan: circles have nothing more to tell apart";
-        return Err(Failure::check(why)
+        return Err(Failure::check(nothing(&plan))
             .help("leave out -o, --gcode and --rapid to see what the campaign tells"));
     }
     if let Some(file) = &file {
@@ -110,6 +114,16 @@ fn write(file: &Destination, text: &str, out: Output) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Why no run is planned: nothing is open, or what is open needs circles that were not allowed.
+fn nothing(plan: &Plan) -> &'static str {
+    if plan.open.is_empty() {
+        "No runs to plan: circles have nothing more to tell apart here."
+    } else {
+        "No runs to plan within these limits, though something is open: allow other circles with --radii, --max-radius, \
+         --max-feed or --max-acceleration."
+    }
+}
+
 fn name(id: &str) -> String {
     Cause::from_id(id).map_or_else(
         || id.replace('_', " "),
@@ -137,7 +151,7 @@ fn show(plan: &Plan, out: Output) {
         ));
     }
     if plan.runs.is_empty() {
-        out.say("No runs to plan: circles have nothing more to tell apart here.");
+        out.say(nothing(plan));
         return;
     }
     let mut table = Table::new();

@@ -1,10 +1,15 @@
 //! What the template is given: words and numbers, ready.
+use super::alone::Alone;
 use super::chart::{Chart, Point, shape};
 use super::map::{Map, map};
 use super::number::{fixed, number, plain};
-use super::verdict::{self, axis, look_alike, unit};
+use super::portrait::{self, Curve};
+use super::verdict::{self, look_alike};
 use giotto::analysis;
-use giotto::campaign::{Campaign, Direction};
+use giotto::analysis::tolerance;
+use giotto::analysis::uncertainty::{self, Conditions, Iso230Budget, Known, Source};
+use giotto::campaign::{Campaign, Direction, Run};
+use giotto::diagnosis::picture::RunPicture;
 use giotto::diagnosis::survey::Response;
 use giotto::diagnosis::{Diagnosis, Finding};
 use serde::Serialize;
@@ -17,6 +22,8 @@ pub struct View {
     grid: String,
     verdict: [String; 3],
     causes: Vec<CauseView>,
+    /// Causes that can be ticked off.
+    whatif: Vec<String>,
     unexplained: Option<UnexplainedView>,
     cannot_tell: Vec<String>,
     kinds: Vec<Kind>,
@@ -25,7 +32,11 @@ pub struct View {
     radii: Vec<Legend>,
     collapse: String,
     residuals: String,
-    iso: Vec<[String; 8]>,
+    sizes: String,
+    forms: String,
+    /// Rows of ISO 230-4, one group a radius.
+    iso: Vec<Vec<[String; 8]>>,
+    budget: Option<Vec<BudgetView>>,
     runs: Vec<[String; 9]>,
     version: &'static str,
     seed: u64,
@@ -54,12 +65,25 @@ struct CauseView {
     next: String,
     compensable: bool,
     why_not: Option<&'static str>,
+    /// The cause alone on the circle where it does most, and which that is.
+    picture: Option<[String; 2]>,
 }
 
 #[derive(Debug, Serialize)]
 struct UnexplainedView {
     rms: String,
     words: Vec<String>,
+    picture: Option<String>,
+}
+
+/// A line of the budget: the source, how it is known, its standard uncertainty in each kind of figure.
+#[derive(Debug, Serialize)]
+struct BudgetView {
+    source: &'static str,
+    known: &'static str,
+    g: String,
+    f: String,
+    d: String,
 }
 
 #[derive(Debug, Serialize)]
@@ -89,18 +113,30 @@ impl View {
     /// Of a campaign and its diagnosis.
     pub fn of(campaign: &Campaign, d: &Diagnosis) -> Self {
         let radii = radii(campaign);
-        let iso = analysis::of_campaign(campaign)
-            .map(|report| report.iso230_4)
-            .unwrap_or_default();
+        let report = analysis::of_campaign(campaign).ok();
+        let alone = Alone::of(campaign, d);
         Self {
             name: campaign.name.clone(),
             machine: campaign.machine.clone(),
             grid: grid(campaign, &radii),
-            verdict: verdict::sentences(d, campaign.runs.len()),
-            causes: d.findings.iter().map(cause).collect(),
+            verdict: verdict::sentences(d, report.as_ref()),
+            causes: d
+                .findings
+                .iter()
+                .enumerate()
+                .map(|(at, f)| cause(campaign, &alone, at, f))
+                .collect(),
+            whatif: d
+                .findings
+                .iter()
+                .zip(&alone.profiles)
+                .filter(|(_, profiles)| profiles.is_some())
+                .map(|(f, _)| verdict::title(f))
+                .collect(),
             unexplained: d.unexplained.present.then(|| UnexplainedView {
                 rms: fixed(d.unexplained.rms_um, 2),
                 words: d.unexplained.signature.words.clone(),
+                picture: unexplained(campaign, d),
             }),
             cannot_tell: d.cannot_tell.clone(),
             kinds: kinds(d),
@@ -108,6 +144,8 @@ impl View {
             map: map(campaign, &d.picture),
             collapse: collapse(campaign, d, &radii),
             residuals: residuals(campaign, d, &radii),
+            sizes: over_acceleration(report.as_ref(), &radii, "sizes"),
+            forms: over_acceleration(report.as_ref(), &radii, "forms"),
             radii: radii
                 .iter()
                 .enumerate()
@@ -116,13 +154,14 @@ impl View {
                     radius: plain(r * 1e3),
                 })
                 .collect(),
-            iso: iso.iter().map(iso_row).collect(),
+            iso: report.as_ref().map(iso_groups).unwrap_or_default(),
+            budget: report.as_ref().and_then(budget),
             runs: runs(campaign, d),
             version: env!("CARGO_PKG_VERSION"),
             seed: d.seed,
             hash: super::hash::of(campaign),
             baseline: d.baseline.name.clone(),
-            polar: super::polar::json(campaign, &d.picture),
+            polar: super::polar::json(campaign, d, &alone),
         }
     }
 }
@@ -165,14 +204,15 @@ fn grid(campaign: &Campaign, radii: &[f64]) -> String {
     )
 }
 
-fn cause(f: &Finding) -> CauseView {
+fn cause(campaign: &Campaign, alone: &Alone, at: usize, f: &Finding) -> CauseView {
     let words = f.cause.model().words();
+    let shown = verdict::shown(&f.estimate);
     CauseView {
-        name: format!("{}{}", words.name, axis(f)),
-        value: number(f.estimate.value),
-        low: number(f.estimate.ci95[0]),
-        high: number(f.estimate.ci95[1]),
-        unit: unit(f.estimate.unit),
+        name: verdict::title(f),
+        value: shown.value,
+        low: shown.low,
+        high: shown.high,
+        unit: shown.unit,
         share: fixed(f.share_percent, 0),
         share_number: f.share_percent,
         probability: fixed(f.probability, 3),
@@ -180,8 +220,9 @@ fn cause(f: &Finding) -> CauseView {
         params: f
             .params
             .iter()
-            .map(|(k, v)| [k.replace('_', " "), number(*v)])
+            .filter_map(|(name, value)| parameter(name, *value))
             .collect(),
+        picture: alone_on_circle(campaign, alone, at, f),
         what: words.what,
         usual: words.usual,
         adjust: words.adjust,
@@ -194,6 +235,136 @@ fn cause(f: &Finding) -> CauseView {
         compensable: f.compensable,
         why_not: words.not_compensable,
     }
+}
+
+/// A further parameter of a cause in words; one that only the simulation understands is left to the model's file.
+fn parameter(name: &str, value: f64) -> Option<[String; 2]> {
+    let (words, factor, unit) = match name {
+        "pitch_m" => ("pitch", 1e3, "mm"),
+        "pitch_mm" => ("pitch", 1.0, "mm"),
+        "decay_s" => ("dies away in", 1e3, "ms"),
+        "rise_s" => ("rises in", 1e3, "ms"),
+        "presliding_m" => ("begins after", 1e6, "µm of travel"),
+        "presliding_mm" => ("begins after", 1e3, "µm of travel"),
+        "play_m" => ("play", 1e6, "µm"),
+        "play_mm" => ("play", 1e3, "µm"),
+        "phase_rad" => ("phase", 180.0 / std::f64::consts::PI, "°"),
+        _ => return None,
+    };
+    Some([
+        words.to_string(),
+        format!("{} {unit}", number(value * factor)),
+    ])
+}
+
+/// Profiles of both directions at the circle where a cause does most.
+fn alone_on_circle(
+    campaign: &Campaign,
+    alone: &Alone,
+    at: usize,
+    f: &Finding,
+) -> Option<[String; 2]> {
+    let (index, most_m) = alone.largest(at)?;
+    let runs = alone.profiles.get(at)?.as_ref()?;
+    let chosen = &campaign.runs[index];
+    let same = |run: &Run| run.radius_m == chosen.radius_m && run.feed_m_s == chosen.feed_m_s;
+    let mut curves: Vec<Curve<'_>> = Vec::new();
+    for (run, profile) in campaign.runs.iter().zip(runs).filter(|(run, _)| same(run)) {
+        let class = ways(run.direction);
+        if !curves.iter().any(|c| c.0 == class) {
+            curves.push((class, profile));
+        }
+    }
+    let where_ = format!(
+        "Alone it makes up to {} µm, at radius {} mm and {} mm/s",
+        fixed(most_m * 1e6, 1),
+        plain(chosen.radius_m * 1e3),
+        plain(chosen.feed_m_s * 1e3)
+    );
+    let words = format!("{} alone on the circle. {where_}.", verdict::title(f));
+    Some([
+        portrait::svg(&format!("alone-{at}"), &words, &curves),
+        where_,
+    ])
+}
+
+/// What is left of the circle where most is left.
+fn unexplained(campaign: &Campaign, d: &Diagnosis) -> Option<String> {
+    let worst = d
+        .picture
+        .iter()
+        .max_by(|a, b| a.rms_m[1].total_cmp(&b.rms_m[1]))?;
+    let run = &campaign.runs[worst.index];
+    let of = |p: &&RunPicture| {
+        let other = &campaign.runs[p.index];
+        other.radius_m == run.radius_m && other.feed_m_s == run.feed_m_s
+    };
+    let mut curves: Vec<Curve<'_>> = Vec::new();
+    for p in d.picture.iter().filter(of) {
+        let class = ways(campaign.runs[p.index].direction);
+        if !curves.iter().any(|c| c.0 == class) {
+            curves.push((class, &p.profile_m[2]));
+        }
+    }
+    let words = format!(
+        "What has no name, at radius {} mm and {} mm/s.",
+        plain(run.radius_m * 1e3),
+        plain(run.feed_m_s * 1e3)
+    );
+    Some(portrait::svg("no-name", &words, &curves))
+}
+
+/// Sizes or forms of all runs over the centripetal acceleration, directions apart.
+fn over_acceleration(report: Option<&analysis::Report>, radii: &[f64], id: &str) -> String {
+    let size = id == "sizes";
+    let words = if size {
+        "radius error"
+    } else {
+        "out-of-roundness"
+    };
+    let point = |run: &analysis::RunAnalysis| {
+        let value = if size {
+            run.radius_error_m
+        } else {
+            run.out_of_roundness_m
+        } * 1e6;
+        let at = [run.feed_m_s.powi(2) / run.radius_m, value];
+        Point {
+            at,
+            shape: shape_of(radii, run.radius_m),
+            class: if run.direction == Direction::Ccw {
+                "ccw"
+            } else {
+                "cw"
+            },
+            label: format!(
+                "{}: R {} mm, {} mm/s, {}: {} m/s², {words} {} µm",
+                run.file,
+                plain(run.radius_m * 1e3),
+                plain(run.feed_m_s * 1e3),
+                ways(run.direction),
+                fixed(at[0], 3),
+                fixed(value, 1)
+            ),
+        }
+    };
+    let runs = report
+        .map(|report| report.runs.as_slice())
+        .unwrap_or_default();
+    Chart {
+        id: id.into(),
+        description: format!(
+            "{words} of {} runs over the programmed centripetal acceleration, both directions.",
+            runs.len()
+        ),
+        titles: [
+            "centripetal acceleration f²/R, m/s²".into(),
+            format!("{words}, µm"),
+        ],
+        points: runs.iter().map(point).collect(),
+        curves: Vec::new(),
+    }
+    .svg()
 }
 
 fn kinds(d: &Diagnosis) -> Vec<Kind> {
@@ -216,7 +387,7 @@ fn kinds(d: &Diagnosis) -> Vec<Kind> {
 }
 
 fn gain(d: &Diagnosis) -> Option<GainView> {
-    let g = d.gain.as_ref()?;
+    let g = d.gain.as_ref().filter(|_| !d.findings.is_empty())?;
     let rows = [
         ("no model", g.no_model_rms_um),
         ("β1 and β2 of the paper", g.beta_rms_um),
@@ -238,19 +409,77 @@ fn gain(d: &Diagnosis) -> Option<GainView> {
     })
 }
 
-fn iso_row(pair: &analysis::Iso230) -> [String; 8] {
-    let um = |v: f64| fixed(v * 1e6, 1);
-    let maybe = |v: Option<f64>| v.map_or("–".to_string(), um);
-    [
-        plain(pair.radius_m * 1e3),
-        plain(pair.feed_m_s * 1e3),
-        maybe(pair.g_cw_m),
-        maybe(pair.g_ccw_m),
-        maybe(pair.g_b_m),
-        um(pair.f_max_m),
-        um(pair.f_min_m),
-        maybe(pair.d_m),
-    ]
+/// Rows in order of radius and feed, one group a radius.
+fn iso_groups(report: &analysis::Report) -> Vec<Vec<[String; 8]>> {
+    let budgets = uncertainty::of_report(report, &Conditions::default());
+    let mut pairs: Vec<_> = report.iso230_4.iter().zip(&budgets).collect();
+    pairs.sort_by(|(a, _), (b, _)| {
+        let by_radius = a.radius_m.total_cmp(&b.radius_m);
+        by_radius.then(a.feed_m_s.total_cmp(&b.feed_m_s))
+    });
+    let mut out: Vec<(f64, Vec<[String; 8]>)> = Vec::new();
+    for (iso, budget) in pairs {
+        let row = iso_row(iso, budget);
+        match out.last_mut() {
+            Some((radius, rows)) if *radius == iso.radius_m => rows.push(row),
+            _ => out.push((iso.radius_m, vec![row])),
+        }
+    }
+    out.into_iter().map(|(_, rows)| rows).collect()
+}
+
+fn iso_row(pair: &analysis::Iso230, budget: &Iso230Budget) -> [String; 8] {
+    let [g_cw, g_ccw, g_b, f_max, f_min, d] = tolerance::figures(pair, budget).map(|figure| {
+        figure.map_or_else(
+            || "–".to_string(),
+            |(value, budget)| {
+                format!(
+                    "{} ± {}",
+                    fixed(value * 1e6, 1),
+                    fixed(budget.expanded_m() * 1e6, 1)
+                )
+            },
+        )
+    });
+    let circle = [pair.radius_m, pair.feed_m_s].map(|si| plain(si * 1e3));
+    let [radius, feed] = circle;
+    [radius, feed, g_cw, g_ccw, g_b, f_max, f_min, d]
+}
+
+/// The budget of the pair with the largest uncertainty of F.
+fn budget(report: &analysis::Report) -> Option<Vec<BudgetView>> {
+    let budgets = uncertainty::of_report(report, &Conditions::default());
+    let worst = budgets
+        .iter()
+        .max_by(|a, b| a.f.standard_m().total_cmp(&b.f.standard_m()))?;
+    let form = worst.g_b.or(worst.g_ccw).or(worst.g_cw)?;
+    let um = |part: Option<&uncertainty::Part>| {
+        part.map_or_else(|| "–".to_string(), |p| fixed(p.standard_m * 1e6, 2))
+    };
+    let lines = worst
+        .f
+        .parts
+        .iter()
+        .enumerate()
+        .map(|(at, part)| BudgetView {
+            source: match part.source {
+                Source::Instrument => "instrument",
+                Source::SetUp => "set-up",
+                Source::Repeatability => "repeatability",
+                Source::Temperature => "temperature",
+                Source::Sampling => "sampling",
+            },
+            known: match part.known {
+                Known::Measured => "measured here",
+                Known::Given => "given",
+                Known::Assumed => "assumed",
+                Known::Missing => "not known, not counted",
+            },
+            g: um(Some(&form.parts[at])),
+            f: um(Some(part)),
+            d: um(worst.d.as_ref().map(|d| &d.parts[at])),
+        });
+    Some(lines.collect())
 }
 
 fn runs(campaign: &Campaign, d: &Diagnosis) -> Vec<[String; 9]> {
@@ -326,7 +555,7 @@ fn collapse(campaign: &Campaign, d: &Diagnosis, radii: &[f64]) -> String {
         .map(|omega| [omega * omega, 1e3 * response.gain(omega).ln()])
         .collect();
     Chart {
-        id: "collapse",
+        id: "collapse".into(),
         description: format!(
             "ln(Rm/R) against ω² for {} runs. Values of each run are in the table of runs.",
             d.picture.len()
@@ -365,7 +594,7 @@ fn residuals(campaign: &Campaign, d: &Diagnosis, radii: &[f64]) -> String {
         }));
     }
     Chart {
-        id: "residuals",
+        id: "residuals".into(),
         description: format!(
             "Radius error of {} runs over the programmed centripetal acceleration: as measured, and what the simulation leaves before and after. Values of each run are in the table of runs.",
             d.picture.len()

@@ -13,6 +13,7 @@ mod joint_lag_mismatch;
 mod joint_reversal;
 mod lateral_play;
 mod radius_offset;
+pub mod remedy;
 mod reversal_spike;
 mod scale_error;
 mod scale_mismatch;
