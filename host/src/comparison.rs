@@ -258,3 +258,86 @@ fn words(figures: &[FigureChange], causes: &[CauseChange], unmatched: usize) -> 
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::of_campaign;
+    use crate::diagnosis::{Options, diagnose};
+    use crate::simulation::machine::PositionLoop;
+    use crate::simulation::{CircleTest, Instrument, Machine, Plan, PlannedTest, campaign};
+    use giotto_shared::Direction;
+
+    /// A mill with backlash on X and axes that are not square, measured with scatter and set-ups of its own.
+    fn measured(backlash_m: f64, squareness_rad: f64, seed: u64) -> Summary {
+        let mut tests = Vec::new();
+        for radius_m in [0.1, 0.15] {
+            for feed_m_s in [0.02, 0.08, 0.2] {
+                for direction in [Direction::Ccw, Direction::Cw] {
+                    let test = CircleTest {
+                        samples: Some(250),
+                        ..CircleTest::new(radius_m, feed_m_s, direction)
+                    };
+                    tests.push(PlannedTest { test, timed: false });
+                }
+            }
+        }
+        let plan = Plan {
+            name: format!("seed {seed}"),
+            machine_name: "mill".into(),
+            machine: Machine {
+                servo: [PositionLoop {
+                    kv_per_s: 40.0,
+                    feed_forward: 0.0,
+                }; 2],
+                backlash_m: [backlash_m, 0.0],
+                squareness_rad,
+                ..Machine::default()
+            },
+            instrument: Instrument {
+                spread_m: 0.7e-6,
+                setup_spread_m: 10e-6,
+                ..Instrument::ballbar()
+            },
+            tests,
+            shuffle: true,
+        };
+        let campaign = campaign(&plan, seed);
+        let diagnosis = diagnose(&campaign, &Options::default()).unwrap();
+        Summary::of(&of_campaign(&campaign).unwrap(), &diagnosis)
+    }
+
+    #[test]
+    fn of_190_pairs_of_one_machine_at_most_one_is_said_to_differ() {
+        let all: Vec<Summary> = (0..20).map(|seed| measured(6e-6, 60e-6, seed)).collect();
+        let mut false_alarms = Vec::new();
+        for (k, before) in all.iter().enumerate() {
+            for after in &all[k + 1..] {
+                let comparison = compare(before, after);
+                assert!(!comparison.figures.is_empty() && !comparison.causes.is_empty());
+                let changed = comparison.figures.iter().any(|f| f.changed)
+                    || comparison.causes.iter().any(|c| c.fate != Fate::Same);
+                if changed {
+                    false_alarms.push(comparison.words);
+                }
+            }
+        }
+        assert!(false_alarms.len() <= 1, "{false_alarms:#?}");
+    }
+
+    #[test]
+    fn what_changed_is_named_with_its_size_and_what_did_not_is_not() {
+        let (before, after) = (measured(6e-6, 60e-6, 1), measured(12e-6, 60e-6, 2));
+        let comparison = compare(&before, &after);
+        let of = |cause: &str| comparison.causes.iter().find(|c| c.cause == cause).unwrap();
+        let backlash = of("backlash");
+        assert_eq!(backlash.fate, Fate::Changed, "{:?}", comparison.words);
+        assert!((backlash.change - 0.006).abs() < 0.001, "{}", backlash.change);
+        assert!(backlash.ci95[0] < 0.006 && 0.006 < backlash.ci95[1]);
+        assert_eq!(of("squareness").fate, Fate::Same);
+        assert!(comparison.words[0].contains("backlash of X"), "{:?}", comparison.words);
+        let gone = compare(&after, &measured(0.0, 60e-6, 3));
+        assert!(gone.causes.iter().any(|c| c.cause == "backlash" && c.fate == Fate::Gone));
+        assert!(gone.figures.iter().any(|f| f.changed && f.figure == "g_b"), "{:?}", gone.words);
+    }
+}

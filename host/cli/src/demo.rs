@@ -1,11 +1,11 @@
 //! `giotto demo`: the whole loop on a bundled campaign and a simulated machine.
 use super::destination::{Destination, Kind as FileKind};
 use super::failure::Failure;
+use super::grid::{Grid, width};
 use super::output::Output;
 use crate::ring::{
     DemoError, LEFT_M, Learned, Proof, REDUCTION_PERCENT, Size, bundled, learn, picture, prove,
 };
-use comfy_table::{CellAlignment, Table, presets};
 use giotto_link::{Controller, OpenOptions, Port, open};
 use giotto_shared::Direction;
 use indicatif::ProgressBar;
@@ -171,21 +171,6 @@ fn document(kind: Kind, machine: &str, seed: u64, proof: &Proof) -> Value {
     })
 }
 
-fn table(header: &[&str], left: usize) -> Table {
-    let mut table = Table::new();
-    table
-        .load_style(presets::NOTHING)
-        .set_header(header.iter().copied());
-    for (k, column) in table.column_iter_mut().enumerate() {
-        column.set_cell_alignment(if k < left {
-            CellAlignment::Left
-        } else {
-            CellAlignment::Right
-        });
-    }
-    table
-}
-
 fn show_learned(learned: &Learned, out: Output) {
     let runs = &learned.report.runs;
     let rms = |of: fn(&giotto::analysis::RunAnalysis) -> f64| {
@@ -226,19 +211,17 @@ fn show_learned(learned: &Learned, out: Output) {
         "3 diagnose  against {}:",
         diagnosis.baseline.name
     ));
-    let mut found = table(
-        &[
-            "cause",
-            "axis",
-            "size",
-            "95 % from",
-            "to",
-            "unit",
-            "share %",
-            "correctable",
-        ],
-        2,
-    );
+    let header = [
+        "cause",
+        "of",
+        "size",
+        "95 % from",
+        "to",
+        "unit",
+        "share %",
+        "correctable",
+    ];
+    let mut found = Grid::new(&header, 2, 2);
     for f in &diagnosis.findings {
         let shown = giotto::units::shown(f.estimate.value, f.estimate.ci95, f.estimate.unit);
         let axis = match f.axis {
@@ -246,7 +229,7 @@ fn show_learned(learned: &Learned, out: Output) {
             Some(giotto_shared::Axis::Y) => "y",
             None => "",
         };
-        found.add_row([
+        found.row([
             f.cause.model().words().name.to_owned(),
             axis.to_owned(),
             shown.value,
@@ -286,21 +269,19 @@ fn show_proof(proof: &Proof, out: Output) {
         flashed.bytes, flashed.slot, flashed.generation
     ));
     out.say("6 run       circles whose radii and speeds are not in the campaign, last of the steady turns measured:");
-    let mut circles = table(
-        &[
-            "R mm",
-            "mm/s",
-            "",
-            "ΔR before",
-            "ΔR after",
-            "roundness before",
-            "after (µm)",
-        ],
-        0,
-    );
+    let header = [
+        "R mm",
+        "mm/s",
+        "way",
+        "ΔR before",
+        "ΔR after",
+        "roundness before",
+        "after (µm)",
+    ];
+    let mut circles = Grid::new(&header, 0, 3);
     for pair in &proof.circles {
         let (before, after) = (&pair.before.analysis, &pair.after.analysis);
-        circles.add_row([
+        circles.row([
             format!("{:.0}", before.radius_m * 1e3),
             format!("{:.0}", before.feed_m_s * 1e3),
             word(before.direction).to_owned(),
@@ -328,10 +309,11 @@ fn show_proof(proof: &Proof, out: Output) {
     ));
 }
 
-fn indented(table: &Table) -> String {
-    table
+fn indented(grid: &Grid) -> String {
+    const INDENT: usize = 12;
+    grid.text(width().saturating_sub(INDENT))
         .lines()
-        .map(|line| format!("            {line}"))
+        .map(|line| format!("{:INDENT$}{line}", ""))
         .collect::<Vec<_>>()
         .join("\n")
 }

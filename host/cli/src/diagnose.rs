@@ -1,6 +1,7 @@
 //! `giotto diagnose`: what the simulation gets wrong, why, the extended model, the gain.
 use super::destination::{Destination, Kind, quoted};
 use super::failure::Failure;
+use super::grid::Grid;
 use super::output::Output;
 use super::source::Source;
 use comfy_table::{CellAlignment, Table, presets};
@@ -88,22 +89,19 @@ fn show(name: &str, d: &Diagnosis, extended: Option<&Path>, out: &Output) {
     if d.findings.is_empty() && !d.unexplained.present && d.cannot_tell.is_empty() {
         out.say("Nothing found: the simulation explains the data.");
     } else if !d.findings.is_empty() {
-        let mut table = Table::new();
-        table.load_style(presets::NOTHING).set_header([
+        let header = [
             "cause",
-            "axis",
+            "of",
             "size",
             "95 % interval",
             "share",
             "probability",
             "correctable",
-        ]);
-        for f in &d.findings {
-            table.add_row(row(f));
-        }
-        right(&mut table, 2);
+        ];
+        let mut grid = Grid::new(&header, 2, 2);
+        d.findings.iter().for_each(|f| grid.row(row(f)));
         out.say("");
-        out.say(&table);
+        grid.show(*out);
         out.say("");
         for f in &d.findings {
             let words = f.cause.model().words();

@@ -1,10 +1,10 @@
 //! `giotto fit`: the radius model of the paper: stepwise partial F, intervals, prediction of other radii.
 use super::destination::{Destination, Kind};
 use super::failure::cannot_write;
+use super::grid::Grid;
 use super::source::Source;
 use super::{Failure, Output};
 use clap::ValueEnum;
-use comfy_table::{CellAlignment, Table, presets};
 use giotto::analysis;
 use giotto::campaign::{Direction, Manifest, Run};
 use giotto::fit::{
@@ -300,21 +300,6 @@ fn document(fit: &RadiusFit) -> Value {
     })
 }
 
-fn table(header: &[&str]) -> Table {
-    let mut table = Table::new();
-    table
-        .load_style(presets::NOTHING)
-        .set_header(header.iter().copied());
-    for (k, column) in table.column_iter_mut().enumerate() {
-        column.set_cell_alignment(if k == 0 {
-            CellAlignment::Left
-        } else {
-            CellAlignment::Right
-        });
-    }
-    table
-}
-
 fn show(fit: &RadiusFit, runs: &[Observation], campaign: &str, out: Output) {
     out.say(format_args!("{campaign}: ΔR = β0(R) + β1 f²/R + β2 f⁴/R³"));
     out.say(match fit.options.offset {
@@ -333,28 +318,31 @@ fn show(fit: &RadiusFit, runs: &[Observation], campaign: &str, out: Output) {
     out.say("");
     show_steps(fit, out);
     out.say("");
-    let mut coefficients = table(&["coefficient", "estimate", "95 % from", "to", ""]);
+    let header = ["coefficient", "estimate", "95 % from", "to", "unit"];
+    let mut coefficients = Grid::new(&header, 1, 1);
+    let mut remarks = Vec::new();
     for (name, unit, value, ci, term) in [
         ("β1", "1e-6 s²", fit.model.beta1_s2, fit.ci95[0], 0),
         ("β2", "1e-6 s⁴", fit.model.beta2_s4, fit.ci95[1], 1),
     ] {
         let micro = |v: f64| format!("{:.4}", v * 1e6);
-        let remark = if fit.entered(term) {
-            ""
-        } else {
-            "  not in the model; interval with both terms in"
-        };
-        coefficients.add_row([
+        if !fit.entered(term) {
+            remarks.push(format!(
+                "{name} is not in the model; its interval is that with both terms in."
+            ));
+        }
+        coefficients.row([
             name.to_owned(),
             micro(value),
             micro(ci[0]),
             micro(ci[1]),
-            format!("{unit}{remark}"),
+            unit.to_owned(),
         ]);
     }
-    out.say(coefficients);
+    coefficients.show(out);
+    remarks.iter().for_each(|remark| out.say(remark));
     out.say("");
-    let mut radii = table(&[
+    let header = [
         "R mm",
         "part",
         "β0 µm",
@@ -362,7 +350,8 @@ fn show(fit: &RadiusFit, runs: &[Observation], campaign: &str, out: Output) {
         "rms µm",
         "largest µm",
         "explained %",
-    ]);
+    ];
+    let mut radii = Grid::new(&header, 0, 1);
     for (radius, offset) in &fit.offsets_m {
         let of_radius = |r: &f64| (r - radius).abs() < 1e-9;
         let trained = fit.options.train_radius_m.is_none_or(|r| of_radius(&r));
@@ -389,9 +378,9 @@ fn show(fit: &RadiusFit, runs: &[Observation], campaign: &str, out: Output) {
                 "–".to_owned(),
             ]),
         }
-        radii.add_row(row);
+        radii.row(row);
     }
-    out.say(radii);
+    radii.show(out);
     out.say("");
     let (runs, rms) = fit.train;
     out.say(format_args!(
@@ -417,14 +406,15 @@ fn show(fit: &RadiusFit, runs: &[Observation], campaign: &str, out: Output) {
 }
 
 fn show_steps(fit: &RadiusFit, out: Output) {
-    let mut steps = table(&["step", "term", "partial F", "critical F", "dof"]);
+    let header = ["step", "term", "partial F", "critical F", "dof"];
+    let mut steps = Grid::new(&header, 1, 2);
     for s in &fit.steps {
         let action = match s.action {
             Action::Enter => "enters",
             Action::Remove => "leaves",
             Action::Reject => "stays out",
         };
-        steps.add_row([
+        steps.row([
             action.to_owned(),
             ["f²/R", "f⁴/R³"][s.column].to_owned(),
             format!("{:.2}", s.partial_f),
@@ -432,7 +422,7 @@ fn show_steps(fit: &RadiusFit, out: Output) {
             format!("{}, {}", s.dof.0, s.dof.1),
         ]);
     }
-    out.say(steps);
+    steps.show(out);
 }
 
 fn show_chain(fit: &RadiusFit, out: Output) {

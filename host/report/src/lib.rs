@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `figures`, `forms` | the paper's Figures 8–11 and 2–7 of a campaign, as SVG |
 //! | `view` | what the page says, ready for the template |
+//! | `cause_view`, `iso`, `plots` | its parts: causes, ISO 230-4, plots of all runs |
 //! | `verdict` | the three sentences |
 //! | `chart` | scatter plots as SVG |
 //! | `map` | misfit over feed and radius |
@@ -16,13 +17,16 @@
 #![forbid(unsafe_code)]
 
 mod alone;
+mod cause_view;
 mod chart;
 pub mod figures;
 pub mod forms;
 mod hash;
+mod iso;
 mod map;
 mod number;
 mod pages;
+mod plots;
 mod polar;
 mod portrait;
 #[cfg(test)]

@@ -14,7 +14,7 @@ use serde::Serialize;
 /// Fewest campaigns whose order can say anything at the levels used here.
 pub const FEWEST: usize = 8;
 /// Most shuffles.
-const SHUFFLES: u32 = 100_000;
+const SHUFFLES: u32 = 400_000;
 /// So many shuffles that do as well settle that there is nothing.
 const ENOUGH: u32 = 20;
 /// One history of an unchanged machine in so many says that something happened, over all its series.
