@@ -1,4 +1,5 @@
 //! `giotto compensate`: rewrite the arcs of an NC program with the inverse correction.
+use super::destination::{Destination, Kind as FileKind};
 use super::{Failure, Output};
 use giotto::model_file::ModelFile;
 use giotto_nc::{self, Compensated, Fate, Keep, Left, Options};
@@ -79,6 +80,7 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
             )));
         }
     }
+    let place = Destination::new(&args.output, FileKind::Text, &[&args.program, &args.model])?;
     let program = read(&args.program, Kind::Any)?;
     let model = ModelFile::load(&args.model)?;
     let options = Options {
@@ -96,8 +98,7 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         giotto_nc::compensate
     };
     let result = compensate(&program, &model, &options);
-    std::fs::write(&args.output, &result.program)
-        .map_err(|e| super::failure::cannot_write(&args.output, &e))?;
+    place.write(&result.program)?;
     let document = document(&result, &model);
     if out.json {
         out.document(&document)

@@ -15,6 +15,7 @@ mod lateral_play;
 mod motion;
 mod parameter;
 mod radius_offset;
+pub mod remedy;
 mod reversal_spike;
 mod scale_error;
 mod scale_mismatch;

@@ -5,8 +5,10 @@ use giotto_shared::Frame;
 /// What machine and instrument allow; what is not said follows from the campaign.
 #[derive(Clone, Debug, Default)]
 pub struct Limits {
-    /// Radii that the instrument has, m; empty: around those of the campaign.
+    /// Radii that the instrument has, m; empty: those of the campaign and the lengths of usual bars.
     pub radii_m: Vec<f64>,
+    /// Largest radius, m; else the largest of the campaign: nobody has said that the machine may go further.
+    pub largest_radius_m: Option<f64>,
     /// Highest feed, m/s; else the highest of the campaign.
     pub highest_feed_m_s: Option<f64>,
     /// Highest centripetal acceleration, m/s²; else the highest of the campaign.
@@ -26,8 +28,8 @@ pub struct Circle {
     pub plane: Plane,
 }
 
-/// Radii beside the smallest and largest that were measured.
-const AROUND: [f64; 5] = [0.5, 0.75, 1.5, 2.0, 3.0];
+/// Lengths that ballbars come in, alone and with their extensions, m.
+const BARS_M: [f64; 9] = [0.05, 0.1, 0.15, 0.25, 0.3, 0.4, 0.45, 0.55, 0.6];
 /// Feeds as shares of the highest.
 const SHARES: [f64; 7] = [0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0];
 /// A turn should not last longer, s.
@@ -67,14 +69,13 @@ pub fn circles(campaign: &Campaign, limits: &Limits) -> Vec<Circle> {
     let mut radii = limits.radii_m.clone();
     if radii.is_empty() {
         let seen: Vec<f64> = runs().map(|r| r.radius_m).collect();
-        let low = seen.iter().copied().fold(f64::INFINITY, f64::min);
         let high = seen.iter().copied().fold(0.0, f64::max);
+        let largest = limits.largest_radius_m.unwrap_or(high) * (1.0 + 1e-9);
         radii = seen;
-        radii.extend(
-            AROUND
-                .iter()
-                .map(|k| round(k * if *k < 1.0 { low } else { high })),
-        );
+        radii.extend(BARS_M.iter().filter(|r| **r <= largest));
+    }
+    if let Some(largest) = limits.largest_radius_m {
+        radii.retain(|r| *r <= largest * (1.0 + 1e-9));
     }
     let mut feeds: Vec<f64> = SHARES.iter().map(|k| round(k * feed)).collect();
     feeds.extend(runs().map(|r| r.feed_m_s).filter(|f| *f <= feed));
