@@ -3,12 +3,13 @@
 //! [`machine`] moves in the time domain and shares nothing with the simulation under test; [`effects`]
 //! hides known errors in it, scaled to a wanted misfit; [`files`] writes such campaigns with their truth;
 //! [`command`] runs the real binary; [`study`] judges what `diagnose` makes of them. [`fuzz`] takes any bytes, [`noise`] makes
-//! them.
+//! them. [`nc`] makes up programs for machines and judges what `giotto compensate` makes of them.
 pub mod command;
 pub mod effects;
 pub mod files;
 pub mod fuzz;
 pub mod machine;
+pub mod nc;
 pub mod noise;
 pub mod paper;
 pub mod study;
