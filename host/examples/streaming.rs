@@ -69,6 +69,8 @@ fn measure(path: &Path) -> Result<(), Box<dyn Error>> {
             started_s: None,
             temperature_c: None,
             centre_m: None,
+            plane: None,
+            setup: None,
             machine: None,
             laps: Laps::First,
         };

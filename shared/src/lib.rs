@@ -2,11 +2,13 @@
 //!
 //! | module | holds |
 //! |---|---|
+//! | [`Actuator`], [`Plane`], [`Frame`] | the drives of a machine, and where a circle lies in it |
 //! | [`circle`] | mergeable moments of a point set, algebraic and geometric circle, plane of 3-D points |
 //! | [`model`] | the radius model ΔR = β1 f²/R + β2 f⁴/R³ (Eq. 15 of the source paper), cumulants, inverse |
 //! | [`term`] | the profile terms that diagnosis fits, the table carries and the engine evaluates |
 //! | [`path`] | time laws with limited jerk, circles, arcs, lines; derivatives in closed form |
 //! | [`angle`], [`fixed`] | integer phases, sine and cosine, fixed-point products of the tick |
+//! | [`bounds`] | what no table may ask for |
 //! | [`law`] | the compensating operator p − (κ2/2) p″ + (κ2²/8 − κ4/24) p⁗ |
 //! | [`table`] | the correction table: layout, bounds, CRC |
 //! | [`wire`] | messages and frames between host and controller |
@@ -19,10 +21,13 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+mod actuator;
 pub mod angle;
+pub mod bounds;
 pub mod circle;
 pub mod direction;
 pub mod fixed;
+mod frame;
 pub mod law;
 pub mod model;
 pub mod path;
@@ -30,4 +35,6 @@ pub mod table;
 pub mod term;
 pub mod wire;
 
+pub use actuator::Actuator;
 pub use direction::{Axis, Direction};
+pub use frame::{Frame, Plane};

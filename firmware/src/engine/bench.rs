@@ -4,11 +4,11 @@
 //! first tick with [`flag::MOVING`](super::flag::MOVING) begins what counts, ticks without it (rest, settling) do not.
 use super::planner::Planner;
 use super::{Config, Executor, Output, Planned, Stream, StreamSample};
-use giotto_shared::Axis;
 use giotto_shared::model::Cumulants;
 use giotto_shared::path::{Segment, smoothstep};
 use giotto_shared::table::{Limits, Table, Travel, Zone};
 use giotto_shared::term::Term;
+use giotto_shared::{Actuator, Plane};
 
 const TICK_S: f64 = 1e-3;
 /// As on the images.
@@ -24,33 +24,38 @@ const CUMULANTS: Cumulants<f32> = Cumulants {
 
 /// Eight profile terms, the dearest there are: reversal pulses and play of both axes, a periodic error.
 pub const TERMS: [Term<f32>; 8] = [
-    Term::Squareness { shear_rad: 80e-6 },
+    Term::Squareness {
+        plane: Plane::Xy,
+        shear_rad: 80e-6,
+    },
     Term::ServoMismatch {
+        plane: Plane::Xy,
         delta_tau_s: 100e-6,
     },
     Term::BandwidthMismatch {
+        plane: Plane::Xy,
         delta_kappa2_s2: 5e-6,
     },
     Term::Backlash {
-        axis: Axis::X,
+        actuator: Actuator::X,
         step_m: 10e-6,
     },
     Term::Backlash {
-        axis: Axis::Y,
+        actuator: Actuator::Y,
         step_m: 12e-6,
     },
     Term::ReversalSpike {
-        axis: Axis::X,
+        actuator: Actuator::X,
         peak_m: 8e-6,
         decay_s: 0.05,
     },
     Term::ReversalSpike {
-        axis: Axis::Y,
+        actuator: Actuator::Y,
         peak_m: 6e-6,
         decay_s: 0.04,
     },
     Term::Cyclic {
-        axis: Axis::X,
+        actuator: Actuator::X,
         amplitude_m: 2e-6,
         pitch_m: 0.01,
         phase_rad: 0.5,

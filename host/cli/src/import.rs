@@ -114,7 +114,7 @@ struct Entry {
 
 impl Entry {
     fn of(added: &Added, options: &Options) -> Self {
-        let plane = added.frame.and_then(|f| f.plane);
+        let plane = added.location.and_then(|f| f.plane);
         Self {
             file: added.file.clone(),
             source: added.source.display().to_string(),

@@ -68,6 +68,8 @@ impl Foreign {
             started_s: None,
             temperature_c: None,
             centre_m: None,
+            plane: None,
+            setup: None,
             machine: None,
             laps: Laps::First,
         })
@@ -175,7 +177,7 @@ pub(super) fn tell(added: &Added, options: &Options, out: Output) {
     if let Some(arc) = added.arc_rad {
         text += &format!(", an arc of {:.1}°", arc.to_degrees());
     }
-    if let Some(plane) = added.frame.and_then(|f| f.plane) {
+    if let Some(plane) = added.location.and_then(|f| f.plane) {
         let (tilt, flat) = (plane.tilt_rad.to_degrees(), plane.flatness_m * 1e6);
         text += &format!(", plane tilted by {tilt:.3}° and flat within {flat:.1} µm");
     }

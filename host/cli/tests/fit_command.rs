@@ -39,6 +39,8 @@ fn campaign() -> Campaign {
                     started_s: None,
                     temperature_c: None,
                     centre_m: None,
+                    frame: giotto::campaign::Frame::default(),
+                    setup: None,
                     samples: Samples {
                         angle_rad: (0..samples).map(|i| sign * TAU * at(i)).collect(),
                         deviation_m: vec![deviation; samples],
@@ -52,6 +54,8 @@ fn campaign() -> Campaign {
     Campaign {
         name: "paper".into(),
         machine: "ABB IRB 1600-6/1.45, simulated".into(),
+        repeatability_m: None,
+        table: None,
         runs,
     }
 }

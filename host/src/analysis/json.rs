@@ -1,7 +1,7 @@
 //! The contract's JSON of `analyze`. Units end the names; what a run does not have is `null`.
 use super::{Iso230, Report, RunAnalysis, counterparts};
 use crate::campaign::import::ballbar20::{Ballbar20, Feature};
-use crate::campaign::{Direction, Frame};
+use crate::campaign::{Direction, Location};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -117,7 +117,7 @@ impl Document {
     }
 }
 
-fn run(run: &RunAnalysis, frame: Option<&Frame>) -> RunEntry {
+fn run(run: &RunAnalysis, frame: Option<&Location>) -> RunEntry {
     RunEntry {
         file: run.file.clone(),
         radius_mm: mm(run.radius_m),

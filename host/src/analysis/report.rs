@@ -2,7 +2,7 @@
 use super::iso230::{self, Iso230, Kept};
 use super::run::{RunAnalysis, of_run};
 use crate::campaign::{
-    Campaign, CampaignError, Frame, Loaded, Manifest, Note, Place, Problem, Run, Together,
+    Campaign, CampaignError, Loaded, Location, Manifest, Note, Place, Problem, Run, Together,
 };
 use giotto_shared::circle::CircleError;
 use rayon::prelude::*;
@@ -19,7 +19,7 @@ pub struct Report {
     /// One entry a pair, in order of first appearance.
     pub iso230_4: Vec<Iso230>,
     /// Where the circles of files with positions lie, by run.
-    pub frames: Vec<Option<Frame>>,
+    pub frames: Vec<Option<Location>>,
     /// What the reader should know.
     pub notes: Vec<Note>,
 }
@@ -110,7 +110,7 @@ pub fn of_files(manifest: &Manifest, progress: impl Fn() + Sync) -> Result<Repor
                 ),
             )
         })?;
-        if let Some(frame) = loaded.frame {
+        if let Some(frame) = loaded.location {
             analysis.centre_m = [
                 frame.origin_m[0] + analysis.centre_m[0],
                 frame.origin_m[1] + analysis.centre_m[1],
@@ -174,7 +174,7 @@ pub fn of_files(manifest: &Manifest, progress: impl Fn() + Sync) -> Result<Repor
     };
     for done in runs {
         report.runs.push(done.analysis);
-        report.frames.push(done.loaded.frame);
+        report.frames.push(done.loaded.location);
         report.notes.extend(done.loaded.notes);
     }
     Ok(report)

@@ -41,6 +41,8 @@ fn run(
         started_s: None,
         temperature_c: None,
         centre_m: None,
+        frame: crate::campaign::Frame::default(),
+        setup: None,
         samples,
     }
 }
@@ -190,6 +192,8 @@ fn iso_figures_of_a_pair() {
     let campaign = Campaign {
         name: "c".into(),
         machine: "m".into(),
+        repeatability_m: None,
+        table: None,
         runs: vec![cw, lone, ccw],
     };
     let report = of_campaign(&campaign).unwrap();
@@ -247,6 +251,8 @@ fn files_and_memory_give_the_same_figures() {
     let campaign = Campaign {
         name: "c".into(),
         machine: "m".into(),
+        repeatability_m: None,
+        table: None,
         runs: vec![make("a.csv", Direction::Cw), make("b.csv", Direction::Ccw)],
     };
     write(&campaign, dir.path()).unwrap();

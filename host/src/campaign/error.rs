@@ -116,6 +116,14 @@ pub enum Problem {
     },
     #[error("`direction` is \"{found}\"; expected \"ccw\" or \"cw\"")]
     UnknownDirection { found: String },
+    #[error(
+        "the points lie across ({}, {}, {}), which is not the plane {declared}",
+        normal[0], normal[1], normal[2]
+    )]
+    OtherPlane {
+        declared: &'static str,
+        normal: [f64; 3],
+    },
     #[error("the campaign lists no runs; expected at least one [[run]]")]
     NoRuns,
     #[error("run \"{file}\" is listed twice (first in line {first}); expected each run once")]
@@ -320,6 +328,7 @@ impl CampaignError {
             P::Toml { .. }
             | P::WrongType { .. }
             | P::OutOfRange { .. }
+            | P::OtherPlane { .. }
             | P::UnknownDirection { .. } => "correct this line of campaign.toml",
             P::MissingKey { .. } | P::UnknownKey { .. } => "correct the key in campaign.toml",
             P::NoRuns => "add a run with `giotto import`",

@@ -1,7 +1,7 @@
 //! `campaign.toml`, strictly: every value checked, every refusal with its line and column.
 use super::error::{CampaignError, Place, Problem};
 use super::import::Slice;
-use super::{Direction, Note};
+use super::{Direction, Frame, Note, Plane};
 use std::collections::HashMap;
 use std::ops::Range;
 use std::path::{Component, Path, PathBuf};
@@ -13,6 +13,9 @@ const EXPECTED_TOML: &str = "[campaign] and [[run]] tables";
 /// Shortest arc that a campaign may declare, degrees.
 pub const SHORTEST_ARC_DEG: f64 = 180.0;
 
+/// Cosine of the largest angle between a plane that is named and the points' own: 45°, from where another is nearer.
+const FARTHEST_TILT: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
 /// A campaign before its samples are read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Manifest {
@@ -22,6 +25,10 @@ pub struct Manifest {
     pub name: String,
     /// Machine under test.
     pub machine: String,
+    /// Known scatter of the size between runs of one circle, m.
+    pub repeatability_m: Option<f64>,
+    /// SHA-256 of the correction table that was at work.
+    pub table: Option<String>,
     /// What it says of each run, in file order.
     pub runs: Vec<Entry>,
     /// What the reader should know (unknown keys).
@@ -51,6 +58,10 @@ pub struct Entry {
     pub temperature_c: Option<f64>,
     /// Programmed centre, m.
     pub centre_m: Option<[f64; 3]>,
+    /// Plane of the circle, if the campaign or the run names it.
+    pub plane: Option<Plane>,
+    /// Name of the set-up, if given.
+    pub setup: Option<String>,
     /// Declared arc, rad, if the run is not a whole turn.
     pub arc_rad: Option<f64>,
     /// Where the run stands in a foreign file; `None` for a file of the contract.
@@ -97,6 +108,37 @@ impl Manifest {
     }
 }
 
+impl Entry {
+    /// How the circle lies: as its points say, else as the campaign says, else in XY.
+    pub(super) fn frame_of(&self, measured: Option<Frame>) -> Result<Frame, CampaignError> {
+        let declared = self.plane.map(Frame::of);
+        let (Some(measured), Some(declared)) = (measured, declared) else {
+            return Ok(measured.or(declared).unwrap_or_default());
+        };
+        let (a, b) = (measured.normal(), declared.normal());
+        let cosine: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
+        if cosine > FARTHEST_TILT {
+            return Ok(measured);
+        }
+        let normal = a.map(|c| (c * 1e3).round() / 1e3);
+        let problem = Problem::OtherPlane {
+            declared: self.plane.map_or("", Plane::name),
+            normal,
+        };
+        Err(CampaignError::new(self.place(0, 0), problem))
+    }
+}
+
+/// What `campaign.toml` says of all runs.
+#[derive(Default)]
+struct Head {
+    name: String,
+    machine: String,
+    plane: Option<Plane>,
+    repeatability_m: Option<f64>,
+    table: Option<String>,
+}
+
 /// The text under examination.
 struct Source<'a> {
     file: &'a Path,
@@ -126,8 +168,7 @@ impl Source<'_> {
         })?;
         let root = document.get_ref();
         self.known_keys(root, &["campaign", "run"])?;
-        let (mut name, mut machine) = (String::new(), String::new());
-        match root.get("campaign") {
+        let mut head = match root.get("campaign") {
             None => {
                 let problem = Problem::MissingKey {
                     key: "[campaign]",
@@ -135,23 +176,15 @@ impl Source<'_> {
                 };
                 return Err(self.error(0..0, problem));
             }
-            Some(value) => {
-                let table = self.table(value, "campaign")?;
-                self.known_keys(table, &["name", "machine"])?;
-                for (key, slot) in [("name", &mut name), ("machine", &mut machine)] {
-                    if let Some(v) = table.get(key) {
-                        *slot = self.string(v, key)?;
-                    }
-                }
-            }
-        }
-        if name.is_empty() {
+            Some(value) => self.head(value)?,
+        };
+        if head.name.is_empty() {
             let folder = self
                 .file
                 .canonicalize()
                 .ok()
                 .and_then(|p| Some(p.parent()?.file_name()?.to_owned()));
-            name = folder.map_or_else(String::new, |f| f.to_string_lossy().into_owned());
+            head.name = folder.map_or_else(String::new, |f| f.to_string_lossy().into_owned());
         }
         let list = match root.get("run") {
             None => return Err(self.error(0..0, Problem::NoRuns)),
@@ -173,7 +206,7 @@ impl Source<'_> {
         let mut runs = Vec::with_capacity(list.len());
         let mut seen: HashMap<PathBuf, usize> = HashMap::new();
         for value in list {
-            let (entry, span) = self.entry(value)?;
+            let (entry, span) = self.entry(value, head.plane)?;
             let plain: PathBuf = entry
                 .path
                 .components()
@@ -193,14 +226,68 @@ impl Source<'_> {
         }
         Ok(Manifest {
             path: self.file.to_path_buf(),
-            name,
-            machine,
+            name: head.name,
+            machine: head.machine,
+            repeatability_m: head.repeatability_m,
+            table: head.table,
             runs,
             notes: self.notes,
         })
     }
 
-    fn entry(&mut self, value: &Value<'_>) -> Result<(Entry, Range<usize>), CampaignError> {
+    fn head(&mut self, value: &Value<'_>) -> Result<Head, CampaignError> {
+        let table = self.table(value, "campaign")?;
+        self.known_keys(
+            table,
+            &["name", "machine", "plane", "repeatability_um", "table"],
+        )?;
+        let text = |key| table.get(key).map(|v| self.string(v, key)).transpose();
+        let repeatability = table.get("repeatability_um").map(|v| {
+            let expected = "the scatter of a circle's size between runs, 0 to 10000 µm";
+            self.within(v, "repeatability_um", expected, |v| {
+                (0.0..=1e4).contains(&v)
+            })
+        });
+        Ok(Head {
+            name: text("name")?.unwrap_or_default(),
+            machine: text("machine")?.unwrap_or_default(),
+            plane: table.get("plane").map(|v| self.plane(v)).transpose()?,
+            repeatability_m: repeatability.transpose()?.map(|um| um * 1e-6),
+            table: table.get("table").map(|v| self.digest(v)).transpose()?,
+        })
+    }
+
+    fn plane(&self, value: &Value<'_>) -> Result<Plane, CampaignError> {
+        let name = self.string(value, "plane")?;
+        let known = Plane::ALL.into_iter().find(|plane| plane.name() == name);
+        known.ok_or_else(|| {
+            let problem = Problem::OutOfRange {
+                key: "plane",
+                value: format!("\"{name}\""),
+                expected: "\"xy\", \"yz\" or \"zx\"",
+            };
+            self.error(value.span(), problem)
+        })
+    }
+
+    fn digest(&self, value: &Value<'_>) -> Result<String, CampaignError> {
+        let text = self.string(value, "table")?;
+        if text.len() == 64 && text.bytes().all(|b| b.is_ascii_hexdigit()) {
+            return Ok(text.to_ascii_lowercase());
+        }
+        let problem = Problem::OutOfRange {
+            key: "table",
+            value: format!("\"{}\"", super::table::shorten(&text)),
+            expected: "the SHA-256 of a table, 64 hexadecimal digits",
+        };
+        Err(self.error(value.span(), problem))
+    }
+
+    fn entry(
+        &mut self,
+        value: &Value<'_>,
+        plane: Option<Plane>,
+    ) -> Result<(Entry, Range<usize>), CampaignError> {
         let table = self.table(value, "run")?;
         self.known_keys(
             table,
@@ -214,6 +301,8 @@ impl Source<'_> {
                 "temperature_c",
                 "centre_mm",
                 "arc_deg",
+                "plane",
+                "setup",
             ],
         )?;
         let need = |key, expected| {
@@ -300,6 +389,14 @@ impl Source<'_> {
             started_s,
             temperature_c,
             centre_m,
+            plane: match table.get("plane") {
+                Some(v) => Some(self.plane(v)?),
+                None => plane,
+            },
+            setup: table
+                .get("setup")
+                .map(|v| self.string(v, "setup"))
+                .transpose()?,
             arc_rad: arc.map(f64::to_radians),
             slice: None,
         };

@@ -35,10 +35,10 @@ mod write;
 
 pub use check::sample_noise;
 pub use error::{CampaignError, Place, Problem};
-pub use giotto_shared::Direction;
+pub use giotto_shared::{Direction, Frame, Plane};
 pub use manifest::{Entry, Manifest, SHORTEST_ARC_DEG};
 pub use read::{Together, read, read_with_notes};
-pub use samples::{Frame, Loaded, Tilt};
+pub use samples::{Loaded, Location, Tilt};
 pub(crate) use table::is_contract_header;
 pub use write::replace;
 pub use write::write;
@@ -62,12 +62,16 @@ impl fmt::Display for Note {
 }
 
 /// A set of circular tests of one machine.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Campaign {
     /// Name of the campaign.
     pub name: String,
     /// Machine under test.
     pub machine: String,
+    /// Known scatter of the size between runs of one circle, m, if the campaign states it.
+    pub repeatability_m: Option<f64>,
+    /// SHA-256 of the correction table that was at work, if one was.
+    pub table: Option<String>,
     /// The runs in file order; the order of time is that of `started_s`.
     pub runs: Vec<Run>,
 }
@@ -91,6 +95,10 @@ pub struct Run {
     pub temperature_c: Option<f64>,
     /// Programmed centre in the machine, m.
     pub centre_m: Option<[f64; 3]>,
+    /// How the circle lies in the machine.
+    pub frame: Frame,
+    /// Runs of one set-up share their centre offset; `None`: the data decide whether the centre holds.
+    pub setup: Option<String>,
     /// What the instrument recorded.
     pub samples: Samples,
 }

@@ -50,6 +50,8 @@ impl Manifest {
             Campaign {
                 name: self.name.clone(),
                 machine: self.machine.clone(),
+                repeatability_m: self.repeatability_m,
+                table: self.table.clone(),
                 runs,
             },
             notes,

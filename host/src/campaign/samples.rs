@@ -5,7 +5,7 @@ use super::import::Quantity;
 use super::manifest::Entry;
 use super::run_file::RunFile;
 use super::table::Batch;
-use super::{Note, Run, Samples, check};
+use super::{Frame, Note, Run, Samples, check};
 use crate::fit::fit_circle;
 use giotto_shared::circle::{Circle, CircleError, Merge, Plane, Scatter};
 use rayon::prelude::*;
@@ -23,7 +23,7 @@ pub struct Loaded {
     /// The run. Without `keep_time` its `time_s` is `None` whatever the file holds.
     pub run: Run,
     /// Where the circle lies in the coordinates of the file, for x, y (and z) files.
-    pub frame: Option<Frame>,
+    pub location: Option<Location>,
     /// Duration of the turn, s, where the file has time stamps.
     pub turn_s: Option<f64>,
     /// What the reader should know.
@@ -40,7 +40,7 @@ pub struct Loaded {
 
 /// Pole of the polar samples in the coordinates of a file with positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Frame {
+pub struct Location {
     /// Centre of the least-squares circle, m.
     pub origin_m: [f64; 3],
     /// Tilt of the plane against the nearest coordinate plane and flatness (peak to valley, m), for 3-D points.
@@ -201,6 +201,8 @@ pub(super) fn load(entry: &Entry, keep_time: bool) -> Result<Loaded, CampaignErr
         started_s: entry.started_s,
         temperature_c: entry.temperature_c,
         centre_m: entry.centre_m,
+        frame: entry.frame_of(plane.as_ref().map(|(view, _)| view.frame))?,
+        setup: entry.setup.clone(),
         samples: Samples {
             angle_rad: rows.first,
             deviation_m: rows.second,
@@ -215,11 +217,11 @@ pub(super) fn load(entry: &Entry, keep_time: bool) -> Result<Loaded, CampaignErr
         None => None,
         Some(field) => Some((rows.stamps.clock(entry, field)?, rows.time, field)),
     };
-    let mut frame = None;
+    let mut location = None;
     let mut covered = TAU;
     let noise_m = if let Some((x, _)) = xy {
         let plane = plane.map(|(view, _)| view.with_heights(rows.heights));
-        frame = Some(polar(entry, x, &mut run.samples, plane, &no_circle)?);
+        location = Some(polar(entry, x, &mut run.samples, plane, &no_circle)?);
         check::deviation(
             entry,
             &run.samples.deviation_m,
@@ -255,7 +257,7 @@ pub(super) fn load(entry: &Entry, keep_time: bool) -> Result<Loaded, CampaignErr
         }
         run.samples.angle_inferred = true;
         let turn_s = Some(clock.turn_s);
-        return Ok(finish(run, frame, turn_s, kept, notes, laps, noise_m));
+        return Ok(finish(run, location, turn_s, kept, notes, laps, noise_m));
     }
     let field = index(&|q| matches!(q, Quantity::Angle | Quantity::Position(0))).unwrap_or(0);
     if !unwrapped(&run.samples.angle_rad) {
@@ -276,7 +278,7 @@ pub(super) fn load(entry: &Entry, keep_time: bool) -> Result<Loaded, CampaignErr
         turn_s = Some(turn);
         kept = keep_time.then_some(time);
     }
-    Ok(finish(run, frame, turn_s, kept, notes, laps, noise_m))
+    Ok(finish(run, location, turn_s, kept, notes, laps, noise_m))
 }
 
 fn too_few(entry: &Entry, found: usize) -> CampaignError {
@@ -313,7 +315,7 @@ fn scatter(entry: &Entry, fields: [usize; 3]) -> Result<Scatter, CampaignError> 
 
 fn finish(
     mut run: Run,
-    frame: Option<Frame>,
+    location: Option<Location>,
     turn_s: Option<f64>,
     time: Option<Vec<f64>>,
     notes: Vec<Note>,
@@ -327,7 +329,7 @@ fn finish(
         rows,
         clocked: turn_s.is_some(),
         run,
-        frame,
+        location,
         turn_s,
         notes,
         laps,
@@ -359,7 +361,7 @@ fn polar(
     samples: &mut Samples,
     plane: Option<PlaneView>,
     no_circle: &dyn Fn(CircleError, usize) -> CampaignError,
-) -> Result<Frame, CampaignError> {
+) -> Result<Location, CampaignError> {
     let (x, y) = (&mut samples.angle_rad, &mut samples.deviation_m);
     let fit = fit_circle(x, y).map_err(|e| no_circle(e, field))?;
     let Circle { centre, radius } = fit.circle;
@@ -382,11 +384,11 @@ fn polar(
             }
         });
     Ok(match plane {
-        None => Frame {
+        None => Location {
             origin_m: [centre[0], centre[1], 0.0],
             plane: None,
         },
-        Some(view) => Frame {
+        Some(view) => Location {
             origin_m: view.lift(centre),
             plane: Some(view.tilt()),
         },
@@ -394,24 +396,17 @@ fn polar(
 }
 
 /// A plane seen from the positive end of the axis nearest to its normal, so that CCW means what it means
-/// in G17, G18 and G19.
+/// in G17, G18 and G19, and angles run from the first axis of that plane.
 struct PlaneView {
     plane: Plane,
-    flip: f64,
+    frame: Frame,
 }
 
 impl PlaneView {
     fn through(scatter: &Scatter) -> Result<Self, CircleError> {
         let plane = Plane::through(scatter)?;
-        let largest = plane
-            .normal
-            .iter()
-            .copied()
-            .fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
-        Ok(Self {
-            plane,
-            flip: largest.signum(),
-        })
+        let frame = Frame::across(plane.normal).ok_or(CircleError::NonFinite)?;
+        Ok(Self { plane, frame })
     }
 
     fn with_heights(mut self, [lowest, highest]: [f64; 2]) -> Self {
@@ -420,16 +415,18 @@ impl PlaneView {
     }
 
     fn project(&self, point: [f64; 3]) -> [f64; 2] {
-        let [u, v] = self.plane.project(point);
-        [u, self.flip * v]
+        let from = [0, 1, 2].map(|k| point[k] - self.plane.centroid[k]);
+        [self.frame.first(), self.frame.second()]
+            .map(|axis| axis[0] * from[0] + axis[1] * from[1] + axis[2] * from[2])
     }
 
     fn lift(&self, [u, v]: [f64; 2]) -> [f64; 3] {
-        self.plane.lift([u, self.flip * v])
+        let (first, second) = (self.frame.first(), self.frame.second());
+        [0, 1, 2].map(|k| self.plane.centroid[k] + u * first[k] + v * second[k])
     }
 
     fn tilt(&self) -> Tilt {
-        let normal = self.plane.normal.map(|c| c * self.flip);
+        let normal = self.frame.normal();
         let axis = normal.iter().copied().fold(0.0, f64::max);
         let across = normal.iter().map(|c| c * c).sum::<f64>() - axis * axis;
         Tilt {

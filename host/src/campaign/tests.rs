@@ -17,6 +17,8 @@ fn ballbar(file: &str, direction: Direction, n: usize, turn_s: f64) -> Run {
         started_s: Some(3.5),
         temperature_c: Some(21.0),
         centre_m: Some([-0.29, 0.987, 0.615]),
+        frame: crate::campaign::Frame::default(),
+        setup: None,
         samples: Samples {
             angle_rad: (0..n).map(angle).collect(),
             deviation_m: (0..n).map(deviation).collect(),
@@ -49,6 +51,8 @@ fn what_is_written_is_read_back() {
     let campaign = Campaign {
         name: "a \"quoted\" name".into(),
         machine: "m".into(),
+        repeatability_m: None,
+        table: None,
         runs: vec![
             ballbar("run000.csv", Direction::Ccw, 500, turn),
             ballbar("b/run1.csv", Direction::Cw, 999, turn),
@@ -100,6 +104,8 @@ fn measured_angles_and_points_survive_a_round_trip() {
     let campaign = Campaign {
         name: "c".into(),
         machine: "m".into(),
+        repeatability_m: None,
+        table: None,
         runs: vec![polar, points],
     };
     write(&campaign, dir.path()).unwrap();
@@ -182,7 +188,7 @@ fn points_in_space_are_seen_from_the_positive_axis() {
     write_raw(dir.path(), ONE, &[("a.csv", &csv)]);
     let manifest = Manifest::open(dir.path()).unwrap();
     let loaded = manifest.load(0).unwrap();
-    let frame = loaded.frame.unwrap();
+    let frame = loaded.location.unwrap();
     close(&frame.origin_m, &[1.0, 2.0, 3.0], 1e-8);
     let plane = frame.plane.unwrap();
     assert!((plane.tilt_rad - tilt).abs() < 1e-7, "{plane:?}");
@@ -264,5 +270,70 @@ fn open_campaigns_are_read_without_a_note() {
         let (campaign, notes) = read_with_notes(&entry.path()).unwrap();
         assert_eq!(campaign.runs.len(), 78);
         assert!(notes.is_empty(), "{}: {notes:?}", entry.path().display());
+    }
+}
+
+#[test]
+fn a_circle_keeps_its_plane_from_the_file_to_the_run() {
+    let tilted = Frame::across([0.3, -0.2, 0.9]).unwrap();
+    for frame in Plane::ALL.into_iter().map(Frame::of).chain([tilted]) {
+        let dir = tempfile::tempdir().unwrap();
+        let mut bar = ballbar("bar.csv", Direction::Cw, 360, PI);
+        bar.samples.angle_inferred = false;
+        bar.samples.deviation_m = bar
+            .samples
+            .angle_rad
+            .iter()
+            .map(|a| 1e-5 * (2.0 * a + 0.4).cos())
+            .collect();
+        bar.frame = frame;
+        bar.setup = Some("A".into());
+        let mut polar = bar.clone();
+        polar.file = "polar.csv".into();
+        polar.samples.time_s = None;
+        let campaign = Campaign {
+            name: "c".into(),
+            machine: "m".into(),
+            repeatability_m: Some(3e-6),
+            table: Some("ab".repeat(32)),
+            runs: vec![bar, polar],
+        };
+        write(&campaign, dir.path()).unwrap();
+        let read = read(dir.path()).unwrap();
+        assert_eq!(
+            (read.repeatability_m, &read.table),
+            (Some(3e-6), &campaign.table)
+        );
+        for (a, b) in campaign.runs.iter().zip(&read.runs) {
+            close(&a.samples.angle_rad, &b.samples.angle_rad, 1e-6);
+            close(&a.samples.deviation_m, &b.samples.deviation_m, 1e-10);
+            close(&a.frame.first(), &b.frame.first(), 1e-6);
+            close(&a.frame.second(), &b.frame.second(), 1e-6);
+            assert_eq!(b.setup.as_deref(), Some("A"));
+        }
+    }
+}
+
+#[test]
+fn a_plane_that_the_points_contradict_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let rows: String = (0..360)
+        .map(|k| f64::from(-k).to_radians().sin_cos())
+        .map(|(sin, cos)| format!("{},0,{}\n", 100.0 * sin, 100.0 * cos))
+        .collect();
+    let file = format!("x_mm,y_mm,z_mm\n{rows}");
+    write_raw(dir.path(), ONE, &[("a.csv", &file)]);
+    assert_eq!(
+        read(dir.path()).unwrap().runs[0].frame.plane(),
+        Some(Plane::Zx)
+    );
+    for (plane, words) in [
+        ("xy", "not the plane xy"),
+        ("xz", "expected \"xy\", \"yz\" or \"zx\""),
+    ] {
+        let toml = ONE.replace("[[run]]", &format!("plane = \"{plane}\"\n[[run]]"));
+        write_raw(dir.path(), &toml, &[("a.csv", &file)]);
+        let refused = read(dir.path()).unwrap_err().to_string();
+        assert!(refused.contains(words), "{refused}");
     }
 }

@@ -1,6 +1,6 @@
 //! Writing campaigns in the contract's files.
 use super::error::{CampaignError, Place, Problem};
-use super::{Campaign, Direction, Run};
+use super::{Campaign, Direction, Frame, Plane, Run};
 use std::collections::HashSet;
 use std::fmt::Write as _;
 use std::io::{BufWriter, Write};
@@ -47,6 +47,12 @@ pub fn write(campaign: &Campaign, dir: &Path) -> Result<(), CampaignError> {
     let mut head = Table::new();
     head["name"] = value(&campaign.name);
     head["machine"] = value(&campaign.machine);
+    if let Some(repeatability_m) = campaign.repeatability_m {
+        head["repeatability_um"] = value(plain(repeatability_m * 1e6));
+    }
+    if let Some(table) = &campaign.table {
+        head["table"] = value(table);
+    }
     document["campaign"] = Item::Table(head);
     let mut list = ArrayOfTables::new();
     for run in &campaign.runs {
@@ -112,6 +118,12 @@ fn entry(run: &Run) -> Table {
                 .collect::<toml_edit::Array>(),
         );
     }
+    if let Some(plane) = run.frame.plane().filter(|plane| *plane != Plane::Xy) {
+        table["plane"] = value(plane.name());
+    }
+    if let Some(setup) = &run.setup {
+        table["setup"] = value(setup);
+    }
     if let Some(arc) = run.samples.arc_rad() {
         table["arc_deg"] = value((arc.to_degrees() * 1e3).round() / 1e3);
     }
@@ -129,31 +141,42 @@ fn write_samples(run: &Run, path: &Path) -> Result<(), CampaignError> {
     let samples = &run.samples;
     let rows = samples.deviation_m.len();
     let mut line = String::with_capacity(64);
-    let header = match (&samples.time_s, samples.angle_inferred) {
-        (Some(_), true) => "time_s,deviation_um\n",
-        (Some(_), false) => "time_s,x_mm,y_mm\n",
-        (None, _) => "angle_deg,deviation_um\n",
-    };
-    out.write_all(header.as_bytes()).map_err(io)?;
+    // A file of lengths says nothing of a tilt: points in space do.
+    let tilted = run.frame.plane().is_none();
+    let positions = tilted || (samples.time_s.is_some() && !samples.angle_inferred);
+    let flat = run.frame == Frame::of(Plane::Xy);
+    let mut header: Vec<&str> = Vec::new();
+    if samples.time_s.is_some() {
+        header.push("time_s");
+    }
+    header.extend(match (positions, flat, samples.time_s.is_some()) {
+        (true, true, _) => &["x_mm", "y_mm"][..],
+        (true, false, _) => &["x_mm", "y_mm", "z_mm"],
+        (false, _, true) => &["deviation_um"],
+        (false, _, false) => &["angle_deg", "deviation_um"],
+    });
+    out.write_all((header.join(",") + "\n").as_bytes())
+        .map_err(io)?;
     for k in 0..rows {
         line.clear();
         let (angle, deviation) = (samples.angle_rad[k], samples.deviation_m[k]);
-        match (&samples.time_s, samples.angle_inferred) {
-            (Some(time), true) => {
-                number(&mut line, time[k], 9, b',');
-                number(&mut line, deviation * 1e6, 6, b'\n');
+        if let Some(time) = &samples.time_s {
+            number(&mut line, time[k], 9, b',');
+        } else if !positions {
+            number(&mut line, angle.to_degrees(), 9, b',');
+        }
+        if positions {
+            let (sin, cos) = angle.sin_cos();
+            let radius_mm = (run.radius_m + deviation) * 1e3;
+            let (first, second) = (run.frame.first(), run.frame.second());
+            let last = if flat { 1 } else { 2 };
+            for axis in 0..=last {
+                let coordinate_mm = radius_mm * (cos * first[axis] + sin * second[axis]);
+                let end = if axis == last { b'\n' } else { b',' };
+                number(&mut line, coordinate_mm, 9, end);
             }
-            (Some(time), false) => {
-                let (sin, cos) = angle.sin_cos();
-                let radius_mm = (run.radius_m + deviation) * 1e3;
-                number(&mut line, time[k], 9, b',');
-                number(&mut line, radius_mm * cos, 9, b',');
-                number(&mut line, radius_mm * sin, 9, b'\n');
-            }
-            (None, _) => {
-                number(&mut line, angle.to_degrees(), 9, b',');
-                number(&mut line, deviation * 1e6, 6, b'\n');
-            }
+        } else {
+            number(&mut line, deviation * 1e6, 6, b'\n');
         }
         out.write_all(line.as_bytes()).map_err(io)?;
     }

@@ -77,7 +77,7 @@ impl CauseModel for Backlash {
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
         Some(Term::Backlash {
-            axis: effect.axis?,
+            actuator: effect.axis?.into(),
             step_m: effect.value * 1e-3,
         })
     }

@@ -1,8 +1,8 @@
 //! Unequal second cumulants: `r = −(Δκ2/4)(f²/R)·|G|·cos2ψ`, the same both ways: a filter before or behind the servo.
 use super::{Cause, CauseModel, Effect, Harmonics, RunView, Words};
 use crate::simulation::machine::Machine;
-use giotto_shared::Axis;
 use giotto_shared::term::Term;
+use giotto_shared::{Axis, Plane};
 
 /// See the module.
 pub struct BandwidthMismatch;
@@ -39,6 +39,7 @@ impl CauseModel for BandwidthMismatch {
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
         Some(Term::BandwidthMismatch {
+            plane: Plane::Xy,
             delta_kappa2_s2: effect.value,
         })
     }

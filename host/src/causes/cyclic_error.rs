@@ -127,7 +127,7 @@ impl CauseModel for CyclicError {
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
         Some(Term::Cyclic {
-            axis: effect.axis?,
+            actuator: effect.axis?.into(),
             amplitude_m: effect.value * 1e-6,
             pitch_m: effect.param("pitch_mm", 10.0) * 1e-3,
             phase_rad: effect.param("phase_rad", 0.0),

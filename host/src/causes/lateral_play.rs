@@ -56,7 +56,8 @@ impl CauseModel for LateralPlay {
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
         Some(Term::LateralPlay {
-            axis: effect.axis?,
+            actuator: effect.axis?.into(),
+            across: effect.axis?.other().into(),
             shift_m: effect.value * 1e-3,
         })
     }

@@ -99,7 +99,7 @@ impl CauseModel for ReversalSpike {
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
         Some(Term::ReversalSpike {
-            axis: effect.axis?,
+            actuator: effect.axis?.into(),
             peak_m: effect.value * 1e-6,
             decay_s: effect.param("decay_s", 0.03),
         })

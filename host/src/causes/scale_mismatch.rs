@@ -1,8 +1,8 @@
 //! X longer than Y: `r = ½R(sx − sy)cos2ψ`, the same both ways.
 use super::{Cause, CauseModel, Effect, Harmonics, RunView, Words};
 use crate::simulation::machine::Machine;
-use giotto_shared::Axis;
 use giotto_shared::term::Term;
+use giotto_shared::{Axis, Plane};
 
 /// See the module.
 pub struct ScaleMismatch;
@@ -39,6 +39,7 @@ impl CauseModel for ScaleMismatch {
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
         Some(Term::ScaleMismatch {
+            plane: Plane::Xy,
             relative: effect.value * 1e-6,
         })
     }

@@ -5,8 +5,8 @@
 //! `turned` (1 or 0) is that choice.
 use super::{Bend, Cause, CauseModel, Effect, Harmonics, RunView, Words};
 use crate::simulation::machine::Machine;
-use giotto_shared::Axis;
 use giotto_shared::term::Term;
+use giotto_shared::{Axis, Plane};
 
 /// See the module.
 pub struct ServoMismatch;
@@ -62,6 +62,7 @@ impl CauseModel for ServoMismatch {
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
         Some(Term::ServoMismatch {
+            plane: Plane::Xy,
             delta_tau_s: effect.value,
         })
     }

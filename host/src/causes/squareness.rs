@@ -1,8 +1,8 @@
 //! Axes not square: `r = ½εR·sin2ψ`, the same both ways.
 use super::{Cause, CauseModel, Effect, Harmonics, RunView, Words};
 use crate::simulation::machine::Machine;
-use giotto_shared::Axis;
 use giotto_shared::term::Term;
+use giotto_shared::{Axis, Plane};
 
 /// See the module.
 pub struct Squareness;
@@ -38,6 +38,7 @@ impl CauseModel for Squareness {
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
         Some(Term::Squareness {
+            plane: Plane::Xy,
             shear_rad: effect.value * 1e-6,
         })
     }

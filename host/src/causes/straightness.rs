@@ -51,7 +51,8 @@ impl CauseModel for Straightness {
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
         Some(Term::Straightness {
-            axis: effect.axis?,
+            actuator: effect.axis?.into(),
+            across: effect.axis?.other().into(),
             curvature_per_m: curvature_per_m(effect),
         })
     }

@@ -2,7 +2,7 @@
 use super::circle::{CircleTest, circle};
 use super::instrument::Instrument;
 use super::machine::Machine;
-use crate::campaign::{Campaign, Run};
+use crate::campaign::{Campaign, Frame, Run};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -82,12 +82,16 @@ pub fn campaign(plan: &Plan, seed: u64) -> Campaign {
                 test.centre_m[1],
                 0.0,
             ]),
+            frame: Frame::default(),
+            setup: None,
             samples,
         }
     };
     Campaign {
         name: plan.name.clone(),
         machine: plan.machine_name.clone(),
+        repeatability_m: None,
+        table: None,
         runs: tests.par_iter().enumerate().map(run).collect(),
     }
 }

@@ -111,6 +111,8 @@ impl Instrument {
         Campaign {
             name: "hidden".into(),
             machine: "machine under test".into(),
+            repeatability_m: None,
+            table: None,
             runs,
         }
     }
@@ -166,6 +168,8 @@ impl Instrument {
             started_s: self.knows_start.then_some(test.started_s),
             temperature_c: None,
             centre_m: None,
+            frame: giotto::campaign::Frame::default(),
+            setup: None,
             samples: Samples {
                 angle_rad,
                 deviation_m,

@@ -7,7 +7,7 @@ use core::f32::consts::TAU;
 use core::num::NonZeroU64;
 use giotto_shared::angle::{RAD_PER_UNIT, sincos};
 use giotto_shared::fixed::single_to_fixed;
-use giotto_shared::law::{CyclicError, Profile};
+use giotto_shared::law::{CyclicError, Profile as Whole, Spike};
 
 fn nm2(metres: f32) -> i32 {
     single_to_fixed(metres * 1e9, 1)
@@ -15,6 +15,40 @@ fn nm2(metres: f32) -> i32 {
 
 fn fine(metres: f32) -> i32 {
     single_to_fixed(metres * 1e9, FINE)
+}
+
+/// The terms of X and Y.
+struct Profile {
+    radius_offset_m: f32,
+    position: [[f32; 2]; 2],
+    velocity_s: [[f32; 2]; 2],
+    acceleration_s2: [[f32; 2]; 2],
+    backlash_m: [f32; 2],
+    lateral_m: [f32; 2],
+    spike: [Spike<f32>; 2],
+    cyclic: [CyclicError<f32>; 2],
+    bow_per_m: [f32; 2],
+}
+
+impl Profile {
+    fn of(p: &Whole<f32>) -> Self {
+        let ([[xx, xy, _], [yx, yy, _], _], [bx, by, _], [ax, ay, _]) =
+            (p.position, p.velocity_s, p.acceleration_s2);
+        let ([[px, pxy, _], [pyx, py, _], _], [sx, sy, _]) = (p.play_m, p.spike);
+        let [[_, bow_x, _], [bow_y, ..], _] = p.bow_per_m;
+        let [c0, c1, _] = p.cyclic;
+        Self {
+            radius_offset_m: p.radius_offset_m,
+            position: [[xx, xy], [yx, yy]],
+            velocity_s: [[bx, 0.0], [0.0, by]],
+            acceleration_s2: [[ax, 0.0], [0.0, ay]],
+            backlash_m: [px, py],
+            lateral_m: [-pxy, pyx],
+            spike: [sx, sy],
+            cyclic: [c0, c1],
+            bow_per_m: [bow_x, bow_y],
+        }
+    }
 }
 
 /// A row of a matrix times X and Y of a vector.
@@ -25,12 +59,13 @@ fn by([a, b]: [f32; 2], [x, y]: [f32; 2]) -> f32 {
 /// For an arc with vectors u and v (m), its centre seen from the reference point (m). Written in place, as all of these:
 /// they are large.
 pub(super) fn on_arc(
-    p: &Profile<f32>,
+    p: &Whole<f32>,
     m: &Motion,
     [u, v]: [[f32; 3]; 2],
     centre: [f32; 2],
     extra: &mut Extra,
 ) {
+    let p = &Profile::of(p);
     unsteady(p, m, extra);
     let ([ux, uy, uz], [vx, vy, vz]) = (u, v);
     let outward = -p.radius_offset_m / super::numbers::length(u);
@@ -88,12 +123,13 @@ pub(super) fn on_arc(
 /// For a line with a span (m), its start seen from the reference point (m); `None`: there is none, and errors of position
 /// are left out.
 pub(super) fn on_line(
-    p: &Profile<f32>,
+    p: &Whole<f32>,
     m: &Motion,
     span: [f32; 3],
     start: Option<[f32; 2]>,
     extra: &mut Extra,
 ) {
+    let p = &Profile::of(p);
     unsteady(p, m, extra);
     let [sx, sy, _] = span;
     let along = [sx, sy];
@@ -119,7 +155,7 @@ pub(super) fn on_line(
 
 /// The terms that are the same on every curve.
 #[inline(never)]
-fn unsteady(p: &Profile<f32>, m: &Motion, extra: &mut Extra) {
+fn unsteady(p: &Profile, m: &Motion, extra: &mut Extra) {
     let ticks = m.take_up_ticks as f32;
     let share = 3.75 / ticks;
     // By the sense of X, then of Y.
@@ -152,7 +188,7 @@ fn unsteady(p: &Profile<f32>, m: &Motion, extra: &mut Extra) {
 
 /// A periodic error. Over a metre of a fine pitch single precision would lose its phase: this divides integers.
 fn periodic(c: &CyclicError<f32>) -> Cyclic {
-    let axis = |value: i32| if c.axis == 1 { [0, value] } else { [value, 0] };
+    let axis = |value: i32| if c.slide == 1 { [0, value] } else { [value, 0] };
     // 2³² units a pitch, per nm: Q24, from a pitch in units of 2⁻³⁷ m, which every pitch from 0.1 mm on is a whole number of.
     const UNITS_PER_NM: u64 = ((1u128 << (32 + 37 + 24)) / 1_000_000_000) as u64;
     let pitch = NonZeroU64::new((c.pitch_m * (1u64 << 37) as f32) as u64);
@@ -191,11 +227,12 @@ fn decay(y: f32) -> f32 {
 
 /// Offset (m) and slew (m/s) that all terms together ask for on an arc at most: the sum of each one's own largest.
 pub(super) fn worst_on_arc(
-    p: &Profile<f32>,
+    p: &Whole<f32>,
     m: &Motion,
     radius: f32,
     [cx, cy]: [f32; 2],
 ) -> [f32; 2] {
+    let p = &Profile::of(p);
     let row = |matrix: [[f32; 2]; 2]| {
         let [x, y] = matrix.map(|[a, b]| a.abs() + b.abs());
         x.max(y)
@@ -249,7 +286,7 @@ mod tests {
     fn a_periodic_error_keeps_its_phase_over_a_metre() {
         for pitch_m in [1e-4f32, 3e-4, 0.0025, 0.01, 0.37, 10.0] {
             let c = CyclicError {
-                axis: 0,
+                slide: 0,
                 amplitude_m: 1e-6,
                 pitch_m,
                 phase_rad: 0.0,

@@ -10,7 +10,7 @@ use core::f64::consts::{PI, TAU};
 use giotto_shared::model::Cumulants;
 use giotto_shared::table::{Limits, Table, Travel, Zone};
 use giotto_shared::term::Term;
-use giotto_shared::{Axis, Direction};
+use giotto_shared::{Actuator, Direction, Plane};
 
 /// SplitMix64.
 pub(super) struct Random(pub(super) u64);
@@ -56,32 +56,41 @@ fn table(random: &mut Random) -> Table {
             terms.push(term).unwrap();
         }
     };
-    term(Term::ScaleMismatch { relative: 100e-6 });
-    term(Term::Squareness { shear_rad: -80e-6 });
+    term(Term::ScaleMismatch {
+        plane: Plane::Xy,
+        relative: 100e-6,
+    });
+    term(Term::Squareness {
+        plane: Plane::Xy,
+        shear_rad: -80e-6,
+    });
     term(Term::ServoMismatch {
+        plane: Plane::Xy,
         delta_tau_s: 100e-6,
     });
     term(Term::Backlash {
-        axis: Axis::X,
+        actuator: Actuator::X,
         step_m: 12e-6,
     });
     term(Term::LateralPlay {
-        axis: Axis::Y,
+        actuator: Actuator::Y,
+        across: Actuator::X,
         shift_m: 7e-6,
     });
     term(Term::ReversalSpike {
-        axis: Axis::X,
+        actuator: Actuator::X,
         peak_m: 8e-6,
         decay_s: 0.05,
     });
     term(Term::Cyclic {
-        axis: Axis::Y,
+        actuator: Actuator::Y,
         amplitude_m: 3e-6,
         pitch_m: 0.01,
         phase_rad: 0.5,
     });
     term(Term::Straightness {
-        axis: Axis::X,
+        actuator: Actuator::X,
+        across: Actuator::Y,
         curvature_per_m: 1e-4,
     });
     let zone = Zone {

@@ -212,6 +212,8 @@ fn run(
         started_s: None,
         temperature_c: None,
         centre_m: None,
+        frame: giotto::campaign::Frame::default(),
+        setup: None,
         samples: plan.instrument.record(&test, &trace, &mut rng),
     };
     let analysis = analysis::of_run(&run, None)?;

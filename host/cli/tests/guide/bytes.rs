@@ -8,7 +8,7 @@ use giotto_shared::wire::{
     self, Command, ExactSegment, FromController, MAX_FRAME, Reply, Request, SetPoint, SetPoints,
     Steps,
 };
-use giotto_shared::{Axis, Direction};
+use giotto_shared::{Actuator, Direction};
 use serde::Serialize;
 
 fn dump(bytes: &[u8]) -> String {
@@ -256,7 +256,7 @@ fn the_table_is_that_of_the_page() {
     };
     zone.terms
         .push(Term::Backlash {
-            axis: Axis::X,
+            actuator: Actuator::X,
             step_m: 8e-6,
         })
         .unwrap();

@@ -7,7 +7,9 @@ use super::trim::Turns;
 use crate::campaign::manifest::{Entry, Manifest};
 use crate::campaign::run_file::RunFile;
 use crate::campaign::table::Batch;
-use crate::campaign::{CampaignError, Direction, Frame, Note, Place, Problem, samples, write};
+use crate::campaign::{
+    CampaignError, Direction, Location, Note, Place, Plane, Problem, samples, write,
+};
 use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -35,6 +37,10 @@ pub struct Options {
     pub temperature_c: Option<f64>,
     /// Centre in the machine, m.
     pub centre_m: Option<[f64; 3]>,
+    /// Plane of the circle; points in space tell it themselves.
+    pub plane: Option<Plane>,
+    /// Set-up that the run belongs to.
+    pub setup: Option<String>,
     /// Machine, for a campaign that is new.
     pub machine: Option<String>,
     /// Which laps become runs.
@@ -57,6 +63,8 @@ impl Options {
             started_s: self.started_s,
             temperature_c: self.temperature_c,
             centre_m: self.centre_m,
+            plane: self.plane,
+            setup: self.setup.clone(),
             arc_rad: None,
             slice: Some(slice),
         }
@@ -106,7 +114,7 @@ pub struct Added {
     /// Angle covered, rad, where it is no whole turn.
     pub arc_rad: Option<f64>,
     /// Where the circle lies, for positions.
-    pub frame: Option<Frame>,
+    pub location: Option<Location>,
     /// Measured duration of the turn, s.
     pub turn_s: Option<f64>,
     /// Radius of the circle that the controller wanted, m, where the file has it.
@@ -201,7 +209,7 @@ fn laps(path: &Path, options: &Options, progress: &dyn Fn(u64)) -> Result<Vec<La
             left_out: (feed_in, feed_out),
             direction,
             arc_rad,
-            frame: None,
+            location: None,
             turn_s: None,
             target_radius_m,
             notes: Vec::new(),
@@ -238,6 +246,8 @@ pub fn open(
             path: path.to_path_buf(),
             name,
             machine,
+            repeatability_m: None,
+            table: None,
             runs,
             notes: Vec::new(),
         },
@@ -256,7 +266,8 @@ fn stage(
         for Lap { entry, mut added } in laps(path, options, &|bytes| progress(path, bytes))? {
             // Read as any command would read it; what it is refused for it is refused for here.
             let loaded = samples::load(&entry, false)?;
-            (added.frame, added.turn_s, added.notes) = (loaded.frame, loaded.turn_s, loaded.notes);
+            (added.location, added.turn_s, added.notes) =
+                (loaded.location, loaded.turn_s, loaded.notes);
             drop(loaded.run);
             let file = write_rows(&entry, loaded.clocked, dir)?;
             staged.push(Staged { file, added });
