@@ -1,5 +1,5 @@
 //! The corrected program on the simulated machine, and before readers that are not ours.
-use super::state::{Action, State};
+use super::state::{Action, Reading, State};
 use super::{Compensated, Fate, Options, compensate, tests::model, word};
 use giotto::model_file::{ModelFile, Servo};
 use giotto::simulation::machine::{AccDec, PositionLoop};
@@ -126,8 +126,9 @@ impl Stretch {
 
 /// Chains of feed moves in the plane that are passed without a stop, with the line each starts in.
 fn chains(program: &[u8]) -> Vec<Vec<Stretch>> {
-    let mut state = State::new();
-    chains_of(word::lines(program).iter().map(|line| state.step(line)))
+    let mut state = State::new(Reading::default());
+    let lines = word::lines(program).enumerate();
+    chains_of(lines.map(|(i, line)| state.step(i + 1, &line)))
 }
 
 fn chains_of(actions: impl Iterator<Item = Action>) -> Vec<Vec<Stretch>> {
@@ -148,7 +149,7 @@ fn chains_of(actions: impl Iterator<Item = Action>) -> Vec<Vec<Stretch>> {
                 sweep_rad: a.sweep_rad,
             }),
             Action::LostArc(left) => panic!("{left}"),
-            Action::Other => None,
+            Action::Stop | Action::Other => None,
         };
         let last = list
             .last()
