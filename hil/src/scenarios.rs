@@ -42,7 +42,7 @@ impl From<ControllerError> for Trouble {
     }
 }
 
-/// Those that no busy host can spoil, in the order they run in; the others are in [`streams`](crate::streams::ALL).
+/// In the order they run in; the others are in [`streams`](crate::streams::ALL).
 pub const ALL: [Scenario; 9] = [
     ("says who it is", identity),
     ("a circle bypassed is the programmed one", bypassed_circle),

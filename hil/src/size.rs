@@ -143,7 +143,12 @@ fn deepest_stack(
     note: &mut dyn FnMut(&str),
 ) -> Result<u32, ControllerError> {
     use giotto_shared::wire::Command;
-    let emulator = Emulator::start_board(board, Some(image), Pace::Fast, note)?;
+    let pace = if board.always_steps() {
+        Pace::Stepped
+    } else {
+        Pace::Free
+    };
+    let emulator = Emulator::start_board(board, Some(image), pace, note)?;
     let mut controller = Controller::connect(Box::new(emulator.into_link()?), "qemu", 1)?;
     controller.supervise(None)?;
     // Where the emulator has no flash, neither does what comes after it use any stack.

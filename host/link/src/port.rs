@@ -47,8 +47,6 @@ pub struct OpenOptions {
     pub image: Option<PathBuf>,
     /// Baud rate of a serial device.
     pub baud: u32,
-    /// How fast time goes in the emulator.
-    pub pace: Pace,
 }
 
 impl Default for OpenOptions {
@@ -56,7 +54,6 @@ impl Default for OpenOptions {
         Self {
             image: None,
             baud: BAUD,
-            pace: Pace::Fast,
         }
     }
 }
@@ -78,11 +75,18 @@ pub fn open(
             } else {
                 Board::Mps2An386
             };
-            let emulator =
-                Emulator::start_board(board, options.image.as_deref(), options.pace, note)?;
+            let image = options.image.as_deref();
+            let pace = if image.is_none() || board.always_steps() {
+                Pace::Stepped
+            } else {
+                Pace::Free
+            };
+            let emulator = Emulator::start_board(board, image, pace, note)?;
             let mut controller = Controller::connect(Box::new(emulator.into_link()?), "qemu", 1)?;
-            // Its time does not wait for ours: a second of silence there may be a moment here.
-            controller.supervise(None)?;
+            if pace == Pace::Free {
+                // Its time does not wait for ours: a second of silence there may be a moment here.
+                controller.supervise(None)?;
+            }
             Ok(controller)
         }
         Port::Device(path) => {

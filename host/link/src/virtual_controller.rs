@@ -1,8 +1,7 @@
 //! The firmware's library on the host: the same server, store, planner and tick, over a flash in memory.
 //!
 //! In this process ([`VirtualLink`]) time is simulated: it passes only while someone waits for an answer, as fast
-//! as the ticks can be computed. Behind a pty ([`serve`]) it is the clock's.
-use super::error::ControllerError;
+//! as the ticks can be computed. Behind a pty ([`serve`](super::serve::serve)) it is the clock's.
 use super::link::Link;
 use giotto_firmware::control::{Desk, Job, Receiver, SEGMENTS, SET_POINTS, Sender, Shared, Tick};
 use giotto_firmware::engine::{Config, Executor, Planner};
@@ -10,9 +9,9 @@ use giotto_firmware::server::{Board, Buffers, Server, TimedSetPoint};
 use giotto_firmware::store::{Layout, ram::RamFlash};
 use std::collections::VecDeque;
 use std::convert::Infallible;
-use std::io::{self, Read, Write};
+use std::io;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Ticks a second.
 pub const TICK_HZ: u32 = 1000;
@@ -241,49 +240,5 @@ impl Link for VirtualLink {
 
     fn now(&self) -> Duration {
         Duration::from_millis(self.controller.ticks * 1000 / u64::from(TICK_HZ))
-    }
-}
-
-/// Serves a virtual controller on a pty, by the clock, until the process ends. `ready` is told the path once
-/// it can be opened.
-///
-/// # Errors
-/// Those of the pty.
-pub fn serve(ready: &mut dyn FnMut(&str)) -> Result<Infallible, ControllerError> {
-    use serialport::{SerialPort, TTYPort};
-    let cannot = |reason: String| ControllerError::CannotOpen {
-        port: "pty".to_owned(),
-        reason,
-    };
-    let (mut near, far) = TTYPort::pair().map_err(|error| cannot(error.description))?;
-    let path = far
-        .name()
-        .ok_or_else(|| cannot("it has no name".to_owned()))?;
-    // Closed, because it is locked: a client could not open it. Until one does, the near end reads as hung up.
-    drop(far);
-    near.set_timeout(Duration::from_millis(1))
-        .map_err(|error| cannot(error.description))?;
-    ready(&path);
-    let mut controller = VirtualController::default();
-    let started = Instant::now();
-    let mut buffer = [0; 4096];
-    loop {
-        match near.read(&mut buffer) {
-            Ok(count) => controller.receive(&buffer[..count]),
-            Err(error)
-                if matches!(
-                    error.kind(),
-                    io::ErrorKind::TimedOut | io::ErrorKind::Interrupted
-                ) => {}
-            // No client: nothing to do but to let time pass.
-            Err(_) => std::thread::sleep(Duration::from_millis(5)),
-        }
-        let due = (started.elapsed().as_secs_f64() * f64::from(TICK_HZ)) as u64;
-        while controller.ticks < due {
-            controller.step();
-            let count = controller.take(&mut buffer);
-            // A client that went away, or does not read, loses what it does not take; it will ask again.
-            let _ = near.write_all(&buffer[..count]);
-        }
     }
 }

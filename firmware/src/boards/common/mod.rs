@@ -20,6 +20,8 @@ pub mod interrupt;
 pub mod log;
 pub mod port;
 pub mod stack;
+#[cfg(feature = "stepped")]
+pub mod steps;
 
 use core::cell::Cell;
 use cortex_m::peripheral::scb::SystemHandler;
@@ -78,6 +80,10 @@ fn SysTick() {
         *OWNED = critical_section::with(|token| TICK.borrow(token).take());
         return;
     };
+    #[cfg(feature = "stepped")]
+    if !steps::may_pass() {
+        return;
+    }
     SHARED.set_stop_input(super::stop::active());
     tick.tick(*LATE);
     *LATE = SCB::is_pendst_pending();
@@ -124,6 +130,9 @@ pub struct Ports<L, S, G> {
     pub log: G,
     /// Feeds the watchdog.
     pub feed: fn(),
+    /// Stops what counts time on its own, where ticks pass as the host grants them.
+    #[cfg(feature = "stepped")]
+    pub still: fn(),
     /// Bytes the link has lost since it was last asked.
     pub lost: fn() -> u32,
 }
@@ -133,7 +142,7 @@ pub fn background<F, L, S, G>(
     board: Board,
     flash: F,
     layout: Layout,
-    (desk, buffers): (BoardDesk, &'static mut Buffers),
+    (desk, buffers, syst): (BoardDesk, &'static mut Buffers, SYST),
     mut ports: Ports<L, S, G>,
 ) -> !
 where
@@ -152,6 +161,14 @@ where
     }
     let mut rounds: u8 = 0;
     let mut idle = idle::Idle::new();
+    #[cfg(feature = "stepped")]
+    let mut link = steps::Stepped::new(ports.link, syst, ports.still);
+    #[cfg(not(feature = "stepped"))]
+    let mut link = {
+        // The counter runs on by itself.
+        let _ = syst;
+        ports.link
+    };
     loop {
         (ports.feed)();
         server.count_lost_bytes((ports.lost)());
@@ -160,7 +177,7 @@ where
         }
         rounds = rounds.wrapping_add(1);
         // A port that fails loses what was being sent; the host asks again.
-        let _ = server.serve(&mut ports.link);
+        let _ = server.serve(&mut link);
         if let Some(stream) = &mut ports.stream {
             let _ = server.stream(stream);
         }
@@ -168,9 +185,17 @@ where
         if server.reset_requested() {
             defmt::info!("reset");
             log::drain(&mut ports.log);
+            #[cfg(feature = "stepped")]
+            link.close();
             SCB::sys_reset();
         }
-        if let Some(permille) = idle.sleep() {
+        #[cfg(feature = "stepped")]
+        link.round();
+        #[cfg(feature = "stepped")]
+        let may_sleep = || link.may_sleep();
+        #[cfg(not(feature = "stepped"))]
+        let may_sleep = || true;
+        if let Some(permille) = idle.sleep(may_sleep) {
             server.note_idle(permille);
         }
     }

@@ -7,7 +7,8 @@
 //! | UART2 | the log, in defmt's encoding (`defmt-print -e IMAGE`) |
 //!
 //! Tables are kept in a window of code memory that behaves like NOR flash; it survives a warm reset, not the
-//! end of the emulator. Never run on the FPGA board itself.
+//! end of the emulator. Once the host grants ticks, time passes as it does (`common::steps`). Never run on the FPGA
+//! board itself.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
@@ -63,9 +64,9 @@ mod image {
             let link = uart::Uart::link()?;
             common::interrupt::enable::<{ vectors::LINK }>(&mut core.NVIC);
             let desk = common::start(&mut core.SYST, &mut core.SCB, CLOCK_HZ)?;
-            Some((link, desk, common::buffers()?))
+            Some((link, desk, common::buffers()?, core.SYST))
         });
-        let Some((link, desk, buffers)) = started else {
+        let Some((link, desk, buffers, syst)) = started else {
             cortex_m::asm::udf()
         };
         if cfg!(feature = "echo") {
@@ -77,13 +78,14 @@ mod image {
             stream: Some(uart::Uart::stream()),
             log: uart::Uart::log(),
             feed: watchdog::feed,
+            still: watchdog::stop,
             lost: common::port::lost,
         };
         common::background(
             BOARD,
             flash::Window::new(),
             flash::LAYOUT,
-            (desk, buffers),
+            (desk, buffers, syst),
             ports,
         )
     }

@@ -68,7 +68,7 @@ pub fn start() -> Clock {
         }
     } else {
         // The emulator's SysTick counts 168 MHz all the same.
-        let core_hz = if cfg!(feature = "awake") {
+        let core_hz = if cfg!(feature = "stepped") {
             CORE_HZ
         } else {
             HSI_HZ

@@ -57,9 +57,9 @@ mod image {
             let link = usart::Usart::link(&clock)?;
             common::interrupt::enable::<{ vectors::LINK }>(&mut core.NVIC);
             let desk = common::start(&mut core.SYST, &mut core.SCB, clock.core_hz)?;
-            Some((link, desk, common::buffers()?))
+            Some((link, desk, common::buffers()?, core.SYST))
         });
-        let Some((link, desk, buffers)) = started else {
+        let Some((link, desk, buffers, syst)) = started else {
             cortex_m::asm::udf()
         };
         if clock.fell_back {
@@ -71,13 +71,16 @@ mod image {
             stream: None::<common::port::Port<usart::Usart>>,
             log: usart::Usart::log(&clock),
             feed: watchdog::feed,
+            // The emulator has no watchdog of this part.
+            #[cfg(feature = "stepped")]
+            still: || {},
             lost: common::port::lost,
         };
         common::background(
             BOARD,
             flash::Sectors::new(),
             flash::LAYOUT,
-            (desk, buffers),
+            (desk, buffers, syst),
             ports,
         )
     }
