@@ -179,10 +179,13 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
 
     /// Looks whether the link is still alive; to be called again and again.
     pub fn supervise(&mut self) {
-        if self.supervision.silent(self.motion.now())
-            && self.supervision.dead(self.motion.snapshot().state)
+        let now = self.motion.now();
+        if self.supervision.silent(now) && self.supervision.dead(self.motion.snapshot().state, now)
         {
             self.motion.hold();
+        }
+        if self.supervision.overdue(now) {
+            self.motion.stop();
         }
     }
 
@@ -224,10 +227,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
 
     /// The next frame of set-points, once it is full or the run has ended.
     fn set_points(&mut self) -> Option<&[u8]> {
-        let moving = matches!(
-            self.motion.snapshot().state,
-            MotionState::Running | MotionState::Stopping
-        );
+        let moving = self.motion.snapshot().state.is_run();
         if moving && self.motion.set_points_waiting() < SET_POINTS {
             return None;
         }
@@ -301,10 +301,23 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
                 self.idle()?;
                 self.reset = true;
             }
+            Command::ClearFault => self.motion.clear_fault().map_err(Refusal::Motion)?,
+            Command::Declare { place_nm } => {
+                self.motion.declare(*place_nm).map_err(Refusal::Motion)?
+            }
+            Command::Pause => self.motion.pause(true).map_err(Refusal::Motion)?,
+            Command::Resume => self.motion.pause(false).map_err(Refusal::Motion)?,
+            Command::Override { percent } => self.set_override(*percent)?,
             Command::Supervise { after_ms } => self.supervision.set(*after_ms),
             Command::Provision { key } => self.provision(*key)?,
         }
         Ok(Reply::Done)
+    }
+
+    fn set_override(&mut self, percent: u8) -> Result<(), Refusal> {
+        bounds::check_override(percent).map_err(Refusal::Motion)?;
+        self.motion.set_override(percent);
+        Ok(())
     }
 
     /// Sends every so many ticks' set-point, on the link or on the port for set-points; 0: none.
@@ -316,7 +329,9 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     fn idle(&self) -> Result<(), Refusal> {
         match self.motion.snapshot().state {
             MotionState::Idle | MotionState::Fault => Ok(()),
-            MotionState::Running | MotionState::Stopping => Err(Refusal::Busy),
+            MotionState::Running | MotionState::Stopping | MotionState::Paused => {
+                Err(Refusal::Busy)
+            }
         }
     }
 
@@ -425,6 +440,8 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             idle_permille: self.idle_permille,
             raw_nm: now.raw_nm,
             corrected_nm: now.corrected_nm,
+            position: now.position,
+            override_percent: now.override_percent,
             counters: Counters {
                 tick_overruns: now.tick_overruns,
                 offset_clamps: now.offset_clamps,

@@ -38,8 +38,8 @@ pub use crc::{Crc32, crc32};
 pub use frame::{Accumulator, FrameCounts, MAX_FRAME, MAX_PAYLOAD, encode};
 pub use message::{
     CHUNK, Chunk, Command, Counters, FaultCause, FromController, IN_FLIGHT, Identity, MotionState,
-    POINTS, PROTOCOL_VERSION, Pose, Probation, Reply, Request, SET_POINTS, SUPERVISE_MS, SetPoint,
-    SetPoints, SlotState, Status, TableInfo,
+    OVERRIDE_PERCENT, POINTS, PROTOCOL_VERSION, Pose, PositionState, Probation, Reply, Request,
+    SET_POINTS, SUPERVISE_MS, SetPoint, SetPoints, SlotState, Status, TableInfo,
 };
 pub use reader::take;
 pub use refusal::{FlashFault, MotionRefusal, Refusal};

@@ -116,7 +116,7 @@ pub enum MotionRefusal {
     #[error("no program or stream of this kind is open, or it was stopped")]
     NoProgram,
     /// The engine is in fault.
-    #[error("the controller is in fault; reset it")]
+    #[error("the controller is in fault; clear it")]
     Fault,
     /// Not possible in the present state.
     #[error("a run is in progress")]
@@ -129,4 +129,13 @@ pub enum MotionRefusal {
     /// The stop input is active.
     #[error("the stop input is active")]
     StopInput,
+    /// Nobody has said where the machine stands.
+    #[error("where the machine stands is not known")]
+    NoPosition,
+    /// A set-point from which a stop would lead out of the workspace.
+    #[error("a stop from there would lead out of the workspace")]
+    NoRoomToStop,
+    /// Nothing runs that could be held, or it is a stream, whose feed is its sender's.
+    #[error("nothing runs whose feed could be held")]
+    NotHeld,
 }

@@ -170,14 +170,14 @@ impl Executor {
     /// The last tick: at its end exactly.
     #[inline(never)]
     pub(super) fn arc_standstill(&mut self) -> Output {
-        self.counters.segments = self.counters.segments.wrapping_add(1);
         let terms = self.mode == Mode::TermFall;
         self.mode = Mode::Rest;
-        // A stop ends elsewhere than was planned.
-        let planned = self.end == self.segment.timing.end;
+        // A stop and a feed hold end elsewhere than was planned.
+        let planned = self.end == self.segment.timing.end && self.pausing.is_none();
+        self.phase = self.end;
+        self.stands();
         let mut wanted = [0; 3];
         if terms || !planned {
-            self.phase = self.end;
             let (c, s) = sincos_with(self.sincos, (self.end >> 32) as u32);
             let [x, y, z] = &self.segment.axes;
             self.rest_nm = [x.on_arc(c, s), y.on_arc(c, s), z.on_arc(c, s)];

@@ -26,6 +26,9 @@ impl Executor {
                 self.cruise()
             }
         };
+        if self.pause {
+            self.begin_pause();
+        }
         // The last tick of the ramp is not yet one at constant feed.
         out.flags &= !flag::CRUISE;
         out
@@ -33,13 +36,13 @@ impl Executor {
 
     #[inline(never)]
     pub(super) fn standstill(&mut self) -> Output {
-        self.counters.segments = self.counters.segments.wrapping_add(1);
         self.set_phase(self.end);
+        self.stands();
         self.mode = Mode::Rest;
         let phase_q32 = (self.phase >> 32) as u32;
         let (c, s) = self.weights(phase_q32);
         self.rest_nm = self.place(c, s, phase_q32);
-        if self.end == self.segment.timing.end {
+        if self.end == self.segment.timing.end && !self.held {
             self.rest_nm = self.segment.end_nm;
         }
         self.rest_offset_nm = self.standing_offset(c, s);
@@ -61,6 +64,12 @@ impl Executor {
     #[inline(never)]
     pub(super) fn rest(&mut self, inbox: &mut impl Inbox) -> Output {
         self.halting = false;
+        if self.held {
+            return self.pause_tick();
+        }
+        if self.pause {
+            return self.finish(self.rest_nm, self.rest_offset_nm, 0);
+        }
         // At rest nothing else needs the segment in hand.
         if inbox.take(&mut self.segment) {
             if self.segment.epoch != self.epoch || self.fault.is_some() {
@@ -101,6 +110,7 @@ impl Executor {
             }
             self.target_nm = self.standing_offset(c, s);
         }
+        (self.from, self.from_turns) = (self.segment.timing.start, 0);
     }
 
     /// Moves the offset from what it is to what the segment starts with, then lets the segment begin.
@@ -124,7 +134,7 @@ impl Executor {
         self.finish(self.rest_nm, offset, flag::SETTLING)
     }
 
-    fn begin_segment(&mut self) {
+    pub(super) fn begin_segment(&mut self) {
         let timing = self.segment.timing;
         self.left = timing.cruise_ticks;
         self.mode = match self.segment.kind {
@@ -138,8 +148,7 @@ impl Executor {
             self.guard.rely_on_plan();
         }
         self.clock = Clock::rising(timing.clock_step);
-        self.phase = timing.start;
-        self.turns = 0;
+        (self.phase, self.turns) = (self.from, self.from_turns);
         self.end = timing.end;
     }
 

@@ -166,6 +166,7 @@ impl Planner {
             window_s: self.machine.stream_window_s,
             feed_m_s,
             acceleration_m_s2: self.machine.acceleration_m_s2,
+            jerk_m_s3: self.machine.jerk_m_s3,
             hold_ticks: self.machine.stream_hold_ticks,
             engage_ticks: self.machine.engage_ticks,
             bounds_nm: self.machine.bounds_nm(bounds.offset_m, bounds.slew_m_s),
@@ -241,6 +242,11 @@ impl Planner {
             tick_s: self.machine.tick_s,
             take_up_ticks: self.machine.take_up_ticks,
         }
+    }
+
+    /// Largest feed of the machine, m/s.
+    pub const fn feed_limit(&self) -> f32 {
+        self.machine.feed_m_s
     }
 
     fn check_feed(&self, feed: f32) -> Result<(), Refused> {

@@ -95,6 +95,8 @@ fn largest_messages_fit() {
         generation: Some(most),
     });
     reply(Reply::Status(Status {
+        position: PositionState::Kept,
+        override_percent: u8::MAX,
         motion: MotionState::Fault,
         fault: Some(FaultCause::Discontinuity),
         stop_input: true,
