@@ -143,7 +143,7 @@ pub(crate) fn at_rest(controller: &mut Controller) -> Result<Status, Trouble> {
     for _ in 0..100_000 {
         let status = controller.status()?;
         match status.motion {
-            MotionState::Running | MotionState::Stopping => {}
+            MotionState::Running | MotionState::Stopping | MotionState::Paused => {}
             MotionState::Idle => return Ok(status),
             MotionState::Fault => {
                 return Err(Trouble::Wrong(format!("in fault: {:?}", status.fault)));

@@ -4,7 +4,7 @@ use super::ports::{Receiver, Sender};
 use super::shared::{DECLARE, Shared};
 use super::{SEGMENTS, STREAM_PLACES};
 use crate::engine::{
-    FARTHEST_NM, MAX_POSITION_M, Planned, Planner, Refused, ZoneError, farthest_nm,
+    Config, FARTHEST_NM, MAX_POSITION_M, Planned, Planner, Refused, ZoneError, farthest_nm,
 };
 use crate::server::{Motion, Snapshot, TimedSetPoint};
 use core::ops::{Deref, DerefMut};
@@ -223,6 +223,8 @@ fn in_words(refused: Refused) -> MotionRefusal {
     match refused {
         Refused::Busy => MotionRefusal::Busy,
         Refused::Fault => MotionRefusal::Fault,
+        Refused::SoftLimit(axis) => MotionRefusal::SoftLimit { axis },
+        Refused::OutOfBounds(Quantity::Length) => MotionRefusal::TooLong,
         Refused::NotANumber(quantity) | Refused::OutOfBounds(quantity) => {
             MotionRefusal::Path(quantity)
         }
@@ -282,7 +284,13 @@ where
         // At rest the queue is empty, and it has room for both.
         let feed_m_s = self.overridden(run.feed_m_s);
         let run = ExactCircle { feed_m_s, ..*run };
-        self.plan(|planner, planned| planner.approach(&run, planned))?;
+        self.planner.soft_circle(&run).map_err(in_words)?;
+        self.plan(|planner, planned| {
+            let moves = planner.approach(&run, planned);
+            // The way there is not what was asked for.
+            planned.leave_out();
+            moves
+        })?;
         self.plan(|planner, planned| planner.circle(&run, planned).map(|()| true))
     }
 
@@ -342,6 +350,10 @@ where
         let mut job = Job::Points(Points::NONE);
         if let Job::Points(points) = &mut job {
             streamed.read(bytes, points)?;
+            let count = usize::from(points.count);
+            for place_nm in points.place_nm.iter().take(count) {
+                self.planner.soft_place(place_nm).map_err(in_words)?;
+            }
         }
         let sent = self.segments.send(&job);
         streamed.batches = streamed.batches.saturating_add(1);
@@ -382,6 +394,14 @@ where
     fn hold(&mut self) {
         self.shared.hold.store(true, Relaxed);
         self.shared.set_program(false);
+    }
+
+    fn configure(&mut self, config: &Config) -> Result<(), MotionRefusal> {
+        if self.snapshot().state.is_run() {
+            return Err(MotionRefusal::Busy);
+        }
+        self.planner.set_config(config);
+        Ok(())
     }
 
     fn pause(&mut self, on: bool) -> Result<(), MotionRefusal> {

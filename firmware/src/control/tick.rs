@@ -66,6 +66,7 @@ where
             self.stream
                 .start(&plan, self.executor.rest_nm(), 0, self.bypass);
             self.streaming = true;
+            self.executor.count_uncorrected(!plan.corrected());
         }
         self.now = self.now.wrapping_add(1);
         let state = self.state();

@@ -1,4 +1,5 @@
 //! What the server needs of an engine.
+use crate::engine::Config;
 use giotto_shared::wire::{
     ExactCircle, ExactSegment, FaultCause, MotionRefusal, MotionState, Pose, PositionState,
     Refusal, SetPoint,
@@ -121,6 +122,12 @@ pub trait Motion {
 
     /// The segment in hand finishes; what waits is thrown away. Until the next program is accepted.
     fn hold(&mut self);
+
+    /// Plans within these limits from now on.
+    ///
+    /// # Errors
+    /// [`MotionRefusal::Busy`].
+    fn configure(&mut self, config: &Config) -> Result<(), MotionRefusal>;
 
     /// Holds the feed within limits (`true`), or lets it go on.
     ///

@@ -5,6 +5,7 @@ use super::error::ControllerError;
 use super::image::Board;
 use super::serial::SerialLink;
 use super::virtual_controller::VirtualLink;
+use giotto_shared::wire::{Command, PositionState};
 use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -83,6 +84,10 @@ pub fn open(
             };
             let emulator = Emulator::start_board(board, image, pace, note)?;
             let mut controller = Controller::connect(Box::new(emulator.into_link()?), "qemu", 1)?;
+            if controller.status()?.position == PositionState::Unknown {
+                // Nothing hangs on an emulated board: it stands where we say.
+                controller.command(Command::Declare { place_nm: [0; 3] })?;
+            }
             if pace == Pace::Free {
                 // Its time does not wait for ours: a second of silence there may be a moment here.
                 controller.supervise(None)?;

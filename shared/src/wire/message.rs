@@ -1,5 +1,5 @@
 //! The messages. A change here is a change of [`PROTOCOL_VERSION`].
-use super::Refusal;
+use super::{ClockSource, EVENTS, Event, MachineConfig, Refusal, ResetCause};
 use crate::path::{ExactCircle, ExactSegment};
 use serde::de::{Error, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -152,6 +152,17 @@ pub enum Command {
         /// [`OVERRIDE_PERCENT`].
         percent: u8,
     },
+    /// The limits in use → [`Reply::Config`].
+    Config,
+    /// At rest: use these limits from now on. A restart brings back those that are stored.
+    Configure(MachineConfig),
+    /// At rest: store the limits in use.
+    SaveConfig,
+    /// What has happened from this number on → [`Reply::Events`].
+    Events {
+        /// Number of the first one wanted; they count from 0 at boot.
+        from: u32,
+    },
 }
 
 /// Reads an array of bytes in a loop: serde's own way is a piece of code a byte, 700 bytes of an image.
@@ -218,6 +229,20 @@ pub enum Reply {
     },
     /// Not done, and why.
     Refused(Refusal),
+    /// To [`Command::Config`].
+    Config {
+        /// In use.
+        config: MachineConfig,
+        /// They are the ones that are stored; `false` as well where none are.
+        stored: bool,
+    },
+    /// To [`Command::Events`].
+    Events {
+        /// Number of the first one below; what is older than the controller's memory is left out.
+        first: u32,
+        /// In order; none: there are no more.
+        events: heapless::Vec<Event, EVENTS>,
+    },
 }
 
 /// Who the controller is.
@@ -399,6 +424,14 @@ pub struct Status {
     pub position: PositionState,
     /// Override of the feed, percent.
     pub override_percent: u8,
+    /// Why the controller started.
+    pub reset: ResetCause,
+    /// What its ticks are counted by.
+    pub clock: ClockSource,
+    /// Longest tick seen, thousandths of the time between two; `None`: not measured.
+    pub worst_tick_permille: Option<u16>,
+    /// Stack never used since boot, bytes; 0: not measured.
+    pub stack_left_bytes: u32,
     /// Counts.
     pub counters: Counters,
 }

@@ -36,6 +36,7 @@ mod image {
     use cortex_m_rt::entry;
     use embedded_io::{Read, Write};
     use giotto_firmware::server::Board;
+    use giotto_shared::wire::{ClockSource, PositionState, ResetCause};
 
     /// Clock of core and peripherals (DAI0386 2.5).
     const CLOCK_HZ: u32 = 25_000_000;
@@ -43,6 +44,9 @@ mod image {
         name: "mps2-an386",
         build: env!("GIOTTO_BUILD"),
         tick_hz: common::TICK_HZ,
+        clock: ClockSource::Crystal,
+        // The emulator does not say.
+        reset: ResetCause::Unknown,
     };
 
     /// Sends back what comes, byte for byte: what the line itself carries (feature `echo`, for `giotto-hil link`).
@@ -63,7 +67,12 @@ mod image {
         let started = cortex_m::Peripherals::take().and_then(|mut core| {
             let link = uart::Uart::link()?;
             common::interrupt::enable::<{ vectors::LINK }>(&mut core.NVIC);
-            let desk = common::start(&mut core.SYST, &mut core.SCB, CLOCK_HZ)?;
+            let desk = common::start(
+                &mut core.SYST,
+                &mut core.SCB,
+                CLOCK_HZ,
+                PositionState::Known,
+            )?;
             Some((link, desk, common::buffers()?, core.SYST))
         });
         let Some((link, desk, buffers, syst)) = started else {

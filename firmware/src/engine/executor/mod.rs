@@ -205,6 +205,12 @@ impl Executor {
         &self.counters
     }
 
+    /// Counts what has begun without a zone of the table.
+    pub fn count_uncorrected(&mut self, uncorrected: bool) {
+        let uncorrected = u32::from(uncorrected);
+        self.counters.uncorrected = self.counters.uncorrected.wrapping_add(uncorrected);
+    }
+
     /// Why nothing runs, if so.
     pub const fn fault(&self) -> Option<Fault> {
         self.fault

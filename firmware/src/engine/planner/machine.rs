@@ -18,6 +18,7 @@ pub(super) struct Machine {
     pub(super) engage_ticks: u32,
     pub(super) stream_window_s: f32,
     pub(super) stream_hold_ticks: u32,
+    pub(super) soft_nm: [[i32; 2]; 3],
     /// Shortest ramp up to a feed f: the longer of f·[0] and √(f·[1]) seconds, by acceleration and by jerk.
     ramp: [f32; 2],
 }
@@ -42,6 +43,7 @@ impl Machine {
             engage_ticks: config.engage_ticks(),
             stream_window_s: config.stream_window_s as f32,
             stream_hold_ticks: config.stream_hold_ticks,
+            soft_nm: config.soft_nm,
             ramp: [
                 STEEPEST[0] as f32 / acceleration_m_s2,
                 STEEPEST[1] as f32 / jerk_m_s3,

@@ -22,6 +22,8 @@ const BOARD: Board = Board {
     name: "bench",
     build: "0",
     tick_hz: 1000,
+    clock: ClockSource::Crystal,
+    reset: ResetCause::Power,
 };
 
 type Cells = RamFlash<CELLS, ERASE>;
@@ -128,6 +130,10 @@ impl Motion for Bench {
 
     fn hold(&mut self) {
         self.held += 1;
+    }
+
+    fn configure(&mut self, _: &Config) -> Result<(), MotionRefusal> {
+        Ok(())
     }
 
     fn pause(&mut self, _: bool) -> Result<(), MotionRefusal> {
