@@ -204,6 +204,11 @@ impl Planned {
         self.timing.cruise_ticks as u64 + 2 * self.timing.ramp_ticks as u64
     }
 
+    /// Not counted if no zone applies.
+    pub(crate) const fn leave_out(&mut self) {
+        self.corrected = true;
+    }
+
     /// Whether a zone of the table applies.
     pub const fn corrected(&self) -> bool {
         self.corrected

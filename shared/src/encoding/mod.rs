@@ -7,3 +7,4 @@ mod writer;
 pub use crc::{Crc32, crc32};
 pub use reader::take;
 pub(crate) use writer::Writer;
+pub use writer::put;

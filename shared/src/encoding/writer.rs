@@ -23,6 +23,13 @@ impl ser::Error for Unsupported {
 
 type Done = Result<(), Unsupported>;
 
+/// Writes a value to the start of `bytes`; its length, or `None` if it does not fit.
+pub fn put<T: Serialize + ?Sized>(value: &T, bytes: &mut [u8]) -> Option<usize> {
+    let mut writer = Writer::new(bytes);
+    value.serialize(&mut writer).ok()?;
+    writer.length()
+}
+
 impl<'a> Writer<'a> {
     pub(crate) fn new(bytes: &'a mut [u8]) -> Self {
         Self { bytes, length: 0 }

@@ -22,6 +22,11 @@ impl Steps {
         }
     }
 
+    /// The step that led to the newest set-point, nm.
+    pub const fn step_nm(&self) -> [i32; 3] {
+        self.step_nm
+    }
+
     /// Appends a set-point to a message; `false`: there is no room for it, and nothing has changed.
     pub fn write(&mut self, place_nm: [i32; 3], steps: &mut Chunk) -> bool {
         let (mut changes, mut step_nm) = ([0i32; 3], [0i32; 3]);

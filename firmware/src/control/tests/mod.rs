@@ -1,4 +1,5 @@
 //! Tick and desk with the queues of a board between them: stop command, stop input, silent host, late ticks.
+mod pause;
 mod programs;
 mod streams;
 

@@ -14,6 +14,9 @@ impl Executor {
         self.left = self.segment.timing.cruise_ticks.wrapping_add(1);
         self.mode = Mode::Cruise;
         let mut out = self.cruise();
+        if self.pause {
+            self.begin_pause();
+        }
         // The last tick of the ramp is not yet one at constant feed.
         out.flags &= !flag::CRUISE;
         out
@@ -21,13 +24,13 @@ impl Executor {
 
     #[inline(never)]
     pub(super) fn standstill(&mut self) -> Output {
-        self.counters.segments = self.counters.segments.wrapping_add(1);
         self.set_phase(self.end);
+        self.stands();
         self.mode = Mode::Rest;
         let phase_q32 = (self.phase >> 32) as u32;
         let (c, s) = self.weights(phase_q32);
         self.rest_nm = self.place(c, s, phase_q32);
-        if self.end == self.segment.timing.end {
+        if self.end == self.segment.timing.end && !self.held {
             self.rest_nm = self.segment.end_nm;
         }
         self.rest_offset_nm = self.standing_offset(c, s);
@@ -45,6 +48,12 @@ impl Executor {
     #[inline(never)]
     pub(super) fn rest(&mut self, inbox: &mut impl Inbox) -> Output {
         self.halting = false;
+        if self.held {
+            return self.pause_tick();
+        }
+        if self.pause {
+            return self.finish(self.rest_nm, self.rest_offset_nm, 0);
+        }
         // At rest nothing else needs the segment in hand.
         if inbox.take(&mut self.segment) {
             if self.segment.epoch != self.epoch || self.fault.is_some() {
@@ -79,6 +88,7 @@ impl Executor {
             }
             self.target_nm = self.standing_offset(c, s);
         }
+        (self.from, self.from_turns) = (self.segment.timing.start, 0);
     }
 
     /// Moves the offset from what it is to what the segment starts with, then lets the segment begin.
@@ -102,7 +112,7 @@ impl Executor {
         self.finish(self.rest_nm, offset, flag::SETTLING)
     }
 
-    fn begin_segment(&mut self) {
+    pub(super) fn begin_segment(&mut self) {
         let timing = self.segment.timing;
         self.left = timing.cruise_ticks;
         self.mode = match self.segment.kind {
@@ -111,8 +121,7 @@ impl Executor {
             Kind::Arc | Kind::Line | Kind::Helix => Mode::Rise,
         };
         self.clock = Clock::rising(timing.clock_step);
-        self.phase = timing.start;
-        self.turns = 0;
+        (self.phase, self.turns) = (self.from, self.from_turns);
         self.end = timing.end;
     }
 

@@ -19,6 +19,7 @@
 //! two ticks of 8 kHz at 25 MHz are 3125.
 mod between;
 mod curve;
+mod pause;
 mod phase;
 
 use crate::engine::engage::Engage;
@@ -97,6 +98,15 @@ pub struct Executor {
     epoch: u8,
     /// On the way to a standstill that was asked for.
     halting: bool,
+    /// Feed hold: nothing begins, and what runs comes to rest on its path …
+    pause: bool,
+    /// … is on its way there, to go on with so many ticks at constant rate …
+    pausing: Option<u32>,
+    /// … and stands there.
+    held: bool,
+    /// Where the segment in hand begins, or goes on: phase and whole turns.
+    from: u64,
+    from_turns: i32,
     fault: Option<Fault>,
 }
 
@@ -125,6 +135,11 @@ impl Executor {
             sides: Sides::default(),
             epoch: 0,
             halting: false,
+            pause: false,
+            pausing: None,
+            held: false,
+            from: 0,
+            from_turns: 0,
             fault: None,
         }
     }
@@ -136,7 +151,12 @@ impl Executor {
 
     /// Nothing in hand.
     pub fn idle(&self) -> bool {
-        self.mode == Mode::Rest
+        self.mode == Mode::Rest && !self.held
+    }
+
+    /// Stands in a feed hold, a part of the segment in hand still to come.
+    pub fn paused(&self) -> bool {
+        self.mode == Mode::Rest && self.held
     }
 
     /// Epoch that a planned segment must carry to be run; grows with each stop and fault.
@@ -147,6 +167,12 @@ impl Executor {
     /// Counts since start.
     pub const fn counters(&self) -> &Counters {
         &self.counters
+    }
+
+    /// Counts what has begun without a zone of the table.
+    pub fn count_uncorrected(&mut self, uncorrected: bool) {
+        let uncorrected = u32::from(uncorrected);
+        self.counters.uncorrected = self.counters.uncorrected.wrapping_add(uncorrected);
     }
 
     /// Why nothing runs, if so.
@@ -188,6 +214,7 @@ impl Executor {
     /// Something went wrong at rest: nothing more runs until [`Self::clear_fault`], and what is open ends here.
     pub fn fail(&mut self, fault: Fault) {
         self.fault = Some(fault);
+        (self.held, self.pausing) = (false, None);
         self.epoch = self.epoch.wrapping_add(1);
     }
 
@@ -210,6 +237,7 @@ impl Executor {
             return;
         }
         self.halting = true;
+        (self.held, self.pausing) = (false, None);
         self.epoch = self.epoch.wrapping_add(1);
         self.counters.stops = self.counters.stops.wrapping_add(1);
         let timing = &self.segment.timing;
@@ -222,8 +250,8 @@ impl Executor {
             Mode::Rise => {
                 // ∫ of the two ramps together: one step for each tick between their starts.
                 let apart = self.clock.elapsed();
-                self.end = timing
-                    .start
+                self.end = self
+                    .from
                     .wrapping_add(timing.step.wrapping_mul(u64::from(apart)));
                 self.second = Clock::rising(timing.clock_step);
                 self.mode = if apart == 0 { Mode::Rest } else { Mode::Both };

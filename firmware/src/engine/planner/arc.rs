@@ -56,6 +56,7 @@ impl Planner {
         {
             return Err(Refused::OutOfBounds(Quantity::Gap));
         }
+        self.soft_arc(arc)?;
         let end = arc.end_nm(self.position_nm);
         let slope = length(rise) / (TAU * radius);
         let round = Round {

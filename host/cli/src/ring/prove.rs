@@ -291,6 +291,7 @@ mod tests {
             }
         };
         Recording {
+            stopped: false,
             dt_s,
             points: (0..((2.0 * ramp_s + cruise_s) / dt_s) as usize)
                 .map(point)
