@@ -10,13 +10,15 @@
 //!
 //! | tick | steady | at most |
 //! |---|---|---|
-//! | arc, β model (`arc`) | 96 | 149, in a ramp |
-//! | arc with eight profile terms, both axes with play and friction pulses (`arc`) | 191 | 281, in a ramp in which an axis reverses |
-//! | set-point of a stream ([`super::Stream`]) | 143 | 143 |
+//! | arc, β model (`arc`) | 131 | 175, in a ramp |
+//! | arc with eight profile terms, two slides with play and friction pulses (`arc`) | 382 | 584, in a ramp in which they turn |
+//! | arc with the dearest eight (`arc`) | | 755 |
+//! | helix (`curve`), the same with eight terms | | 458, 723 |
+//! | set-point of a stream ([`super::Stream`]) | 146 | 146 |
+//! | whole interrupt, helix with the dearest eight, each set-point recorded | | 1181; 2441 where a segment is taken |
 //!
-//! These are arcs whose bounds the planner proved; all else (lines, helices, arcs at their bounds, stops in a ramp,
-//! engagement) runs in `curve` and `between` and takes longer: a helix 455 at most, 522 with the same eight terms; between
-//! two ticks of 8 kHz at 25 MHz are 3125.
+//! Lines, helices and stops in a ramp run in `curve`, what is between motions in `between`; between two ticks of 8 kHz at
+//! 25 MHz are 3125.
 mod arc;
 mod between;
 mod curve;
