@@ -120,14 +120,21 @@ impl Args {
 
     fn mark(&self, options: &Options) -> Result<Mark, Failure> {
         let text = std::fs::read(&self.model).map_err(|e| {
-            Failure::input(format_args!("{}: cannot be read: {e}", self.model.display()))
+            Failure::input(format_args!(
+                "{}: cannot be read: {e}",
+                self.model.display()
+            ))
         })?;
         let digest = Sha256::digest(&text);
         let keep = match options.keep {
             Keep::Feed => "feed",
             Keep::Omega => "omega",
         };
-        let planes = if options.all_planes { ", all planes" } else { "" };
+        let planes = if options.all_planes {
+            ", all planes"
+        } else {
+            ""
+        };
         let centres = if options.absolute_centres {
             ", absolute centres"
         } else {
@@ -212,7 +219,10 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
 /// Holds the output against the rules of its controller.
 fn check(path: &Path, target: Target, out: Output) -> Result<(), Failure> {
     let text = std::fs::read(path).map_err(|e| {
-        Failure::input(format_args!("{}: cannot be read again: {e}", path.display()))
+        Failure::input(format_args!(
+            "{}: cannot be read again: {e}",
+            path.display()
+        ))
     })?;
     let (rules, name) = match target {
         Target::Linuxcnc => (Controller::LinuxCnc, "LinuxCNC"),
@@ -225,7 +235,12 @@ fn check(path: &Path, target: Target, out: Output) -> Result<(), Failure> {
         return Ok(());
     };
     for trouble in &found {
-        out.note(format_args!("  {}:{}: {}", path.display(), trouble.line, trouble.what));
+        out.note(format_args!(
+            "  {}:{}: {}",
+            path.display(),
+            trouble.line,
+            trouble.what
+        ));
     }
     Err(Failure::check(format_args!(
         "{}:{}:1: {name} would refuse {} line{}, this one first: {}",

@@ -38,9 +38,7 @@ pub(super) const STEP: f64 = 0.02;
 pub(super) fn cumulants(servo: &Servo) -> Cumulants<f64> {
     match *servo {
         Servo::Beta {
-            beta1_s2,
-            beta2_s4,
-            ..
+            beta1_s2, beta2_s4, ..
         } => {
             let kappa2_s2 = -2.0 * beta1_s2;
             Cumulants {
@@ -256,8 +254,14 @@ mod tests {
             let Chain::LagAverage { lag, average } = found.chain else {
                 panic!("{found:?}")
             };
-            assert!((lag * found.unit_s * kv_per_s - 1.0).abs() < 1e-6, "{found:?}");
-            assert!((average * found.unit_s - window_s).abs() < 1e-5, "{found:?}");
+            assert!(
+                (lag * found.unit_s * kv_per_s - 1.0).abs() < 1e-6,
+                "{found:?}"
+            );
+            assert!(
+                (average * found.unit_s - window_s).abs() < 1e-5,
+                "{found:?}"
+            );
         }
     }
 
@@ -281,9 +285,24 @@ mod tests {
     #[test]
     fn a_parabola_shows_the_cumulants() {
         let chains = [
-            (Chain::LagAverage { lag: 1.0, average: 0.0 }, 1.0),
-            (Chain::LagAverage { lag: 0.6, average: 2.0 }, 0.36 + 4.0 / 12.0),
-            (Chain::SecondOrder { zeta: 0.95 }, -2.0 * (1.0 - 2.0 * 0.95 * 0.95)),
+            (
+                Chain::LagAverage {
+                    lag: 1.0,
+                    average: 0.0,
+                },
+                1.0,
+            ),
+            (
+                Chain::LagAverage {
+                    lag: 0.6,
+                    average: 2.0,
+                },
+                0.36 + 4.0 / 12.0,
+            ),
+            (
+                Chain::SecondOrder { zeta: 0.95 },
+                -2.0 * (1.0 - 2.0 * 0.95 * 0.95),
+            ),
             (Chain::SecondOrder { zeta: 0.5 }, -1.0),
             (Chain::FeedForward { share: 0.5 }, 0.75),
         ];

@@ -127,7 +127,10 @@ fn grbl(line: &Line<'_>, action: &Action) -> Option<String> {
                     | 930
                     | 940
             ),
-            b'M' => matches!(word.tenths(), 0 | 10 | 20 | 30 | 40 | 50 | 70 | 80 | 90 | 300),
+            b'M' => matches!(
+                word.tenths(),
+                0 | 10 | 20 | 30 | 40 | 50 | 70 | 80 | 90 | 300
+            ),
             b'P' => !matches!(action, Action::Arc(_) | Action::LostArc(_)),
             letter => b"FIJKLNRSTXYZ".contains(&letter),
         };
@@ -197,6 +200,9 @@ mod tests {
         let flat = "G21 F100\nG0 X1000 Y0\nG3 X1000 Y0.001 I-1000000 J0\n";
         assert_eq!(lines(flat, Controller::Grbl), [3]);
         assert_eq!(lines(flat, Controller::LinuxCnc), [0; 0]);
-        assert_eq!(lines("G21 F100\nG0 X10 Y0\nG3 I-10 P2\n", Controller::Grbl), [3]);
+        assert_eq!(
+            lines("G21 F100\nG0 X10 Y0\nG3 I-10 P2\n", Controller::Grbl),
+            [3]
+        );
     }
 }

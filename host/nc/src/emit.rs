@@ -51,9 +51,7 @@ impl Writer {
             block.centre(piece, &mut words);
             let feed = match arc.modes.feed_mode {
                 // Each block takes its own time at the speed of the arc.
-                FeedMode::InverseTime => {
-                    Some(60.0 * arc.feed_mm_s * factor / piece.length_mm)
-                }
+                FeedMode::InverseTime => Some(60.0 * arc.feed_mm_s * factor / piece.length_mm),
                 _ if factor != 1.0 && k == 0 => Some(scaled_feed(arc, factor)),
                 _ => None,
             };
@@ -155,7 +153,11 @@ impl<'a> Block<'a> {
             } else {
                 self.round(piece.end[slot])
             };
-            let from = if arc.modes.absolute { 0.0 } else { self.place[slot] };
+            let from = if arc.modes.absolute {
+                0.0
+            } else {
+                self.place[slot]
+            };
             push_number(words, (self.next[slot] - from) / self.unit, decimals);
         }
     }
@@ -179,7 +181,11 @@ impl<'a> Block<'a> {
         } else {
             self.round(from + (to - from) * piece.share) / self.unit
         };
-        let start = if self.arc.modes.absolute { 0.0 } else { self.height };
+        let start = if self.arc.modes.absolute {
+            0.0
+        } else {
+            self.height
+        };
         push_number(words, target - start, self.decimals + 1);
         self.height = target;
     }
@@ -201,7 +207,10 @@ impl<'a> Block<'a> {
             }
             words.extend_from_slice(&[b' ', letter]);
             let ends = k == self.arc_ends;
-            if ends && !relative && let Some(word) = self.line.word(letter) {
+            if ends
+                && !relative
+                && let Some(word) = self.line.word(letter)
+            {
                 let text = &self.line.text[word.range.start + 1..word.range.end];
                 words.extend_from_slice(text.trim_ascii());
                 continue;
@@ -270,7 +279,10 @@ fn first(
         } else if geometry(word) {
             out.extend_from_slice(&line.text[at..word.range.start]);
             if !written {
-                if out[begin..].last().is_some_and(|b| !b.is_ascii_whitespace()) {
+                if out[begin..]
+                    .last()
+                    .is_some_and(|b| !b.is_ascii_whitespace())
+                {
                     out.push(b' ');
                 }
                 if !has_code {

@@ -22,7 +22,8 @@ const LEAST_MM: f64 = 0.01;
 const TAIL_MM: f64 = 0.02;
 
 /// Where lines go: its index, its text with what became of it. `None` for the text: as it was.
-pub(super) type Sink<'s> = dyn FnMut(&Line<'_>, usize, Option<&[u8]>, Option<Fate>) -> io::Result<()> + 's;
+pub(super) type Sink<'s> =
+    dyn FnMut(&Line<'_>, usize, Option<&[u8]>, Option<Fate>) -> io::Result<()> + 's;
 
 /// Holds back the lines that are not decided yet.
 struct Engine<'a> {
@@ -64,11 +65,9 @@ impl<'a> Engine<'a> {
                 match (&visit.action, plan) {
                     (Action::Arc(arc), Some(Ok(plan))) => {
                         let arc = from_its_start(arc);
-                        let pieces =
-                            blend::pieces(&arc, plan.twin.delta_mm, plan.entry, plan.exit);
+                        let pieces = blend::pieces(&arc, plan.twin.delta_mm, plan.entry, plan.exit);
                         text.clear();
-                        self.writer
-                            .arc(&visit.line, &arc, plan, &pieces, &mut text);
+                        self.writer.arc(&visit.line, &arc, plan, &pieces, &mut text);
                         let fate = plan.fate(&arc, pieces.len());
                         sink(&visit.line, visit.index, Some(&text), Some(fate))?;
                     }

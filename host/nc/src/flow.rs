@@ -76,9 +76,9 @@ fn follow(lines: &[Line<'_>]) -> Option<Vec<usize>> {
             Sort::Flow(Keyword::Sub) => {
                 // A definition is passed over.
                 let name = line.o_name();
-                let end = lines[at..].iter().position(|l| {
-                    l.sort == Sort::Flow(Keyword::EndSub) && l.o_name() == name
-                })?;
+                let end = lines[at..]
+                    .iter()
+                    .position(|l| l.sort == Sort::Flow(Keyword::EndSub) && l.o_name() == name)?;
                 at += end + 1;
                 continue;
             }
@@ -167,7 +167,9 @@ fn target(
     programs: &HashMap<Vec<u8>, usize>,
     numbers: &HashMap<i64, usize>,
 ) -> Option<(usize, u32)> {
-    let p = line.word(b'P').filter(|p| p.value >= 0.0 && p.value.fract() == 0.0)?;
+    let p = line
+        .word(b'P')
+        .filter(|p| p.value >= 0.0 && p.value.fract() == 0.0)?;
     let number = p.value as u64;
     let named = |n: u64| programs.get(n.to_string().as_bytes()).copied();
     let times = match line.word(b'L') {

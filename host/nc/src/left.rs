@@ -60,7 +60,8 @@ struct Since<'a>(&'a Option<Because>);
 
 impl fmt::Display for Since<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.map_or(Ok(()), |because| write!(f, " since {because}"))
+        self.0
+            .map_or(Ok(()), |because| write!(f, " since {because}"))
     }
 }
 

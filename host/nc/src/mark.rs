@@ -31,7 +31,10 @@ impl fmt::Display for Mark {
 pub fn marked(program: &[u8]) -> Option<(usize, String)> {
     let at = memchr::memmem::find_iter(program, BEGIN.as_bytes()).find(|at| {
         // A comment, and not a text that speaks of one.
-        let line = program[..*at].rsplit(|b| *b == b'\n').next().unwrap_or_default();
+        let line = program[..*at]
+            .rsplit(|b| *b == b'\n')
+            .next()
+            .unwrap_or_default();
         matches!(line.trim_ascii(), b"(" | b";" | b"!")
     })?;
     let line = 1 + memchr::memchr_iter(b'\n', &program[..at]).count();
@@ -60,7 +63,12 @@ impl<'a> Marking<'a> {
         };
         Self {
             program,
-            mark: mark.map(|m| (format!("{open}{m}{close}{end}").into_bytes(), place(program))),
+            mark: mark.map(|m| {
+                (
+                    format!("{open}{m}{close}{end}").into_bytes(),
+                    place(program),
+                )
+            }),
             from: 0,
             to: 0,
         }
@@ -103,7 +111,9 @@ pub(super) fn place(program: &[u8]) -> usize {
         let starts = |word: &str| upper.starts_with(word.as_bytes());
         let module = starts("MODULE") || starts("%%%");
         let number = !module
-            && (starts("%") || matches!(upper.first(), Some(b'O' | b':')) && upper.get(1).is_some_and(u8::is_ascii_digit));
+            && (starts("%")
+                || matches!(upper.first(), Some(b'O' | b':'))
+                    && upper.get(1).is_some_and(u8::is_ascii_digit));
         head |= module;
         let of_head = head && (starts("VERSION") || starts("LANGUAGE"));
         if !(text.is_empty() || module || number || of_head) || !line.ends_with(b"\n") {
@@ -156,7 +166,10 @@ mod tests {
             let out = copied(&program, Some("G2 X6"));
             assert_eq!(out, format!("{head}{words}{end}G1 X1{end}G2 X6"));
             let lines = head.lines().count();
-            assert_eq!(marked(out.as_bytes()), Some((lines + 1, words.trim_matches(['(', ')']).to_owned())));
+            assert_eq!(
+                marked(out.as_bytes()),
+                Some((lines + 1, words.trim_matches(['(', ')']).to_owned()))
+            );
             // Nothing corrected: nothing said.
             assert_eq!(copied(&program, None), program);
             assert_eq!(marked(program.as_bytes()), None);

@@ -165,7 +165,8 @@ impl Reader<'_> {
             if word.value.is_nan() {
                 return Err((
                     word.range.start + 1,
-                    "parameters, expressions or settings; expected words with plain numbers".to_owned(),
+                    "parameters, expressions or settings; expected words with plain numbers"
+                        .to_owned(),
                 ));
             }
             match word.letter {
@@ -262,7 +263,9 @@ impl Reader<'_> {
         }
         let feed_mm_s = match self.state.feed() {
             _ if rapid => self.running.rapid_mm_s,
-            (Some(feed), Some(FeedMode::PerMinute)) if feed > 0.0 => feed * self.state.unit_mm() / 60.0,
+            (Some(feed), Some(FeedMode::PerMinute)) if feed > 0.0 => {
+                feed * self.state.unit_mm() / 60.0
+            }
             (Some(feed), Some(FeedMode::InverseTime)) if feed > 0.0 => length * feed / 60.0,
             _ => {
                 return Err((

@@ -159,7 +159,11 @@ impl State {
 
     /// Millimetres of one program unit; those of a millimetre where it is not known.
     pub(super) fn unit_mm(&self) -> f64 {
-        if self.now.inch == Some(true) { 25.4 } else { 1.0 }
+        if self.now.inch == Some(true) {
+            25.4
+        } else {
+            1.0
+        }
     }
 
     /// Takes the line of a number, from 1.
@@ -293,8 +297,7 @@ impl State {
         }
         same(&mut self.saved, &skipped.saved);
         if self.open != skipped.open || self.blocked != skipped.blocked {
-            self.blocked
-                .get_or_insert(Left::OptionalBlock(self.line));
+            self.blocked.get_or_insert(Left::OptionalBlock(self.line));
         }
     }
 
@@ -332,7 +335,10 @@ impl State {
     fn words_done(&mut self, line: &Line<'_>, axes: bool, own: bool, stops: bool) -> Action {
         self.take_feed(line);
         // Tools of lathes bring their offsets (T0101).
-        if line.word(b'T').is_some_and(|t| t.value.is_nan() || t.value >= 100.0) {
+        if line
+            .word(b'T')
+            .is_some_and(|t| t.value.is_nan() || t.value >= 100.0)
+        {
             let because = self.because(Code::Named("a tool with its offsets"));
             self.lose_place(because);
         }
@@ -456,7 +462,11 @@ impl State {
             }
             G::Opens(mode) => {
                 self.open_mode(mode, because);
-                return if mode == Mode::Polar { Use::None } else { Use::Own };
+                return if mode == Mode::Polar {
+                    Use::None
+                } else {
+                    Use::Own
+                };
             }
             G::Closes(mode) => {
                 let was_open = self.open_modes().any(|(m, _)| m == mode);
@@ -601,7 +611,9 @@ impl State {
             let value = line.word(b'F').map(|f| f.value);
             self.now.feed = value.filter(|v| v.is_finite() && !self.unit_changed);
             if self.now.feed.is_none() && !self.unit_changed {
-                self.lose_feed(Code::Named("F with a number that only the controller knows"));
+                self.lose_feed(Code::Named(
+                    "F with a number that only the controller knows",
+                ));
             }
         } else if self.now.feed_mode == Some(FeedMode::InverseTime) {
             self.now.feed = None;
@@ -653,14 +665,22 @@ impl State {
         match (letter, self.absolute_extruder) {
             (b'E', Some(absolute)) => Some(!absolute),
             // Marlin's E goes with G90 and G91, others' does not.
-            (b'E', None) => self.now.absolute.filter(|absolute| *absolute).map(|_| false),
+            (b'E', None) => self
+                .now
+                .absolute
+                .filter(|absolute| *absolute)
+                .map(|_| false),
             _ => self.now.absolute.map(|absolute| !absolute),
         }
     }
 
     fn take_along(&mut self, line: &Line<'_>) {
         for (slot, letter) in ALONG.into_iter().enumerate() {
-            if !line.has(letter) || line.words.iter().any(|w| w.letter == b'G' && w.tenths() == 920)
+            if !line.has(letter)
+                || line
+                    .words
+                    .iter()
+                    .any(|w| w.letter == b'G' && w.tenths() == 920)
             {
                 continue;
             }

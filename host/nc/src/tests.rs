@@ -71,7 +71,12 @@ fn reasons_to_leave_an_arc() {
         left("G0 X20 Y0\nG3 X-20 Y0 I-20 J0\n"),
         Left::UnknownFeed(None)
     );
-    for geometry in ["X-20 Y1 I-20 J0", "X-20 Y0", "X-20 Y0 R10", "X-20 I-20 P0.5"] {
+    for geometry in [
+        "X-20 Y1 I-20 J0",
+        "X-20 Y0",
+        "X-20 Y0 R10",
+        "X-20 I-20 P0.5",
+    ] {
         assert_eq!(left(&format!("{HEAD}G3 {geometry}\n")), Left::Geometry);
     }
     let block = |words: &str| left(&format!("{HEAD}G3 X-20 Y0 I-20 J0 {words}\n"));
@@ -89,7 +94,10 @@ fn reasons_to_leave_an_arc() {
         let found = block(words);
         assert!(
             found == Left::Words(Code::Word(letter, tenths))
-                || matches!(found, Left::UnknownPosition(Some(_)) | Left::UnknownModes(_)),
+                || matches!(
+                    found,
+                    Left::UnknownPosition(Some(_)) | Left::UnknownModes(_)
+                ),
             "{words}: {found:?}"
         );
     }
@@ -115,7 +123,11 @@ fn reasons_to_leave_an_arc() {
     assert_eq!(behind("G41 D1"), Left::CutterCompensation(g(410)));
     assert_eq!(behind("G95 F0.1"), Left::UnknownFeed(Some(g(950))));
     for (line, tenths) in [("G28", 280), ("G55", 550), ("G92 X3", 920), ("G53 X1", 530)] {
-        assert_eq!(behind(line), Left::UnknownPosition(Some(g(tenths))), "{line}");
+        assert_eq!(
+            behind(line),
+            Left::UnknownPosition(Some(g(tenths))),
+            "{line}"
+        );
     }
     for (line, tenths) in [
         ("G68 X0 Y0 R30", 680),
@@ -131,11 +143,17 @@ fn reasons_to_leave_an_arc() {
     assert_eq!(behind("G61"), Left::ExactStop(g(610)));
     assert_eq!(behind("M99"), Left::NotReached);
     for line in ["M98 P5", "M72", "G65 P9000 A1"] {
-        assert!(matches!(behind(line), Left::UnknownModes(b) if b.line == 3), "{line}");
+        assert!(
+            matches!(behind(line), Left::UnknownModes(b) if b.line == 3),
+            "{line}"
+        );
     }
     assert!(matches!(behind("$H"), Left::UnknownModes(_)));
     assert!(matches!(behind("o100 if [1]"), Left::ProgramFlow(b) if b.line == 3));
-    assert!(matches!(behind("IF [#1 EQ 1] GOTO 5"), Left::ProgramFlow(_)));
+    assert!(matches!(
+        behind("IF [#1 EQ 1] GOTO 5"),
+        Left::ProgramFlow(_)
+    ));
     assert!(matches!(behind("/G91"), Left::UnknownModes(b) if b.line == 3));
     assert!(matches!(behind("/G1 X5"), Left::UnknownPosition(Some(b)) if b.line == 3));
     assert_eq!(
@@ -365,15 +383,15 @@ fn halves_of_a_circle_share_their_offset() {
     let [
         Fate::Corrected {
             delta_mm,
-            blocks: 5,
+            blocks: 7,
             ..
         },
-        Fate::Corrected { blocks: 10, .. },
+        Fate::Corrected { blocks: 6, .. },
     ] = fates[..]
     else {
         panic!("{fates:?}")
     };
-    let first = &arcs(&text)[4];
+    let first = &arcs(&text)[6];
     assert!((first.end[0] + 20.0 + delta_mm).abs() < 1e-5, "{text}");
     let last = arcs(&text).last().unwrap().end;
     assert_eq!(last, [20.0, 0.0]);

@@ -74,10 +74,42 @@ pub(super) enum Keyword {
 
 /// Words that steer a program, of Fanuc, LinuxCNC and Siemens.
 const FLOW: [&str; 36] = [
-    "IF", "THEN", "GOTO", "GOTOF", "GOTOB", "GOTOC", "WHILE", "DO", "END", "ENDWHILE", "ELSE",
-    "ELSEIF", "ENDIF", "REPEAT", "ENDREPEAT", "REPEATB", "UNTIL", "FOR", "ENDFOR", "LOOP",
-    "ENDLOOP", "BREAK", "CONTINUE", "RETURN", "CASE", "DEFAULT", "PROC", "EXTERN", "EXTCALL",
-    "CALL", "PCALL", "MCALL", "RET", "SUB", "ENDSUB", "SETINT",
+    "IF",
+    "THEN",
+    "GOTO",
+    "GOTOF",
+    "GOTOB",
+    "GOTOC",
+    "WHILE",
+    "DO",
+    "END",
+    "ENDWHILE",
+    "ELSE",
+    "ELSEIF",
+    "ENDIF",
+    "REPEAT",
+    "ENDREPEAT",
+    "REPEATB",
+    "UNTIL",
+    "FOR",
+    "ENDFOR",
+    "LOOP",
+    "ENDLOOP",
+    "BREAK",
+    "CONTINUE",
+    "RETURN",
+    "CASE",
+    "DEFAULT",
+    "PROC",
+    "EXTERN",
+    "EXTCALL",
+    "CALL",
+    "PCALL",
+    "MCALL",
+    "RET",
+    "SUB",
+    "ENDSUB",
+    "SETINT",
 ];
 
 impl Line<'_> {
@@ -218,7 +250,11 @@ impl Reader<'_> {
     fn word(&mut self, letter: u8) -> Option<()> {
         let digits = self.blanks(self.at + 1);
         let (length, value) = self.value(digits, letter == b'O')?;
-        let end = if length == 0 { self.at + 1 } else { digits + length };
+        let end = if length == 0 {
+            self.at + 1
+        } else {
+            digits + length
+        };
         self.words.push(Word {
             letter,
             value,
@@ -300,9 +336,13 @@ impl Reader<'_> {
 
 /// `[10] [-2.5]`: arguments that are numbers, and a comment.
 fn plain_arguments(text: &[u8]) -> bool {
-    let code = text.split(|b| matches!(b, b'(' | b';')).next().unwrap_or_default();
-    code.iter()
-        .all(|b| b.is_ascii_digit() || matches!(b, b'[' | b']' | b'.' | b'-' | b'+' | b' ' | b'\t' | b'\r'))
+    let code = text
+        .split(|b| matches!(b, b'(' | b';'))
+        .next()
+        .unwrap_or_default();
+    code.iter().all(|b| {
+        b.is_ascii_digit() || matches!(b, b'[' | b']' | b'.' | b'-' | b'+' | b' ' | b'\t' | b'\r')
+    })
 }
 
 /// M-words that a printer's text follows.
@@ -430,7 +470,10 @@ mod tests {
         assert_eq!(read("G1 X1 0").1, Sort::Unread);
         assert_eq!(read("G1 X1,5").1, Sort::Unread);
         assert_eq!(read("G2 X1 Y1 CR=5").1, Sort::Unread);
-        assert_eq!(read("M117 Layer X5 of 7"), (vec![('M', 117.0)], Sort::Plain));
+        assert_eq!(
+            read("M117 Layer X5 of 7"),
+            (vec![('M', 117.0)], Sort::Plain)
+        );
     }
 
     #[test]
@@ -450,7 +493,12 @@ mod tests {
             assert!(words[2].1.is_nan() && words[3].1 == 0.0, "{text}");
         }
         assert_eq!(line(b"G[#1]").words[0].tenths(), UNKNOWN_TENTHS);
-        for setting in ["#1=5", "#<a> = [1 + #2] (c)", "N5 #1 = -sin[2]", "#1=5 #2=6"] {
+        for setting in [
+            "#1=5",
+            "#<a> = [1 + #2] (c)",
+            "N5 #1 = -sin[2]",
+            "#1=5 #2=6",
+        ] {
             assert_eq!(read(setting).1, Sort::Setting, "{setting}");
         }
         assert_eq!(read("#1=5 G1 X2").1, Sort::Unread);

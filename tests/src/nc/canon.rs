@@ -113,7 +113,11 @@ impl Call {
         }
         self.name == other.name
             && self.values.len() == other.values.len()
-            && self.values.iter().zip(&other.values).all(|(a, b)| near(a, b))
+            && self
+                .values
+                .iter()
+                .zip(&other.values)
+                .all(|(a, b)| near(a, b))
     }
 }
 
@@ -146,7 +150,11 @@ impl Place {
                 }
             }
             "USE_LENGTH_UNITS" => {
-                let unit = if call.text.contains("INCH") { 25.4 } else { 1.0 };
+                let unit = if call.text.contains("INCH") {
+                    25.4
+                } else {
+                    1.0
+                };
                 let scale = self.unit_mm / unit;
                 (0..3).for_each(|i| self.at[i] *= scale);
                 self.unit_mm = unit;
@@ -196,7 +204,10 @@ fn beside(p: [f64; 6], from: [f64; 6], to: [f64; 6]) -> (f64, f64) {
     if length == 0.0 {
         return (distance(p, from), 0.0);
     }
-    let along: f64 = (0..3).map(|i| (p[i] - from[i]) * (to[i] - from[i])).sum::<f64>() / length;
+    let along: f64 = (0..3)
+        .map(|i| (p[i] - from[i]) * (to[i] - from[i]))
+        .sum::<f64>()
+        / length;
     let foot = std::array::from_fn(|i| from[i] + (to[i] - from[i]) * along / length);
     (distance(p, foot), along / length)
 }
@@ -248,7 +259,10 @@ pub fn compare(before: &Canon, after: &Canon, feeds_may_differ: bool) -> Result<
             place.take(&before.calls[i]);
             i += 1;
         }
-        let arcs: Vec<&Call> = before.calls[first..i].iter().filter(|c| c.is_arc()).collect();
+        let arcs: Vec<&Call> = before.calls[first..i]
+            .iter()
+            .filter(|c| c.is_arc())
+            .collect();
         let next = before.calls.get(i);
         let next_line = next.filter(|c| c.is_line());
         let (mut pieces, mut arc_length) = (0, 0.0);
@@ -284,10 +298,7 @@ pub fn compare(before: &Canon, after: &Canon, feeds_may_differ: bool) -> Result<
                 None => format!("{} became nothing", arcs[0].text),
             });
         }
-        let mut meant = Place {
-            at: start,
-            ..place
-        };
+        let mut meant = Place { at: start, ..place };
         let mut expected = 0.0;
         for arc in &arcs {
             expected += path_mm(&meant, meant.at, arc);
@@ -295,12 +306,25 @@ pub fn compare(before: &Canon, after: &Canon, feeds_may_differ: bool) -> Result<
         }
         let room = next_line.map_or(0.0, |n| distance(place.at, place.end_of(n)) * place.unit_mm);
         if arc_length > 1.1 * expected + room + 1.0 || arc_length < 0.9 * expected - 1.0 {
-            return Err(format!("{} of {expected} mm became {arc_length} mm", arcs[0].text));
+            return Err(format!(
+                "{} of {expected} mm became {arc_length} mm",
+                arcs[0].text
+            ));
         }
         // What stands between two arcs acts where the first ends, which the correction moves aside.
-        let still = ["STRAIGHT_TRAVERSE", "STRAIGHT_FEED", "ARC_FEED", "DWELL", "PROGRAM_STOP"];
-        let moves = before.calls[i..].iter().find(|c| still.contains(&c.name.as_str()));
-        if !(moves.is_some_and(Call::is_arc) && distance(out.at, place.at) * place.unit_mm < ASIDE_MM) {
+        let still = [
+            "STRAIGHT_TRAVERSE",
+            "STRAIGHT_FEED",
+            "ARC_FEED",
+            "DWELL",
+            "PROGRAM_STOP",
+        ];
+        let moves = before.calls[i..]
+            .iter()
+            .find(|c| still.contains(&c.name.as_str()));
+        if !(moves.is_some_and(Call::is_arc)
+            && distance(out.at, place.at) * place.unit_mm < ASIDE_MM)
+        {
             check_end(&place, out.at, next_line)?;
         }
     }
@@ -326,7 +350,10 @@ fn check_end(place: &Place, end: [f64; 6], next_line: Option<&Call>) -> Result<(
             return Ok(());
         }
     }
-    Err(format!("arcs end {off} units off, at {end:?} instead of {:?}", place.at))
+    Err(format!(
+        "arcs end {off} units off, at {end:?} instead of {:?}",
+        place.at
+    ))
 }
 
 /// Length of a feed move in its plane, mm.
@@ -342,9 +369,10 @@ fn path_mm(place: &Place, from: [f64; 6], call: &Call) -> f64 {
     let turns = call.values[4];
     let raw = (turns.signum() * (angle(end) - angle(from))).rem_euclid(std::f64::consts::TAU);
     // Printed digits: an arc of a hair less than nothing is a full turn only if its ends are one.
-    let closed = (from[a] - end[a]).hypot(from[b] - end[b]) < 3e-4;
+    // Ends printed in inches are good to 2.5 µm.
+    let closed = (from[a] - end[a]).hypot(from[b] - end[b]) < 6e-3 / place.unit_mm;
     let first = if closed { std::f64::consts::TAU } else { raw };
-    let small = closed && radius * place.unit_mm < 1e-2;
+    let small = closed && radius * place.unit_mm < 2e-2;
     if small {
         return 0.0;
     }

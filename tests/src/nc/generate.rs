@@ -33,12 +33,16 @@ fn spoilt(text: String, random: &mut ChaCha8Rng) -> String {
             1 => lines.insert(at, lines[other].clone()),
             2 => lines.swap(at, other),
             3 => {
-                let word = ["G91 ", "G20 ", "G18 ", "S5 ", "M8 ", "F77 ", "A3 ", "K2 ", "/", "G92 "];
+                let word = [
+                    "G91 ", "G20 ", "G18 ", "S5 ", "M8 ", "F77 ", "A3 ", "K2 ", "/", "G92 ",
+                ];
                 let word = word[random.random_range(0..word.len())];
                 lines[at].insert_str(0, word);
             }
             4 => {
-                let words = [" S0", " M63 P1", " F100", " G40", " (x)", " ; y", " M5", " Z1", " E2", " D1"];
+                let words = [
+                    " S0", " M63 P1", " F100", " G40", " (x)", " ; y", " M5", " Z1", " E2", " D1",
+                ];
                 lines[at].push_str(words[random.random_range(0..words.len())]);
             }
             _ => {
@@ -148,16 +152,25 @@ impl<'r> Writer<'r> {
             }
             61..=65 => {
                 self.absolute = !self.absolute;
-                self.text.push_str(if self.absolute { "G90\n" } else { "G91\n" });
+                self.text
+                    .push_str(if self.absolute { "G90\n" } else { "G91\n" });
             }
             66..=67 => {
                 self.absolute_centres = !self.absolute_centres;
-                self.text.push_str(if self.absolute_centres { "G90.1\n" } else { "G91.1\n" });
+                self.text.push_str(if self.absolute_centres {
+                    "G90.1\n"
+                } else {
+                    "G91.1\n"
+                });
             }
             68..=70 => {
                 self.inverse_time = !self.inverse_time;
                 let unit = if self.inch { "F100\n" } else { "F2500\n" };
-                let line = if self.inverse_time { "G93\n".into() } else { format!("G94 {unit}") };
+                let line = if self.inverse_time {
+                    "G93\n".into()
+                } else {
+                    format!("G94 {unit}")
+                };
                 self.text.push_str(&line);
             }
             71..=73 => self.modes_kept(),
@@ -169,14 +182,43 @@ impl<'r> Writer<'r> {
             88..=89 => self.printed(),
             _ => {
                 let lines = [
-                    "G4 P0.05", "M3 S1000", "S500", "M5", "M8", "M9", "M0", "M1", "T1 M6", "(part)", "; words",
-                    "M62 P1", "M63 P1", "M64 P2", "M65 P2", "M67 E1 Q5", "M68 E1 Q2", "G64 P0.01", "G61", "G64",
-                    "(MSG, here)", "G98", "N77", "", "G43 H2 Z20", "G49 Z5", "G61.1", "G64 P0.02",
+                    "G4 P0.05",
+                    "M3 S1000",
+                    "S500",
+                    "M5",
+                    "M8",
+                    "M9",
+                    "M0",
+                    "M1",
+                    "T1 M6",
+                    "(part)",
+                    "; words",
+                    "M62 P1",
+                    "M63 P1",
+                    "M64 P2",
+                    "M65 P2",
+                    "M67 E1 Q5",
+                    "M68 E1 Q2",
+                    "G64 P0.01",
+                    "G61",
+                    "G64",
+                    "(MSG, here)",
+                    "G98",
+                    "N77",
+                    "",
+                    "G43 H2 Z20",
+                    "G49 Z5",
+                    "G61.1",
+                    "G64 P0.02",
                 ];
                 let line = lines[self.random.random_range(0..lines.len())];
                 if line.starts_with("G43") || line.starts_with("G49") {
                     // Their Z is a move by the motion in force: said by a line of its own.
-                    self.text.push_str(if line.starts_with("G43") { "G43 H2\n" } else { "G49\n" });
+                    self.text.push_str(if line.starts_with("G43") {
+                        "G43 H2\n"
+                    } else {
+                        "G49\n"
+                    });
                     self.text.push_str("G90 G0 X0 Y0 Z0\n");
                     self.absolute = true;
                     (self.at, self.modal) = ([0.0; 3], "G0");
@@ -202,7 +244,19 @@ impl<'r> Writer<'r> {
     /// Words that posts put behind a move.
     fn behind(&mut self) {
         let words = [
-            " S0", " S300", " F400", " F2000", " M62 P1", " M63 P1", " M8", " M9", " M3", " M5", " (c)", " ; c", " M68 E0 Q5",
+            " S0",
+            " S300",
+            " F400",
+            " F2000",
+            " M62 P1",
+            " M63 P1",
+            " M8",
+            " M9",
+            " M3",
+            " M5",
+            " (c)",
+            " ; c",
+            " M68 E0 Q5",
         ];
         if self.chance(25) {
             let word = words[self.random.random_range(0..words.len())];
@@ -292,7 +346,10 @@ impl<'r> Writer<'r> {
                 self.arc(radius, sweep, ccw);
             }
             if self.chance(10) {
-                self.text.push_str(["(between)\n", "F1500\n", "N5\n", "\n", "S100\n"][self.random.random_range(0..5)]);
+                self.text.push_str(
+                    ["(between)\n", "F1500\n", "N5\n", "\n", "S100\n"]
+                        [self.random.random_range(0..5)],
+                );
                 if self.text.ends_with("F1500\n") && self.inverse_time {
                     self.text.truncate(self.text.len() - 6);
                 }
@@ -319,7 +376,10 @@ impl<'r> Writer<'r> {
         let end = if full {
             start
         } else {
-            [centre[0] + radius * angle.cos(), centre[1] + radius * angle.sin()]
+            [
+                centre[0] + radius * angle.cos(),
+                centre[1] + radius * angle.sin(),
+            ]
         };
         let climb = self.chance(12).then(|| self.between(-3.0, 3.0));
         let turns = if full && self.chance(30) { 2 } else { 1 };
@@ -332,7 +392,11 @@ impl<'r> Writer<'r> {
             self.word('R', r);
         } else {
             for (slot, axis) in [a, b].into_iter().enumerate() {
-                let from = if self.absolute_centres { 0.0 } else { start[slot] };
+                let from = if self.absolute_centres {
+                    0.0
+                } else {
+                    start[slot]
+                };
                 self.word(['I', 'J', 'K'][axis], centre[slot] - from);
             }
         }
@@ -342,7 +406,11 @@ impl<'r> Writer<'r> {
         if self.chance(5) && !self.inch {
             self.rotary += self.between(-20.0, 20.0);
             let value = if self.absolute { self.rotary } else { 7.5 };
-            self.rotary = if self.absolute { value } else { self.rotary + 7.5 };
+            self.rotary = if self.absolute {
+                value
+            } else {
+                self.rotary + 7.5
+            };
             let _ = write!(self.text, " A{value:.3}");
         }
         self.time_word(radius * sweep);
@@ -351,14 +419,19 @@ impl<'r> Writer<'r> {
         } else {
             self.behind();
         }
-        self.heading = if full { self.heading } else { self.heading + side * sweep };
+        self.heading = if full {
+            self.heading
+        } else {
+            self.heading + side * sweep
+        };
     }
 
     fn modes_kept(&mut self) {
         let before = (self.plane, self.absolute, self.absolute_centres);
         self.text.push_str("M70\n");
         let feed = if self.inch { "F105" } else { "F2600" };
-        self.text.push_str(["G91\n", "G18\n", "G90.1\n", "G90\n"][self.random.random_range(0..4)]);
+        self.text
+            .push_str(["G91\n", "G18\n", "G90.1\n", "G90\n"][self.random.random_range(0..4)]);
         if self.text.ends_with("G91\n") {
             self.absolute = false;
         } else if self.text.ends_with("G18\n") {
@@ -379,7 +452,17 @@ impl<'r> Writer<'r> {
 
     fn offsets(&mut self) {
         let lines = [
-            "G92 X1 Y2", "G92.1", "G92.2", "G55", "G54", "G10 L2 P1 X3 Y4", "G10 L2 P1 R15", "G10 L2 P1 R0", "G53 G0 X1 Y1", "G28", "G30",
+            "G92 X1 Y2",
+            "G92.1",
+            "G92.2",
+            "G55",
+            "G54",
+            "G10 L2 P1 X3 Y4",
+            "G10 L2 P1 R15",
+            "G10 L2 P1 R0",
+            "G53 G0 X1 Y1",
+            "G28",
+            "G30",
         ];
         let line = lines[self.random.random_range(0..lines.len())];
         self.text.push_str(line);
@@ -397,7 +480,10 @@ impl<'r> Writer<'r> {
 
     fn parameters(&mut self) {
         let lines = [
-            "#1=5\n", "#<a> = [1 + 2]\n", "#2 = #5420\n", "o77 if [#1 GT 0]\no77 endif\n",
+            "#1=5\n",
+            "#<a> = [1 + 2]\n",
+            "#2 = #5420\n",
+            "o77 if [#1 GT 0]\no77 endif\n",
             "o78 repeat [2]\nG4 P0.01\no78 endrepeat\n",
         ];
         let line = lines[self.random.random_range(0..lines.len())];
@@ -470,11 +556,21 @@ impl<'r> Writer<'r> {
             self.text.push_str(" F50");
         }
         self.text.push('\n');
-        self.rotary = if self.absolute { value } else { self.rotary + value };
+        self.rotary = if self.absolute {
+            value
+        } else {
+            self.rotary + value
+        };
     }
 
     fn optional(&mut self) {
-        let lines = ["/G4 P0.1\n", "/M8\n", "/(c)\n", "/S5\n", "/G0 X1 Y1\nG0 X0 Y0 Z0\n"];
+        let lines = [
+            "/G4 P0.1\n",
+            "/M8\n",
+            "/(c)\n",
+            "/S5\n",
+            "/G0 X1 Y1\nG0 X0 Y0 Z0\n",
+        ];
         let line = lines[self.random.random_range(0..lines.len())];
         if line.contains("G0") && !self.absolute {
             return;

@@ -58,7 +58,12 @@ pub fn read(program: &str) -> (Vec<Move>, Option<Refused>) {
     let mut moves = Vec::new();
     for (i, text) in program.lines().enumerate() {
         match state.line(text) {
-            Ok(Some(Done { end, angle_rad, radius_mm, centre })) => moves.push(Move {
+            Ok(Some(Done {
+                end,
+                angle_rad,
+                radius_mm,
+                centre,
+            })) => moves.push(Move {
                 line: i + 1,
                 end,
                 angle_rad,
@@ -123,12 +128,21 @@ impl State {
         let mut to = from;
         for i in 0..3 {
             if let Some(v) = axes[i] {
-                to[i] = if self.absolute { v * unit } else { from[i] + v * unit };
+                to[i] = if self.absolute {
+                    v * unit
+                } else {
+                    from[i] + v * unit
+                };
             }
         }
         self.at = to;
         if self.motion < 2 {
-            return Ok(Some(Done { end: to, angle_rad: 0.0, radius_mm: 0.0, centre: [0.0; 2] }));
+            return Ok(Some(Done {
+                end: to,
+                angle_rad: 0.0,
+                radius_mm: 0.0,
+                centre: [0.0; 2],
+            }));
         }
         let [a, b, _] = self.plane;
         let (x, y) = (to[a] - from[a], to[b] - from[b]);
@@ -223,7 +237,9 @@ pub fn compare(before: &str, after: &str) -> Result<(), String> {
     if refused.is_none()
         && let Some(Refused { line, error }) = output_refused
     {
-        return Err(format!("Grbl refuses line {line} of the output with error {error}"));
+        return Err(format!(
+            "Grbl refuses line {line} of the output with error {error}"
+        ));
     }
     let longest = |moves: &[Move]| {
         moves
@@ -233,7 +249,9 @@ pub fn compare(before: &str, after: &str) -> Result<(), String> {
     };
     let (was, is) = (longest(&original), longest(&moves));
     if refused.is_none() && is > 1.1 * was + 1.0 {
-        return Err(format!("Grbl runs an arc of {is} mm where {was} mm was the longest"));
+        return Err(format!(
+            "Grbl runs an arc of {is} mm where {was} mm was the longest"
+        ));
     }
     Ok(())
 }
@@ -244,12 +262,22 @@ mod tests {
 
     #[test]
     fn arcs_are_those_of_grbl() {
-        let (moves, refused) = read("G21 G0 X20 Y0\nG3 X-20 I-20\nG2 X20 I20 J0\nG3 I-20\nG2 X0 Y-20 R20\n");
+        let (moves, refused) =
+            read("G21 G0 X20 Y0\nG3 X-20 I-20\nG2 X20 I20 J0\nG3 I-20\nG2 X0 Y-20 R20\n");
         assert_eq!(refused, None);
-        let angles: Vec<f32> = moves.iter().map(|m| (m.angle_rad / PI * 2.0).round()).collect();
+        let angles: Vec<f32> = moves
+            .iter()
+            .map(|m| (m.angle_rad / PI * 2.0).round())
+            .collect();
         assert_eq!(angles, [0.0, 2.0, -2.0, 4.0, -1.0]);
-        assert_eq!(read("G0 X20\nG3 X-20 I-19\n").1, Some(Refused { line: 2, error: 33 }));
-        assert_eq!(read("G0 X20\nG3 X-20\n").1, Some(Refused { line: 2, error: 35 }));
+        assert_eq!(
+            read("G0 X20\nG3 X-20 I-19\n").1,
+            Some(Refused { line: 2, error: 33 })
+        );
+        assert_eq!(
+            read("G0 X20\nG3 X-20\n").1,
+            Some(Refused { line: 2, error: 35 })
+        );
         assert_eq!(read("M62 P1\n").1, Some(Refused { line: 1, error: 20 }));
         // A hair of an arc so flat that 32 bits lose its side.
         let (moves, _) = read("G0 X1000\nG3 X1000 Y0.001 I-1000000 J0\n");

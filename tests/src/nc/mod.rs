@@ -29,7 +29,11 @@ pub fn model() -> ModelFile {
 /// Options by number: what the users of one program in eight choose.
 pub fn options(seed: u64) -> Options {
     Options {
-        keep: if seed % 8 == 7 { Keep::Omega } else { Keep::Feed },
+        keep: if seed % 8 == 7 {
+            Keep::Omega
+        } else {
+            Keep::Feed
+        },
         all_planes: !seed.is_multiple_of(8),
         ..Options::default()
     }

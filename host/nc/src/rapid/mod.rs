@@ -9,11 +9,11 @@ mod read;
 mod tests;
 
 use super::blend::{self, Piece};
+use super::check::Trouble;
 use super::correct::{Law, Plan, Visit, decide};
+use super::mark::{self, Mark};
 use super::state::{Action, Arc};
 use super::word::{Line, Sort};
-use super::check::Trouble;
-use super::mark::{self, Mark};
 use super::{Compensated, Fate, Options, Report, inverse::Inverse};
 use giotto::model_file::ModelFile;
 use read::{Motion, Reader};
@@ -99,9 +99,14 @@ pub(super) fn check(program: &[u8]) -> Vec<Trouble> {
         let (a, b) = (to(via), to(end));
         let size = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
         let dot: f64 = (0..3).map(|i| a[i] * b[i]).sum();
-        let seen = (dot / (size(a) * size(b))).clamp(-1.0, 1.0).acos().to_degrees();
+        let seen = (dot / (size(a) * size(b)))
+            .clamp(-1.0, 1.0)
+            .acos()
+            .to_degrees();
         let what = match (size(a), size(b)) {
-            (v, e) if v.min(e) < LEAST_MM => Some(format!("points {:.3} mm from its start", v.min(e))),
+            (v, e) if v.min(e) < LEAST_MM => {
+                Some(format!("points {:.3} mm from its start", v.min(e)))
+            }
             _ if seen < 1.0 => Some(format!("a via point that is seen {seen:.2}° from its end")),
             _ => None,
         };

@@ -146,7 +146,12 @@ impl Reader {
     /// The three points of a plain MoveC, as far as they are known.
     pub(super) fn points(&self, line: &[u8]) -> Option<[[f64; 3]; 3]> {
         let text = std::str::from_utf8(code(line)).ok()?.trim();
-        let list = arguments(text.get(..5).filter(|n| n.eq_ignore_ascii_case("MoveC")).map(|_| text)?, "MoveC")?;
+        let list = arguments(
+            text.get(..5)
+                .filter(|n| n.eq_ignore_ascii_case("MoveC"))
+                .map(|_| text)?,
+            "MoveC",
+        )?;
         let start = self.stand.as_ref()?.target.place;
         let via = self.target(list.first()?)?.place;
         Some([start, via, self.target(list.get(1)?)?.place])
@@ -202,7 +207,11 @@ impl Reader {
         };
         if let Some((_, words)) = circle {
             // The end is the second argument.
-            let stand = if name.starts_with("ARCC") { to(1, 6, false) } else { None };
+            let stand = if name.starts_with("ARCC") {
+                to(1, 6, false)
+            } else {
+                None
+            };
             self.lose("an instruction that is not rewritten");
             self.stand = stand;
             return Read::of(Action::LostArc(Left::Dialect(words)));
@@ -216,10 +225,15 @@ impl Reader {
             }
             _ if straight || triggered || welded => {
                 let stand = to(0, if welded { 5 } else { 3 }, triggered);
+                let stops = arguments(text, &text[..name.len()])
+                    .is_none_or(|list| list.iter().any(|a| a.eq_ignore_ascii_case("fine")));
                 let before = self.stand.take();
                 self.lose("an instruction that is not rewritten");
                 self.stand = stand;
-                self.passed(before, false, None)
+                Read {
+                    stops,
+                    ..self.passed(before, false, None)
+                }
             }
             _ if text.ends_with(':') => {
                 self.lose("a label");

@@ -89,7 +89,10 @@ fn a_taught_circle_is_corrected_and_the_rest_copied() {
     let mut reader = Reader::default();
     let mut last: Option<([f64; 2], [f64; 2])> = None;
     let mut turned = 0.0;
-    for action in text.split_inclusive('\n').map(|l| reader.step(l.as_bytes()).action) {
+    for action in text
+        .split_inclusive('\n')
+        .map(|l| reader.step(l.as_bytes()).action)
+    {
         let (start, end, t0, t1) = match action {
             Action::Arc(a) => {
                 turned += a.sweep_rad;
