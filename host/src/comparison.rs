@@ -332,12 +332,28 @@ mod tests {
         let of = |cause: &str| comparison.causes.iter().find(|c| c.cause == cause).unwrap();
         let backlash = of("backlash");
         assert_eq!(backlash.fate, Fate::Changed, "{:?}", comparison.words);
-        assert!((backlash.change - 0.006).abs() < 0.001, "{}", backlash.change);
+        assert!(
+            (backlash.change - 0.006).abs() < 0.001,
+            "{}",
+            backlash.change
+        );
         assert!(backlash.ci95[0] < 0.006 && 0.006 < backlash.ci95[1]);
         assert_eq!(of("squareness").fate, Fate::Same);
-        assert!(comparison.words[0].contains("backlash of X"), "{:?}", comparison.words);
+        assert!(
+            comparison.words[0].contains("backlash of X"),
+            "{:?}",
+            comparison.words
+        );
         let gone = compare(&after, &measured(0.0, 60e-6, 3));
-        assert!(gone.causes.iter().any(|c| c.cause == "backlash" && c.fate == Fate::Gone));
-        assert!(gone.figures.iter().any(|f| f.changed && f.figure == "g_b"), "{:?}", gone.words);
+        assert!(
+            gone.causes
+                .iter()
+                .any(|c| c.cause == "backlash" && c.fate == Fate::Gone)
+        );
+        assert!(
+            gone.figures.iter().any(|f| f.changed && f.figure == "g_b"),
+            "{:?}",
+            gone.words
+        );
     }
 }

@@ -202,7 +202,10 @@ fn mended(folder: &Path, probe: &str) {
                 (of(run, "radius_mm") - radius).abs() < 1e-6
                     && (of(run, "feed_mm_s") - feed).abs() < 1e-6
             };
-            let all = runs.iter().filter(same).map(|run| of(run, "out_of_roundness_um"));
+            let all = runs
+                .iter()
+                .filter(same)
+                .map(|run| of(run, "out_of_roundness_um"));
             all.fold(0.0, f64::max)
         }
     };
@@ -219,7 +222,13 @@ fn mended(folder: &Path, probe: &str) {
         };
         let (measured, mended) = (before(radius, feed), after(radius, feed));
         // A step inside a sector of 2° is smoothed there; the sample noise of this plan is 0.05 µm.
-        assert!((now - measured).abs() < 1.0, "R {radius} f {feed}: {now} {measured}");
-        assert!((then - mended).abs() < 1.0, "R {radius} f {feed}: {then} {mended}");
+        assert!(
+            (now - measured).abs() < 1.0,
+            "R {radius} f {feed}: {now} {measured}"
+        );
+        assert!(
+            (then - mended).abs() < 1.0,
+            "R {radius} f {feed}: {then} {mended}"
+        );
     }
 }
