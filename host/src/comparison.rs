@@ -296,7 +296,9 @@ mod tests {
             },
             instrument: Instrument {
                 spread_m: 0.7e-6,
-                setup_spread_m: 10e-6,
+                // One set-up a campaign.
+                setup_m: [10e-6 * (seed as f64).sin(), 10e-6 * (seed as f64).cos()],
+                setup_spread_m: 0.0,
                 ..Instrument::ballbar()
             },
             tests,
