@@ -19,6 +19,9 @@ pub struct ModelFile {
     pub campaign: String,
     /// Machine, as the campaign names it.
     pub machine: String,
+    /// Delay of the machine behind its command, s, where a diagnosis could tell it: dead time on top of the servo's own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub delay_s: Option<f64>,
     /// The radius law.
     pub servo: Servo,
     /// Where it was fitted: the table's bounds.
@@ -132,6 +135,11 @@ impl ModelFile {
             .fault()
             .or_else(|| self.valid.fault())
             .or_else(|| {
+                let delay_s = self.delay_s?;
+                let possible = (0.0..=LONGEST_DELAY_S).contains(&delay_s);
+                Fault::unless(possible, &["delay_s"], delay_s, "a delay of 0 to 1 s")
+            })
+            .or_else(|| {
                 self.effects.iter().enumerate().find_map(|(i, effect)| {
                     let i = i.to_string();
                     let finite = |path: &[&str], value: f64| {
@@ -160,6 +168,9 @@ impl ModelFile {
             })
     }
 }
+
+/// Longest delay of a machine behind its command that is no mistake, s.
+const LONGEST_DELAY_S: f64 = 1.0;
 
 const FINITE: &str = "a finite number";
 
@@ -314,6 +325,8 @@ pitch_mm = 10.0
             refuse("value = 2.5", "value = inf"),
             "M.toml:24:9: `effect.value` is inf; expected a finite number"
         );
+        let delayed = refuse("\n[servo]", "delay_s = 7.5\n[servo]");
+        assert!(delayed.ends_with("`delay_s` is 7.5; expected a delay of 0 to 1 s"), "{delayed}");
         assert!(
             refuse("pitch_mm = 10.0", "pitch_mm = nan")
                 .starts_with("M.toml:28:12: `effect.params.pitch_mm`")

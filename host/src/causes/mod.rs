@@ -191,6 +191,11 @@ pub trait CauseModel: Sync {
     /// Brings shape parameters back to where they mean something.
     fn tidy(&self, _shape: &mut [f64]) {}
 
+    /// Whether a value (in the contract's unit) is one that the cause can have at all.
+    fn allows(&self, value: f64) -> bool {
+        value.is_finite()
+    }
+
     /// Number of linear columns: 2 where the phase of the signature is free.
     fn columns(&self) -> usize {
         1

@@ -25,6 +25,13 @@ const WORDS: Words = Words {
     not_compensable: None,
 };
 
+/// Decay of the loop's answer, s: from the fastest current-bound drives to an integral time that no one would keep.
+const DECAY_S: [f64; 2] = [5e-4, 0.4];
+/// Shortest rise, s: the cycle of a fast position loop.
+const SHORTEST_RISE_S: f64 = 5e-5;
+/// Presliding travel of guides and gears, m: ball tracks to wound-up drives.
+const PRESLIDING_M: [f64; 2] = [1e-8, 5e-4];
+
 impl CauseModel for ReversalSpike {
     fn cause(&self) -> Cause {
         Cause::ReversalSpike
@@ -59,7 +66,18 @@ impl CauseModel for ReversalSpike {
     }
 
     fn tidy(&self, shape: &mut [f64]) {
-        shape.iter_mut().for_each(|value| *value = value.abs());
+        let [decay_s, rise_s, presliding_m] = shape else {
+            return;
+        };
+        *decay_s = decay_s.abs().clamp(DECAY_S[0], DECAY_S[1]);
+        *rise_s = rise_s.abs().clamp(SHORTEST_RISE_S, *decay_s);
+        *presliding_m = presliding_m.abs().clamp(PRESLIDING_M[0], PRESLIDING_M[1]);
+    }
+
+    // Friction opposes the new direction: the spike is outward. An inward one is another thing, the shoulder of a step
+    // for the most part.
+    fn allows(&self, peak_um: f64) -> bool {
+        peak_um > 0.0
     }
 
     fn signature(

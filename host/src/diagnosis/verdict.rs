@@ -1,11 +1,13 @@
 //! From the chosen explanations to findings: estimate, interval, probability, share, look-alikes.
 use super::duration::Clamp;
 use super::explained::{Explained, energies};
-use super::finding::{Estimate, Finding};
+use super::finding::{Estimate, Finding, Largest};
 use super::item::Kind;
 use super::linear::solve;
 use super::roughness::{self, Teeth};
 use super::search::{columns_of, evidence, select};
+use super::statement;
+use super::status::{Status, TIE};
 use super::tangent;
 use super::tone::{Amplitude, Tone};
 use crate::causes::{Cause, Effect};
@@ -49,6 +51,9 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
         let Kind::Cause { cause, axis, .. } = &found.items[item].kind else {
             return None;
         };
+        if found.tied.contains(&item) {
+            return None;
+        }
         let words = cause.model().words();
         let (value, half) = estimate(found, item);
         let params = parameters(found, item);
@@ -63,7 +68,11 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
         Some(Finding {
             cause: *cause,
             axis: *axis,
+            actuators: statement::actuators(*cause, *axis),
             probability: probability(found, &weights, at),
+            status: Status::default(),
+            effect_um: statement::largest(found, item),
+            remedy: statement::remedy(*cause, *axis, value),
             estimate: Estimate {
                 value,
                 ci95,
@@ -91,7 +100,7 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
     if let Some((clamp, energy)) = clamp {
         let value = clamp.limit_m_s2 * 1e3;
         let half = 2.0 * clamp.se_m_s2 * 1e3;
-        out.push(plain(
+        let finding = plain(
             Cause::FeedClamp,
             None,
             value,
@@ -100,7 +109,11 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
             share(energy),
             rms(energy),
             BTreeMap::new(),
-        ));
+        );
+        out.push(Finding {
+            effect_um: statement::of_slower_feed(found),
+            ..finding
+        });
     }
     let (pieces, energy) = unexplained_energy(found, &each);
     let hidden_by_pieces = pieces >= PIECES && tone_energy < 9.0 * energy;
@@ -110,7 +123,10 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
         .zip(tone_energies)
         .filter(|_| !hidden_by_pieces)
     {
-        out.push(tone_finding(tone, share(energy), rms(energy)));
+        out.push(Finding {
+            effect_um: statement::of_tone(found, tone),
+            ..tone_finding(tone, share(energy), rms(energy))
+        });
     }
     for (teeth, energy) in found.teeth.iter().zip(teeth_energy) {
         let odds = 0.5 * teeth.significance.powi(2) - 14.0;
@@ -122,7 +138,7 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
             params,
         } = teeth_effect(teeth);
         let half = 0.5 * (ci95[1] - ci95[0]);
-        out.push(plain(
+        let finding = plain(
             cause,
             axis,
             value,
@@ -131,7 +147,11 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
             share(energy),
             rms(energy),
             params,
-        ));
+        );
+        out.push(Finding {
+            effect_um: statement::of_teeth(found, teeth),
+            ..finding
+        });
     }
     out.sort_by(|a, b| b.share_percent.total_cmp(&a.share_percent));
     out
@@ -151,9 +171,6 @@ fn unexplained_energy(found: &Explained, each: &[f64]) -> (usize, f64) {
 
 /// So many patterns side by side are pieces of one thing that none of them describes.
 const PIECES: usize = 3;
-
-/// A look-alike that explains these data to the last digit leaves even odds, give or take rounding.
-const EVEN: f64 = 0.5 - 1e-6;
 
 /// Against all patterns, rms: below, a cause beside so many of them may be a further piece. One with shape parameters fits more.
 const LARGER_THAN_PIECES: [f64; 2] = [1.0 / 3.0, 3.0];
@@ -189,7 +206,7 @@ fn without_bent(
                             (roughness::energy_m2(teeth, &found.runs) / samples).sqrt() * 1e6;
                         f.rms_um < 0.25 * teeth_um
                     });
-            f.probability >= EVEN && !piece && !smear
+            f.probability > TIE && !piece && !smear
         })
         .collect()
 }
@@ -222,7 +239,11 @@ fn plain(
     Finding {
         cause,
         axis,
+        actuators: statement::actuators(cause, axis),
         probability,
+        status: Status::default(),
+        effect_um: Largest::default(),
+        remedy: statement::remedy(cause, axis, value),
         estimate: Estimate {
             value,
             ci95,
@@ -266,7 +287,7 @@ fn tone_finding(tone: &Tone, share: f64, rms: f64) -> Finding {
     let (cause, value, half) = match tone.amplitude {
         Amplitude::Constant => (Cause::Vibration, tone.frequency_hz, 2.0 * se_hz),
         Amplitude::Centripetal => {
-            let period = 1.0 / tone.frequency_hz;
+            let period = tone.frequency_hz.recip();
             (
                 Cause::InterpolationChord,
                 period,
@@ -436,6 +457,36 @@ fn probability(found: &Explained, weights: &[f64], at: usize) -> f64 {
     }
 }
 
+/// Chosen causes in whose place another cause does as well to the last digit, and its name: even odds are no finding.
+pub fn ties(found: &Explained) -> Vec<(usize, Cause)> {
+    let products = found.ledger.white(&found.all());
+    let worth = |set: &[usize]| evidence(&products, &found.nuisance, &found.items, set);
+    let Some(best) = worth(&found.chosen) else {
+        return Vec::new();
+    };
+    let twin = |(at, &own): (usize, &usize)| {
+        let Kind::Cause { cause, .. } = found.items[own].kind else {
+            return None;
+        };
+        let other = (0..found.items.len()).find(|&index| {
+            let Kind::Cause { cause: other, .. } = found.items[index].kind else {
+                return false;
+            };
+            let mut swapped = found.chosen.clone();
+            swapped[at] = index;
+            other != cause && !found.chosen.contains(&index) && worth(&swapped).is_some_and(|worth| worth > best - EVEN)
+        })?;
+        match found.items[other].kind {
+            Kind::Cause { cause, .. } => Some((own, cause)),
+            Kind::Pattern(_) => None,
+        }
+    };
+    found.chosen.iter().enumerate().filter_map(twin).collect()
+}
+
+/// Difference of evidence (2·ln of the odds) below which two names have even odds.
+const EVEN: f64 = 0.4;
+
 /// Other causes that would explain these data nearly as well in its place (evidence within 2·ln 20).
 fn look_alikes(found: &Explained, weights: &[f64], at: usize) -> Vec<String> {
     let products = found.ledger.white(weights);
@@ -540,6 +591,12 @@ fn join_axes(findings: Vec<Finding>) -> Vec<Finding> {
                 let value = 0.5 * (twin.estimate.value + finding.estimate.value);
                 let half = 0.5 * halves[0].hypot(halves[1]);
                 twin.axis = None;
+                twin.actuators = [twin.actuators.clone(), finding.actuators.clone()].concat();
+                twin.actuators.sort();
+                if finding.effect_um.max > twin.effect_um.max {
+                    twin.effect_um = finding.effect_um;
+                }
+                twin.remedy = statement::remedy(twin.cause, None, value);
                 twin.estimate.value = value;
                 twin.estimate.ci95 = [value - half, value + half];
                 twin.share_percent += finding.share_percent;
