@@ -5,6 +5,7 @@
 use giotto::simulation::machine::{AccDec, PositionLoop};
 use giotto::simulation::{Hold, Machine, SetPoints, drive};
 use giotto_link::Recording;
+use giotto_shared::Frame;
 use giotto_shared::model::Cumulants;
 use giotto_shared::table::{self, Limits, MAX_IMAGE_BYTES, Table, Travel, Zone};
 
@@ -19,7 +20,7 @@ fn machine() -> Machine {
     let servo = [PositionLoop {
         kv_per_s: 1.0 / LAG_S,
         feed_forward: 0.0,
-    }; 2];
+    }; 3];
     Machine {
         acc_dec: AccDec::MovingAverage(AVERAGE_S),
         servo,
@@ -75,24 +76,20 @@ impl Errors {
 /// The errors of a recorded run; `distance` is that of a point from the programmed path, m.
 pub fn errors(recording: &Recording, distance: &dyn Fn([f64; 2]) -> f64) -> Errors {
     let largest = |pick: fn(&giotto_link::SetPointRecord) -> [f64; 3]| {
-        let mut position_m: Vec<[f64; 2]> = recording
-            .points
-            .iter()
-            .map(pick)
-            .map(|[x, y, _]| [x, y])
-            .collect();
+        let mut position_m: Vec<[f64; 3]> = recording.points.iter().map(pick).collect();
         let end = position_m.last().copied().unwrap_or_default();
         position_m.extend([end; ARRIVAL]);
         let set_points = SetPoints {
             dt_s: recording.dt_s,
             position_m: &position_m,
-            centre_m: [0.0; 2],
+            centre_m: [0.0; 3],
+            frame: Frame::default(),
             started_s: 0.0,
             hold: Hold::Cubic,
         };
         let path = drive(&machine(), &set_points).position_m;
         path.into_iter()
-            .map(|p| distance(p).abs())
+            .map(|[x, y, _]| distance([x, y]).abs())
             .fold(0.0, f64::max)
     };
     Errors {

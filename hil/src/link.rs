@@ -84,7 +84,7 @@ pub fn measure(note: &mut dyn FnMut(&str)) -> Result<Report, ControllerError> {
         image::ensure(board, note)?,
     ];
     let [echo, giotto] = images.map(|image| {
-        move || Emulator::start_board(board, Some(&image), Pace::Fast, &mut |_| {})?.into_link()
+        move || Emulator::start_board(board, Some(&image), Pace::Free, &mut |_| {})?.into_link()
     });
     let (mut table_s, mut echo_s) = (Vec::new(), Vec::new());
     for _ in 0..ROUNDS {

@@ -8,7 +8,7 @@ use giotto_hil::scenarios::{self, Outcome};
 use giotto_hil::ticks::{self, Counts, TERMS};
 use giotto_hil::{link, rate, size, streams};
 use giotto_link::ControllerError;
-use giotto_link::{Board, OpenOptions, Pace, Port, open};
+use giotto_link::{Board, OpenOptions, Port, open};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -110,16 +110,7 @@ fn main() -> ExitCode {
             image,
             worn_flash,
             json,
-        } => run_scenarios(
-            &port,
-            &OpenOptions {
-                image,
-                baud,
-                pace: Pace::Fast,
-            },
-            worn_flash,
-            json,
-        ),
+        } => run_scenarios(&port, &OpenOptions { image, baud }, worn_flash, json),
         Command::Link { json, check } => run_link(json, check),
         Command::Instructions { record } => return run_instructions(record),
         Command::Rate { json, check } => run_rate(json, check),
@@ -168,6 +159,7 @@ fn run_ticks(as_json: bool) -> Result<ExitCode, ControllerError> {
             "arc_extended_steady": range(&counts, "arc_extended_steady"),
             "stream": range(&counts, "stream"),
             "naive_libm": range(&counts, "naive_libm"),
+            "interrupt": range(&counts, "interrupt"),
             "naive_nalgebra": range(&counts, "naive_nalgebra"),
             "naive_idsp": range(&counts, "naive_idsp"),
             "image": { "text_bytes": image.text, "ram_bytes": image.ram, "stack_bytes": image.stack },
@@ -196,19 +188,7 @@ fn run_scenarios(
     let mut note = |text: &str| eprintln!("{text}");
     let mut controller = open(&port, options, &mut note)?;
     let (mut failed, mut done) = (0, Vec::new());
-    let emulated = matches!(port, Port::Qemu | Port::QemuBoard(_));
-    for (at, scenario) in scenarios::ALL.iter().chain(&streams::ALL).enumerate() {
-        if at == scenarios::ALL.len() && emulated {
-            // In the emulator time would run away from whoever sends or records every set-point.
-            controller = open(
-                &port,
-                &OpenOptions {
-                    pace: Pace::Slow,
-                    ..options.clone()
-                },
-                &mut note,
-            )?;
-        }
+    for scenario in scenarios::ALL.iter().chain(&streams::ALL) {
         let outcome = scenarios::run(scenario, &mut controller);
         let good = match outcome {
             Outcome::Passed => true,

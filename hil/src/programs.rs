@@ -15,8 +15,6 @@ impl From<ProgramError> for Trouble {
 const FEED_M_S: f64 = 0.2;
 /// The bar on what is left of the contour error of arcs with joints.
 const BAR: f64 = 0.05;
-/// So often a program is tried whose record has gaps.
-pub(crate) const TRIES: usize = 3;
 
 fn line(x: f64, y: f64) -> Segment {
     Segment::Line {
@@ -54,32 +52,20 @@ fn end_nm(from_nm: [i32; 3], segments: &[Segment]) -> Result<[i32; 3], Trouble> 
     })
 }
 
-/// Runs a program from a place and records every set-point. A host that is busy elsewhere may not take them as fast as an
-/// emulator makes them: then once more.
-fn recorded(
+/// Runs a program from a place and records every set-point.
+pub(crate) fn recorded(
     controller: &mut Controller,
     start_nm: [i32; 3],
     segments: &[Segment],
 ) -> Result<Recording, Trouble> {
-    // Nor may an emulator take it for dead: its second is a short one.
-    controller.supervise(None)?;
-    for last in (0..TRIES).map(|attempt| attempt + 1 == TRIES) {
-        controller.move_to(start_nm, FEED_M_S)?;
-        let before = controller.status()?.counters.segments;
-        let recording = match controller.run_program(&steps(segments), 1) {
-            Err(ProgramError {
-                error: ControllerError::SetPointsLost { .. },
-                ..
-            }) if !last => continue,
-            other => other?,
-        };
-        let done = controller.status()?.counters.segments.wrapping_sub(before);
-        ensure(done as usize == segments.len(), || {
-            format!("{done} segments done")
-        })?;
-        return Ok(recording);
-    }
-    Err(Trouble::Wrong("never recorded".to_owned()))
+    controller.move_to(start_nm, FEED_M_S)?;
+    let before = controller.status()?.counters.segments;
+    let recording = controller.run_program(&steps(segments), 1)?;
+    let done = controller.status()?.counters.segments.wrapping_sub(before);
+    ensure(done as usize == segments.len(), || {
+        format!("{done} segments done")
+    })?;
+    Ok(recording)
 }
 
 /// Lines, a helix of more than a turn, a tilted arc, dwells: more than the queue holds.
@@ -142,7 +128,6 @@ pub fn silent_host(controller: &mut Controller) -> Result<(), Trouble> {
     let before = controller.status()?;
     let mut at = before.raw_nm;
     let mut first = at;
-    controller.supervise(None)?;
     controller.command(Command::Begin)?;
     for (n, x) in [0.08, 0.02, 0.06].into_iter().enumerate() {
         let segment = line(x, 0.0).exact(at).map_err(ControllerError::from)?;

@@ -64,7 +64,7 @@ pub fn measure(note: &mut dyn FnMut(&str)) -> Result<Report, ControllerError> {
     let board = Board::Mps2An386;
     let (flash_s, flash_controller_s) = flash_time(board, note)?;
     let path = image::ensure_with(board, &["fast"], note)?;
-    let emulator = Emulator::start_board(board, Some(&path), Pace::Fast, note)?;
+    let emulator = Emulator::start_board(board, Some(&path), Pace::Free, note)?;
     let mut controller = Controller::connect(Box::new(emulator.into_link()?), "qemu", 1)?;
     controller.supervise(None)?;
     controller.flash(&largest_table(), &mut |_| {})?;
@@ -96,7 +96,7 @@ pub fn measure(note: &mut dyn FnMut(&str)) -> Result<Report, ControllerError> {
 
 /// Time for the largest table from its first byte to the last of the verification, by the clock and by ticks.
 fn flash_time(board: Board, note: &mut dyn FnMut(&str)) -> Result<(f64, f64), ControllerError> {
-    let emulator = Emulator::start_board(board, None, Pace::Fast, note)?;
+    let emulator = Emulator::start_board(board, None, Pace::Free, note)?;
     let mut controller = Controller::connect(Box::new(emulator.into_link()?), "qemu", 1)?;
     let table = largest_table();
     let before = controller.status()?.tick;

@@ -42,7 +42,7 @@ impl From<ControllerError> for Trouble {
     }
 }
 
-/// Those that no busy host can spoil, in the order they run in; the others are in [`streams`](crate::streams::ALL).
+/// In the order they run in; the others are in [`streams`](crate::streams::ALL).
 pub const ALL: [Scenario; 9] = [
     ("says who it is", identity),
     ("a circle bypassed is the programmed one", bypassed_circle),
@@ -143,7 +143,7 @@ pub(crate) fn at_rest(controller: &mut Controller) -> Result<Status, Trouble> {
     for _ in 0..100_000 {
         let status = controller.status()?;
         match status.motion {
-            MotionState::Running | MotionState::Stopping => {}
+            MotionState::Running | MotionState::Stopping | MotionState::Paused => {}
             MotionState::Idle => return Ok(status),
             MotionState::Fault => {
                 return Err(Trouble::Wrong(format!("in fault: {:?}", status.fault)));

@@ -9,9 +9,9 @@ use serde_json::{Value, json};
 use std::path::Path;
 
 /// Most text of an image, bytes.
-pub const TEXT_BAR: u32 = 64 * 1024;
+pub const TEXT_BAR: u32 = 256 * 1024;
 /// Most RAM of an image, variables and the deepest stack, bytes.
-pub const RAM_BAR: u32 = 16 * 1024;
+pub const RAM_BAR: u32 = 48 * 1024;
 
 /// Every so many set-points are asked for: at each of them a host that is busy elsewhere may fall behind.
 const EVERY: u16 = 8;
@@ -143,7 +143,12 @@ fn deepest_stack(
     note: &mut dyn FnMut(&str),
 ) -> Result<u32, ControllerError> {
     use giotto_shared::wire::Command;
-    let emulator = Emulator::start_board(board, Some(image), Pace::Fast, note)?;
+    let pace = if board.always_steps() {
+        Pace::Stepped
+    } else {
+        Pace::Free
+    };
+    let emulator = Emulator::start_board(board, Some(image), pace, note)?;
     let mut controller = Controller::connect(Box::new(emulator.into_link()?), "qemu", 1)?;
     controller.supervise(None)?;
     // Where the emulator has no flash, neither does what comes after it use any stack.

@@ -1,15 +1,16 @@
 //! Scenarios of streams: set-points sent one a tick, and the contour that comes of them.
 use crate::contour;
-use crate::programs::{self, TRIES};
+use crate::planes;
+use crate::programs;
 use crate::scenarios::{Scenario, Trouble, ensure, holds};
+use giotto_link::Controller;
 use giotto_link::streaming::Streamed;
-use giotto_link::{Controller, ControllerError};
 use giotto_shared::path::smoothstep;
 use giotto_shared::wire::{Command, FaultCause, MotionState};
 use std::f64::consts::TAU;
 
-/// Every set-point is sent or recorded. In an emulator they need a time that a busy host can keep up with.
-pub const ALL: [Scenario; 5] = [
+/// Every set-point is sent or recorded.
+pub const ALL: [Scenario; 6] = [
     (
         "a program ends where its segments do, to the nanometre",
         programs::ends_exactly,
@@ -17,6 +18,10 @@ pub const ALL: [Scenario; 5] = [
     (
         "flash, programs: contour of arcs between lines, through a machine",
         programs::contour,
+    ),
+    (
+        "flash: contour of a ZX and a tilted circle, through a machine with a bad Z",
+        planes::contour,
     ),
     ("a stream is followed set-point by set-point", followed),
     (
@@ -57,21 +62,11 @@ fn places(curve: Curve, rate: f64, tick_s: f64) -> Vec<[i32; 3]> {
         .collect()
 }
 
-/// Streams a curve from rest at its start, again if the host was too busy to keep up with an emulator.
+/// Streams a curve from rest at its start.
 fn streamed(controller: &mut Controller, places_nm: &[[i32; 3]]) -> Result<Streamed, Trouble> {
     let start_nm = places_nm.first().copied().unwrap_or_default();
-    controller.supervise(None)?;
-    for last in (0..TRIES).map(|attempt| attempt + 1 == TRIES) {
-        controller.move_to(start_nm, 0.3)?;
-        match controller.run_stream(places_nm, 0.5, 1) {
-            Ok(streamed) if streamed.missing == 0 || last => return Ok(streamed),
-            Err(ControllerError::Starved { .. }) if !last => controller.reset()?,
-            Err(ControllerError::SetPointsLost { .. }) if !last => {}
-            Err(error) => return Err(error.into()),
-            Ok(_) => {}
-        }
-    }
-    Err(Trouble::Wrong("never streamed".to_owned()))
+    controller.move_to(start_nm, 0.3)?;
+    Ok(controller.run_stream(places_nm, 0.5, 1)?)
 }
 
 fn tick_s(controller: &Controller) -> f64 {

@@ -130,7 +130,7 @@ pub fn largest_table() -> Vec<u8> {
 
 fn heapless_terms() -> giotto_shared::table::Terms {
     let spike = Term::ReversalSpike {
-        axis: giotto_shared::Axis::X,
+        actuator: giotto_shared::Actuator::X,
         peak_m: 2e-6,
         decay_s: 0.02,
     };

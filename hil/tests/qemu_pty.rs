@@ -14,8 +14,7 @@ use giotto_shared::table::{self, MAX_IMAGE_BYTES, TableError};
 use giotto_shared::wire::{Command, Refusal};
 
 fn connect(emulator: &Emulator) -> Result<Controller, ControllerError> {
-    let link = SerialLink::open(emulator.pty(), BAUD)?;
-    Controller::connect(Box::new(link), emulator.pty(), 7)
+    Controller::connect(emulator.open()?, emulator.pty(), 7)
 }
 
 /// The largest table with another name.
@@ -30,7 +29,7 @@ fn other_table() -> Vec<u8> {
 
 #[test]
 fn flash_status_verify_reset_verify_and_every_refusal_leaves_the_table() {
-    let emulator = Emulator::start(None, Pace::Fast, &mut |note| eprintln!("{note}")).unwrap();
+    let emulator = Emulator::start(None, Pace::Stepped, &mut |note| eprintln!("{note}")).unwrap();
     let mut controller = connect(&emulator).unwrap();
     let status = controller.status().unwrap();
     assert!(status.bypass && status.active.is_none());
@@ -52,7 +51,7 @@ fn flash_status_verify_reset_verify_and_every_refusal_leaves_the_table() {
 
     // In use: a second program does not get the port.
     assert!(matches!(
-        connect(&emulator),
+        SerialLink::open(emulator.pty(), BAUD),
         Err(ControllerError::InUse { .. })
     ));
 

@@ -62,11 +62,11 @@ fn plant_lap() -> Result<Box<dyn Fn()>, Box<dyn Error>> {
         servo: [PositionLoop {
             kv_per_s: 40.0,
             feed_forward: 0.0,
-        }; 2],
+        }; 3],
         mechanics: [Some(SecondOrder {
             omega_n_rad_s: 60.0,
             zeta: 0.5,
-        }); 2],
+        }); 3],
         ..Machine::default()
     };
     let test = CircleTest::new(0.1, 0.3, Direction::Ccw);

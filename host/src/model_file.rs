@@ -1,34 +1,49 @@
 //! `MODEL.toml`: what `fit` and `diagnose` write and what `simulate`, `table` and `flash` read.
-use crate::causes::Effect;
+use crate::causes::{Effect, WrittenEffect};
 use crate::toml_file::{TomlFileError, TomlProblem, TomlText};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Version of the file format written by this build.
-pub const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 2;
+/// The format before planes: its pairs are X and Y.
+const FLAT_FORMAT: u32 = 1;
 
 const EXPECTED: &str = "a model as `giotto fit -o` and `giotto diagnose -o` write it";
 
 /// A model of one machine.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ModelFile {
-    /// Format version, [`FORMAT`].
+    /// Format version, [`FORMAT`]; files of format 1 are read too.
     pub format: u32,
     /// Name of the campaign it was fitted on.
     pub campaign: String,
     /// Machine, as the campaign names it.
     pub machine: String,
     /// Delay of the machine behind its command, s, where a diagnosis could tell it: dead time on top of the servo's own.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub delay_s: Option<f64>,
     /// The radius law.
     pub servo: Servo,
     /// Where it was fitted: the table's bounds.
     pub valid: Valid,
     /// What diagnosis added, in order of share.
-    #[serde(default, rename = "effect", skip_serializing_if = "Vec::is_empty")]
+    #[serde(rename = "effect", skip_serializing_if = "Vec::is_empty")]
     pub effects: Vec<Effect>,
+}
+
+/// The same as it is written, before its effects are checked.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    format: u32,
+    campaign: String,
+    machine: String,
+    delay_s: Option<f64>,
+    servo: Servo,
+    valid: Valid,
+    #[serde(default, rename = "effect")]
+    effects: Vec<WrittenEffect>,
 }
 
 /// The axis-matched servo response.
@@ -88,12 +103,30 @@ impl ModelFile {
     fn of_text(text: &TomlText) -> Result<Self, TomlFileError> {
         // A newer format may have other keys: its number comes before them.
         match text.top("format") {
-            Some(found) if found.parse() != Ok(FORMAT) => {
+            Some(found) if !matches!(found.parse(), Ok(FLAT_FORMAT | FORMAT)) => {
                 return Err(text.format_error(found, FORMAT));
             }
             Some(_) | None => {}
         }
-        let model: Self = text.parse()?;
+        let written: Written = text.parse()?;
+        let flat = written.format == FLAT_FORMAT;
+        let mut effects = Vec::with_capacity(written.effects.len());
+        for (index, effect) in written.effects.into_iter().enumerate() {
+            effects.push(
+                effect
+                    .checked(flat)
+                    .map_err(|fault| fault.at(text, index))?,
+            );
+        }
+        let model = Self {
+            format: FORMAT,
+            campaign: written.campaign,
+            machine: written.machine,
+            delay_s: written.delay_s,
+            servo: written.servo,
+            valid: written.valid,
+            effects,
+        };
         match model.fault() {
             None => Ok(model),
             Some(fault) => {
@@ -131,41 +164,11 @@ impl ModelFile {
     }
 
     fn fault(&self) -> Option<Fault> {
-        self.servo
-            .fault()
-            .or_else(|| self.valid.fault())
-            .or_else(|| {
-                let delay_s = self.delay_s?;
-                let possible = (0.0..=LONGEST_DELAY_S).contains(&delay_s);
-                Fault::unless(possible, &["delay_s"], delay_s, "a delay of 0 to 1 s")
-            })
-            .or_else(|| {
-                self.effects.iter().enumerate().find_map(|(i, effect)| {
-                    let i = i.to_string();
-                    let finite = |path: &[&str], value: f64| {
-                        Fault::unless(value.is_finite(), path, value, FINITE)
-                    };
-                    let [lo, hi] = effect.ci95;
-                    finite(&["effect", &i, "value"], effect.value)
-                        .or_else(|| finite(&["effect", &i, "ci95", "0"], lo))
-                        .or_else(|| finite(&["effect", &i, "ci95", "1"], hi))
-                        .or_else(|| {
-                            let expected = "lower end first";
-                            Fault::unless(
-                                lo <= hi,
-                                &["effect", &i, "ci95"],
-                                format!("[{lo}, {hi}]"),
-                                expected,
-                            )
-                        })
-                        .or_else(|| {
-                            effect
-                                .params
-                                .iter()
-                                .find_map(|(k, v)| finite(&["effect", &i, "params", k], *v))
-                        })
-                })
-            })
+        self.servo.fault().or_else(|| self.valid.fault()).or_else(|| {
+            let delay_s = self.delay_s?;
+            let possible = (0.0..=LONGEST_DELAY_S).contains(&delay_s);
+            Fault::unless(possible, &["delay_s"], delay_s, "a delay of 0 to 1 s")
+        })
     }
 }
 
@@ -251,8 +254,8 @@ impl Valid {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::causes::Cause;
-    use giotto_shared::Axis;
+    use crate::causes::{ALL, Cause, Seat, Site};
+    use giotto_shared::Actuator;
 
     const TEXT: &str = r#"format = 1
 campaign = "lab"
@@ -282,6 +285,7 @@ ci95 = [2.0, 3.0]
 
 [effect.params]
 pitch_mm = 10.0
+phase_rad = 0.5
 "#;
 
     fn refuse(from: &str, to: &str) -> String {
@@ -302,16 +306,17 @@ pitch_mm = 10.0
                 half_width95: [2.1e-6, 1.3e-7]
             }
         );
-        assert_eq!(model.effects[0].cause, Cause::Backlash);
-        assert_eq!(model.effects[0].axis, Some(Axis::X));
-        assert_eq!(model.effects[1].params["pitch_mm"], 10.0);
+        assert_eq!(model.effects[0].cause(), Cause::Backlash);
+        assert_eq!(model.effects[0].site(), Site::One(Actuator::X));
+        let parameters: Vec<_> = model.effects[1].parameters().iter().collect();
+        assert_eq!(parameters, [("phase_rad", 0.5), ("pitch_mm", 10.0)]);
     }
 
     #[test]
     fn refusals_name_the_place() {
         assert_eq!(
             refuse("format = 1", "format = 7"),
-            "M.toml:1:10: format 7, and this build reads format 1"
+            "M.toml:1:10: format 7, and this build reads format 2"
         );
         assert_eq!(
             refuse("beta2_s4 = -2.3e-7", "beta2_s4 = nan"),
@@ -323,7 +328,7 @@ pitch_mm = 10.0
         );
         assert_eq!(
             refuse("value = 2.5", "value = inf"),
-            "M.toml:24:9: `effect.value` is inf; expected a finite number"
+            "M.toml:24:9: `effect.value` is inf; expected 0 to 1000"
         );
         let delayed = refuse("\n[servo]", "delay_s = 7.5\n[servo]");
         assert!(delayed.ends_with("`delay_s` is 7.5; expected a delay of 0 to 1 s"), "{delayed}");
@@ -377,16 +382,18 @@ pitch_mm = 10.0
             model.save(&file).unwrap();
             assert_eq!(ModelFile::load(&file).unwrap(), model);
         }
-        model.effects[0].value = f64::NAN;
+        model.valid.radius_mm = [f64::NAN, 1.0];
         assert!(
             model
                 .save(&file)
                 .unwrap_err()
                 .to_string()
-                .contains("effect.value")
+                .contains("valid.radius_mm")
         );
         assert!(
-            ModelFile::load(&file).unwrap().effects[0].value.is_finite(),
+            ModelFile::load(&file).unwrap().effects[0]
+                .value()
+                .is_finite(),
             "the old file is whole"
         );
         assert!(
@@ -407,6 +414,142 @@ pitch_mm = 10.0
                 .unwrap_err()
                 .to_string()
                 .contains(":2:12: not UTF-8")
+        );
+    }
+
+    /// A whole effect of a cause, as a file would hold it, and the names of its parameters that have to be there.
+    fn whole(cause: Cause) -> (String, Vec<&'static str>) {
+        let place = match cause.model().seat() {
+            Seat::Machine | Seat::MachineOrOne => "",
+            Seat::One => "axis = \"z\"\n",
+            Seat::Pair => "plane = \"zx\"\n",
+            Seat::Across => "axis = \"z\"\nacross = \"y\"\n",
+        };
+        let inside = |[lowest, highest]: [f64; 2]| 0.9 * lowest + 0.1 * highest;
+        let value = inside(cause.model().size().range);
+        let params: String = cause
+            .model()
+            .parameters()
+            .iter()
+            .map(|p| format!("{} = {:?}\n", p.name, inside(p.range)))
+            .collect();
+        let needed = cause.model().parameters().iter();
+        let needed = needed.filter(|p| p.otherwise.is_none()).map(|p| p.name);
+        (
+            format!(
+                "[[effect]]\ncause = \"{}\"\n{place}value = {value:?}\nci95 = [0.0, 0.0]\n[effect.params]\n{params}",
+                cause.id()
+            ),
+            needed.collect(),
+        )
+    }
+
+    fn with_effect(effect: &str) -> Result<ModelFile, TomlFileError> {
+        let head = TEXT.split("[[effect]]").next().unwrap();
+        let head = head.replace("format = 1", "format = 2");
+        ModelFile::parse(&format!("{head}{effect}"), Path::new("M.toml"))
+    }
+
+    /// All causes, all parameters: missing, misspelt, of another unit, no number, beyond what can be.
+    #[test]
+    fn no_number_of_an_effect_is_invented() {
+        let first_line = TEXT.split("[[effect]]").next().unwrap().lines().count();
+        for model in ALL {
+            let (text, needed) = whole(model.cause());
+            let id = model.words().id;
+            let read = with_effect(&text).unwrap();
+            assert_eq!(read.effects[0].cause(), model.cause());
+            let again = with_effect(
+                &toml::to_string(&Only {
+                    effect: &read.effects,
+                })
+                .unwrap(),
+            );
+            assert_eq!(
+                again.unwrap().effects,
+                read.effects,
+                "{id}: written and read back"
+            );
+            let refused = |text: String, words: &[&str]| {
+                let error = with_effect(&text).err();
+                let error = error
+                    .unwrap_or_else(|| panic!("{id} is taken:\n{text}"))
+                    .to_string();
+                for word in words {
+                    assert!(error.contains(word), "{id}: {error}, without {word}");
+                }
+                let line: usize = error.split(':').nth(1).unwrap().parse().unwrap();
+                assert!(line > first_line, "{id}: {error}");
+            };
+            for key in ["axis", "plane", "across"] {
+                if text.contains(&format!("\n{key} = ")) {
+                    let without: Vec<&str> = text
+                        .lines()
+                        .filter(|line| !line.starts_with(&format!("{key} = ")))
+                        .collect();
+                    refused(without.join("\n"), &[key]);
+                } else {
+                    let more = text.replace("\nvalue", &format!("\n{key} = \"xy\"\nvalue"));
+                    assert!(with_effect(&more).is_err(), "{id} takes `{key}`");
+                }
+            }
+            for parameter in model.parameters() {
+                let name = parameter.name;
+                let line = text
+                    .lines()
+                    .find(|line| line.starts_with(&format!("{name} = ")))
+                    .unwrap();
+                let but = |new: &str| text.replace(line, new);
+                if needed.contains(&name) {
+                    refused(but(""), &[name, "missing"]);
+                }
+                let stem = name.rsplit_once('_').map_or(name, |(stem, _)| stem);
+                for other in [
+                    format!("{name}x"),
+                    format!("{stem}_furlong"),
+                    stem.to_owned(),
+                ] {
+                    if !model.parameters().iter().any(|p| p.name == other) {
+                        refused(but(&format!("{other} = 1.0")), &[]);
+                    }
+                }
+                let beyond = format!("{:?}", 2.0 * parameter.range[1] + 1.0);
+                for value in ["nan", "inf", "-inf", &beyond, "\"10\""] {
+                    refused(but(&format!("{name} = {value}")), &[name]);
+                }
+            }
+            let size = text.lines().find(|line| line.starts_with("value")).unwrap();
+            let beyond = format!("{:?}", 2.0 * model.size().range[1] + 1.0);
+            for value in ["nan", "inf", &beyond] {
+                refused(text.replace(size, &format!("value = {value}")), &["value"]);
+            }
+            refused(text.replace(size, ""), &["value"]);
+            refused(
+                text.replace("[effect.params]", "[effect.parms]"),
+                &["parms"],
+            );
+        }
+    }
+
+    #[derive(Serialize)]
+    struct Only<'a> {
+        effect: &'a [Effect],
+    }
+
+    #[test]
+    fn a_file_without_planes_means_x_and_y() {
+        let flat = TEXT.replace(
+            "cause = \"backlash\"\naxis = \"x\"\nvalue = 0.012",
+            "cause = \"squareness\"\nvalue = 0.012",
+        );
+        let read = ModelFile::parse(&flat, Path::new("M.toml")).unwrap();
+        assert_eq!(read.format, FORMAT);
+        assert_eq!(read.effects[0].site(), Site::Pair(giotto_shared::Plane::Xy));
+        let now = flat.replace("format = 1", "format = 2");
+        let refused = ModelFile::parse(&now, Path::new("M.toml")).unwrap_err();
+        assert!(
+            refused.to_string().contains("`plane` is missing"),
+            "{refused}"
         );
     }
 }

@@ -53,3 +53,12 @@ impl Axis {
         }
     }
 }
+
+impl From<Axis> for crate::Actuator {
+    fn from(axis: Axis) -> Self {
+        match axis {
+            Axis::X => Self::X,
+            Axis::Y => Self::Y,
+        }
+    }
+}

@@ -8,7 +8,9 @@
 //! | [`term`] | the profile terms that diagnosis fits, the table carries and the engine evaluates |
 //! | [`path`] | time laws with limited jerk, circles, arcs, lines; derivatives in closed form |
 //! | [`angle`], [`fixed`] | integer phases, sine and cosine, fixed-point products of the tick |
+//! | [`bounds`] | what no table may ask for |
 //! | [`law`] | the compensating operator p − (κ2/2) p″ + (κ2²/8 − κ4/24) p⁗ |
+//! | [`encoding`] | values as bytes, CRC-32 |
 //! | [`table`] | the correction table: layout, bounds, CRC |
 //! | [`wire`] | messages and frames between host and controller |
 //!
@@ -22,8 +24,10 @@ extern crate std;
 
 mod actuator;
 pub mod angle;
+pub mod bounds;
 pub mod circle;
 pub mod direction;
+pub mod encoding;
 pub mod fixed;
 mod frame;
 pub mod law;

@@ -7,7 +7,9 @@
 )]
 use giotto::campaign::Direction;
 use giotto_tests::machine::run::simulate;
-use giotto_tests::machine::{AxisChain, Cyclic, Friction, Machine, Test, Thermal, Vibration};
+use giotto_tests::machine::{
+    AxisChain, Cyclic, Friction, Machine, Plane, Test, Thermal, Vibration,
+};
 use std::f64::consts::PI;
 
 const UM: f64 = 1e-6;
@@ -21,6 +23,9 @@ fn test(radius_m: f64, feed_m_s: f64, direction: Direction) -> Test {
         start_angle_rad: 0.0,
         started_s: 0.0,
         samples: N,
+        plane: Plane::XY,
+        centre_m: [0.0; 3],
+        from_rest: false,
     }
 }
 
@@ -29,7 +34,7 @@ fn profile(machine: &Machine, test: &Test) -> Vec<f64> {
     simulate(machine, test, 1000.0, 0.0)
         .position_m
         .iter()
-        .map(|p| p[0].hypot(p[1]) - test.radius_m)
+        .map(|p| test.plane.radius(*p) - test.radius_m)
         .collect()
 }
 
@@ -163,9 +168,9 @@ fn bandwidth_mismatch_is_even_and_along_the_axes() {
 #[test]
 fn geometry_has_its_ovals_lobes_and_chirp() {
     let mut m = Machine::default();
-    m.geometry.scale = [50e-6, 20e-6];
-    m.geometry.squareness_rad = 40e-6;
-    m.geometry.bow_per_m[0] = 3e-4;
+    m.geometry.scale = [50e-6, 20e-6, 0.0];
+    m.geometry.squareness_rad[0] = 40e-6;
+    m.geometry.bow_per_m[0][1] = 3e-4;
     both(|direction, _| {
         let t = test(0.3, 0.1, direction);
         let r = profile(&m, &t);
@@ -241,7 +246,7 @@ fn backlash_steps_outward_on_both_axes_both_ways() {
 fn lateral_play_moves_the_mean_against_the_direction() {
     for axis in 0..2 {
         let mut m = Machine::default();
-        m.lateral_play_m[axis] = 5.0 * UM;
+        m.lateral_play_m[axis][1 - axis] = 5.0 * UM;
         both(|direction, d| {
             let t = test(0.15, 0.1, direction);
             let r = profile(&m, &t);
@@ -355,6 +360,7 @@ fn heat_and_vibration_belong_to_time() {
         thermal: Some(Thermal {
             total: 100e-6,
             curvature: 0.0,
+            hook: 0.0,
         }),
         ..Machine::default()
     };
@@ -370,6 +376,7 @@ fn heat_and_vibration_belong_to_time() {
     let warm = Thermal {
         total: 100e-6,
         curvature: 2.0,
+        hook: 0.0,
     };
     near(
         warm.growth(1.0),

@@ -1,15 +1,17 @@
 //! The background's half: plans what the tick runs, and is the [`Motion`] of the server.
 use super::job::{Job, Points};
 use super::ports::{Receiver, Sender};
-use super::shared::Shared;
+use super::shared::{DECLARE, Shared};
 use super::{SEGMENTS, STREAM_PLACES};
-use crate::engine::{MAX_POSITION_M, Planned, Planner, Refused, ZoneError};
+use crate::engine::{
+    Config, FARTHEST_NM, MAX_POSITION_M, Planned, Planner, Refused, ZoneError, farthest_nm,
+};
 use crate::server::{Motion, Snapshot, TimedSetPoint};
 use core::ops::{Deref, DerefMut};
 use core::sync::atomic::Ordering::Relaxed;
-use giotto_shared::path::{ExactCircle, ExactSegment, Quantity};
+use giotto_shared::path::{ExactArc, ExactCircle, ExactSegment, Quantity};
 use giotto_shared::table::{self, Table, TableError};
-use giotto_shared::wire::{MotionRefusal, MotionState, Refusal, Steps};
+use giotto_shared::wire::{MotionRefusal, MotionState, Pose, PositionState, Refusal, Steps};
 
 /// What the background owns.
 pub struct Desk<P, S, O, I> {
@@ -32,29 +34,72 @@ struct Streamed {
     /// So many have to wait before the tick begins.
     ahead: u16,
     batches: u16,
+    /// Ticks that the tick may carry on beyond what has come, and its limits when it then stops.
+    hold_ticks: u32,
+    limits: [f32; 2],
 }
 
 /// Farthest coordinate of a set-point, nm.
 const MAX_POSITION_NM: u32 = (MAX_POSITION_M * 1e9) as u32;
 
 impl Streamed {
-    /// Reads set-points; `None`: bytes are left over, they are more than a batch, or a place is none.
-    fn read(&mut self, mut bytes: &[u8], points: &mut Points) -> Option<()> {
+    /// Reads set-points.
+    ///
+    /// # Errors
+    /// Bytes are left over, they are more than a batch, a place is none, or one from which a stop would lead out of all places.
+    fn read(&mut self, mut bytes: &[u8], points: &mut Points) -> Result<(), MotionRefusal> {
+        const NONE: MotionRefusal = MotionRefusal::Path(Quantity::Position);
         points.first = self.next;
         while !bytes.is_empty() {
-            bytes = self.steps.read(bytes)?;
+            let before = self.steps.step_nm();
+            bytes = self.steps.read(bytes).ok_or(NONE)?;
             let place_nm = self.steps.place_nm;
             if place_nm
                 .iter()
                 .any(|nm| nm.unsigned_abs() > MAX_POSITION_NM)
             {
-                return None;
+                return Err(NONE);
             }
-            *points.place_nm.get_mut(usize::from(points.count))? = place_nm;
+            if self.leads_out(before) {
+                return Err(MotionRefusal::NoRoomToStop);
+            }
+            *points
+                .place_nm
+                .get_mut(usize::from(points.count))
+                .ok_or(NONE)? = place_nm;
             points.count = points.count.wrapping_add(1);
             self.next = self.next.wrapping_add(1);
         }
-        Some(())
+        Ok(())
+    }
+
+    /// Whether the machine, were the newest set-point the last one to come, would leave the coordinates before it stands.
+    /// Mostly one comparison an axis: few are so near.
+    fn leads_out(&self, before: Pose) -> bool {
+        /// Farther from the end of the coordinates than any brake is long.
+        const FAR_NM: u32 = FARTHEST_NM as u32 / 2;
+        let step = self.steps.step_nm();
+        let place = self.steps.place_nm;
+        if place.iter().all(|nm| nm.unsigned_abs() < FAR_NM) {
+            return false;
+        }
+        let [x, y, z] = step.map(|nm| nm as f32);
+        let speed = libm::sqrtf(x * x + y * y + z * z);
+        place
+            .iter()
+            .zip(step)
+            .zip(before)
+            .any(|((&nm, step), was)| {
+                let outward = nm.signum().wrapping_mul(step);
+                let change = nm.signum().wrapping_mul(step.wrapping_sub(was));
+                let (velocity, change) = (outward as f32, change as f32);
+                let on = self.hold_ticks as f32 * velocity;
+                outward > 0
+                    && nm.unsigned_abs() as f32
+                        + on
+                        + farthest_nm(self.limits, speed, velocity, change)
+                        > FARTHEST_NM as f32
+            })
     }
 }
 
@@ -82,14 +127,27 @@ where
         let now = self.snapshot();
         match now.state {
             MotionState::Idle => {}
-            MotionState::Running | MotionState::Stopping => return Err(MotionRefusal::Busy),
+            MotionState::Running | MotionState::Stopping | MotionState::Paused => {
+                return Err(MotionRefusal::Busy);
+            }
             MotionState::Fault => return Err(MotionRefusal::Fault),
         }
         if now.stop_input {
             return Err(MotionRefusal::StopInput);
         }
+        if now.position == PositionState::Unknown {
+            return Err(MotionRefusal::NoPosition);
+        }
         self.shared.hold.store(false, Relaxed);
-        self.planner.resync(now.raw_nm, self.shared.epoch());
+        self.shared.pause.store(false, Relaxed);
+        // What was declared a moment ago the tick may not have seen.
+        let declared = self.shared.asked.load(Relaxed) & DECLARE != 0;
+        let here_nm = if declared {
+            self.shared.declared_nm()
+        } else {
+            now.raw_nm
+        };
+        self.planner.resync(here_nm, self.shared.epoch());
         Ok(())
     }
 
@@ -118,6 +176,19 @@ where
             Ok(())
         } else {
             Err(MotionRefusal::QueueFull)
+        }
+    }
+
+    /// The feed asked for under the override: never above the machine's, unless it was asked for, which is refused.
+    fn overridden(&self, feed_m_s: f32) -> f32 {
+        let limit = self.planner.feed_limit();
+        let wanted = feed_m_s * f32::from(self.shared.override_percent()) * 0.01;
+        if feed_m_s > limit {
+            feed_m_s
+        } else if wanted > limit {
+            limit
+        } else {
+            wanted
         }
     }
 
@@ -152,6 +223,8 @@ fn in_words(refused: Refused) -> MotionRefusal {
     match refused {
         Refused::Busy => MotionRefusal::Busy,
         Refused::Fault => MotionRefusal::Fault,
+        Refused::SoftLimit(axis) => MotionRefusal::SoftLimit { axis },
+        Refused::OutOfBounds(Quantity::Length) => MotionRefusal::TooLong,
         Refused::NotANumber(quantity) | Refused::OutOfBounds(quantity) => {
             MotionRefusal::Path(quantity)
         }
@@ -182,10 +255,7 @@ where
     }
 
     fn install(&mut self, image: Option<&[u8]>) -> Result<(), Refusal> {
-        if matches!(
-            self.snapshot().state,
-            MotionState::Running | MotionState::Stopping
-        ) {
+        if self.snapshot().state.is_run() {
             return Err(Refusal::Motion(MotionRefusal::Busy));
         }
         let Some(image) = image else {
@@ -210,9 +280,18 @@ where
     #[inline(never)]
     fn run_circle(&mut self, run: &ExactCircle) -> Result<(), MotionRefusal> {
         self.ready()?;
+        self.stream = None;
         // At rest the queue is empty, and it has room for both.
-        self.plan(|planner, planned| planner.approach(run, planned))?;
-        self.plan(|planner, planned| planner.circle(run, planned).map(|()| true))
+        let feed_m_s = self.overridden(run.feed_m_s);
+        let run = ExactCircle { feed_m_s, ..*run };
+        self.planner.soft_circle(&run).map_err(in_words)?;
+        self.plan(|planner, planned| {
+            let moves = planner.approach(&run, planned);
+            // The way there is not what was asked for.
+            planned.leave_out();
+            moves
+        })?;
+        self.plan(|planner, planned| planner.circle(&run, planned).map(|()| true))
     }
 
     fn begin(&mut self) -> Result<(), MotionRefusal> {
@@ -226,7 +305,13 @@ where
     fn append(&mut self, segment: &ExactSegment, _tolerance_nm: u32) -> Result<(), MotionRefusal> {
         self.open(false)?;
         self.room()?;
-        self.plan(|planner, planned| planner.segment(segment, planned).map(|()| true))
+        let mut segment = *segment;
+        if let ExactSegment::Line { feed_m_s, .. } | ExactSegment::Arc(ExactArc { feed_m_s, .. }) =
+            &mut segment
+        {
+            *feed_m_s = self.overridden(*feed_m_s);
+        }
+        self.plan(|planner, planned| planner.segment(&segment, planned).map(|()| true))
     }
 
     #[inline(never)]
@@ -248,6 +333,8 @@ where
             next: 0,
             ahead,
             batches: 0,
+            hold_ticks: plan.hold_ticks().saturating_add(1),
+            limits: plan.limits(),
         });
         self.shared.set_program(true);
         self.accepted(sent)
@@ -262,9 +349,11 @@ where
         };
         let mut job = Job::Points(Points::NONE);
         if let Job::Points(points) = &mut job {
-            streamed
-                .read(bytes, points)
-                .ok_or(MotionRefusal::Path(Quantity::Position))?;
+            streamed.read(bytes, points)?;
+            let count = usize::from(points.count);
+            for place_nm in points.place_nm.iter().take(count) {
+                self.planner.soft_place(place_nm).map_err(in_words)?;
+            }
         }
         let sent = self.segments.send(&job);
         streamed.batches = streamed.batches.saturating_add(1);
@@ -298,12 +387,56 @@ where
 
     fn stop(&mut self) {
         self.shared.stop.store(true, Relaxed);
+        self.shared.pause.store(false, Relaxed);
         self.shared.set_program(false);
     }
 
     fn hold(&mut self) {
         self.shared.hold.store(true, Relaxed);
         self.shared.set_program(false);
+    }
+
+    fn configure(&mut self, config: &Config) -> Result<(), MotionRefusal> {
+        if self.snapshot().state.is_run() {
+            return Err(MotionRefusal::Busy);
+        }
+        self.planner.set_config(config);
+        Ok(())
+    }
+
+    fn pause(&mut self, on: bool) -> Result<(), MotionRefusal> {
+        let now = self.snapshot();
+        let holds = matches!(now.state, MotionState::Running | MotionState::Paused)
+            && self.stream.is_none();
+        if on && !holds {
+            return Err(MotionRefusal::NotHeld);
+        }
+        self.shared.pause.store(on, Relaxed);
+        Ok(())
+    }
+
+    fn set_override(&mut self, percent: u8) {
+        self.shared.set_override(percent);
+    }
+
+    fn clear_fault(&mut self) -> Result<(), MotionRefusal> {
+        if self.snapshot().state.is_run() {
+            return Err(MotionRefusal::Busy);
+        }
+        self.shared.clear_fault();
+        Ok(())
+    }
+
+    fn declare(&mut self, place_nm: Pose) -> Result<(), MotionRefusal> {
+        if self.snapshot().state.is_run() {
+            return Err(MotionRefusal::Busy);
+        }
+        let outside = |nm: &i32| nm.unsigned_abs() > MAX_POSITION_NM;
+        if place_nm.iter().any(outside) {
+            return Err(MotionRefusal::Path(Quantity::Position));
+        }
+        self.shared.declare(place_nm);
+        Ok(())
     }
 
     fn subscribe(&mut self, every: u16) {

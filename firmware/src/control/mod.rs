@@ -10,6 +10,7 @@
 //!
 //! Either end of a queue has one owner. The words of [`Shared`] are written by one side each; a table and a
 //! segment cross whole, inside the queue.
+pub mod bench;
 mod desk;
 mod job;
 mod jobs;

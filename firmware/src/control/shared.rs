@@ -5,7 +5,7 @@ use core::sync::atomic::{
     AtomicBool, AtomicI32, AtomicU8, AtomicU16, AtomicU32, Ordering::Relaxed,
 };
 use core::sync::atomic::{Ordering, compiler_fence};
-use giotto_shared::wire::{FaultCause, MotionState};
+use giotto_shared::wire::{FaultCause, MotionState, PositionState};
 
 /// State of the engine as the tick leaves it, and wishes of the background. On one core, so that a
 /// compiler fence orders what the interrupt writes.
@@ -30,6 +30,13 @@ pub struct Shared {
     late: AtomicU32,
     rejected: AtomicU32,
     // Written by the background.
+    position: AtomicU8,
+    override_percent: AtomicU8,
+    /// Wishes for a machine at rest, each a bit: raised by the background, lowered by the tick.
+    pub(super) asked: AtomicU8,
+    declared_nm: [AtomicI32; 3],
+    /// Feed hold.
+    pub(super) pause: AtomicBool,
     /// A stream that waits may begin.
     pub(super) go: AtomicBool,
     /// Epoch of the program that is open, or [`NO_PROGRAM`]. A stop ends the epoch, and the program with it.
@@ -51,10 +58,19 @@ impl Default for Shared {
 
 const NO_PROGRAM: u16 = u16::MAX;
 
+/// Bits of `asked`: forget the fault; the machine stands where `declared_nm` says.
+pub(super) const CLEAR: u8 = 1;
+pub(super) const DECLARE: u8 = 2;
+
 const REST: u8 = 0;
 const RUNNING: u8 = 1;
 const STOPPING: u8 = 2;
 const FAULT: u8 = 3;
+const PAUSED: u8 = 4;
+
+const UNKNOWN: u8 = 0;
+const KNOWN: u8 = 1;
+const KEPT: u8 = 2;
 
 const NO_FAULT: u8 = 0;
 const OVERRUN: u8 = 1;
@@ -62,9 +78,14 @@ const DISCONTINUITY: u8 = 2;
 const STARVED: u8 = 3;
 
 impl Shared {
-    /// At rest at the origin, bypassed.
+    /// At rest at the origin, which is where the machine stands, bypassed.
     pub const fn new() -> Self {
         Self {
+            position: AtomicU8::new(KNOWN),
+            override_percent: AtomicU8::new(100),
+            asked: AtomicU8::new(0),
+            declared_nm: [const { AtomicI32::new(0) }; 3],
+            pause: AtomicBool::new(false),
             tick: AtomicU32::new(0),
             state: AtomicU8::new(REST),
             epoch: AtomicU8::new(0),
@@ -98,6 +119,50 @@ impl Shared {
         self.stop_input.store(active, Relaxed);
     }
 
+    /// Before the first tick: where the machine stands, and how that is known. The executor has to begin there too.
+    pub fn stands(&self, place_nm: [i32; 3], known: PositionState) {
+        for words in [&self.raw_nm, &self.corrected_nm] {
+            for (word, nm) in words.iter().zip(place_nm) {
+                word.store(nm, Relaxed);
+            }
+        }
+        let known = match known {
+            PositionState::Unknown => UNKNOWN,
+            PositionState::Known => KNOWN,
+            PositionState::Kept => KEPT,
+        };
+        self.position.store(known, Relaxed);
+    }
+
+    /// Asks the tick to forget a fault.
+    pub(super) fn clear_fault(&self) {
+        self.asked.fetch_or(CLEAR, Relaxed);
+    }
+
+    /// Tells the tick where the machine stands.
+    pub(super) fn declare(&self, place_nm: [i32; 3]) {
+        for (word, nm) in self.declared_nm.iter().zip(place_nm) {
+            word.store(nm, Relaxed);
+        }
+        self.position.store(KNOWN, Relaxed);
+        self.asked.fetch_or(DECLARE, Relaxed);
+    }
+
+    /// What was declared last, nm.
+    pub(super) fn declared_nm(&self) -> [i32; 3] {
+        self.declared_nm.each_ref().map(|word| word.load(Relaxed))
+    }
+
+    /// Share of the feed that is asked for, percent.
+    pub(super) fn set_override(&self, percent: u8) {
+        self.override_percent.store(percent, Relaxed);
+    }
+
+    /// The same.
+    pub(super) fn override_percent(&self) -> u8 {
+        self.override_percent.load(Relaxed)
+    }
+
     /// Publishes a tick.
     #[allow(clippy::too_many_arguments, reason = "the words of one tick")]
     pub(super) fn publish(
@@ -115,6 +180,7 @@ impl Shared {
             MotionState::Running => RUNNING,
             MotionState::Stopping => STOPPING,
             MotionState::Fault => FAULT,
+            MotionState::Paused => PAUSED,
         };
         self.state.store(state, Relaxed);
         self.epoch.store(epoch, Relaxed);
@@ -204,6 +270,7 @@ impl Shared {
                 REST => MotionState::Idle,
                 RUNNING => MotionState::Running,
                 STOPPING => MotionState::Stopping,
+                PAUSED => MotionState::Paused,
                 _ => MotionState::Fault,
             },
             tick,
@@ -228,6 +295,12 @@ impl Shared {
                 _ => Some(FaultCause::Starved),
             },
             stop_input: self.stop_input.load(Relaxed),
+            position: match self.position.load(Relaxed) {
+                UNKNOWN => PositionState::Unknown,
+                KEPT => PositionState::Kept,
+                _ => PositionState::Known,
+            },
+            override_percent: self.override_percent.load(Relaxed),
         }
     }
 }

@@ -3,7 +3,7 @@ use super::STREAM_PLACES;
 use super::job::Job;
 use super::jobs::Jobs;
 use super::ports::{Receiver, Sender};
-use super::shared::Shared;
+use super::shared::{CLEAR, DECLARE, Shared};
 use crate::engine::{Counters, Executor, Fault, Output, Stream, StreamState};
 use crate::server::TimedSetPoint;
 use core::ops::Deref;
@@ -21,6 +21,7 @@ pub struct Tick<S, I, O> {
     set_points: O,
     now: u32,
     bypass: bool,
+    pause: bool,
     stop_input: bool,
     /// Ticks to the next set-point of the record; 0: none is being made.
     until_next: u16,
@@ -44,6 +45,7 @@ where
             set_points,
             now: 0,
             bypass: true,
+            pause: false,
             stop_input: false,
             until_next: 1,
             recording: false,
@@ -64,6 +66,7 @@ where
             self.stream
                 .start(&plan, self.executor.rest_nm(), 0, self.bypass);
             self.streaming = true;
+            self.executor.count_uncorrected(!plan.corrected());
         }
         self.now = self.now.wrapping_add(1);
         let state = self.state();
@@ -105,12 +108,17 @@ where
             self.stream.finish();
         }
         let output = self.stream.tick(sample);
+        let starved = matches!(
+            self.stream.state(),
+            StreamState::Stopping | StreamState::Fault
+        );
+        if starved && self.executor.fault().is_none() {
+            // From now on what comes is refused, not only once it stands.
+            self.executor.fail(Fault::Starved);
+        }
         if self.stream.over() {
             self.streaming = false;
             self.executor.set_position(output.nominal_nm);
-            if self.stream.state() == StreamState::Fault {
-                self.executor.fail(Fault::Starved);
-            }
         }
         output
     }
@@ -122,6 +130,8 @@ where
         let shared = &self.shared;
         let wishes = shared.stop.load(Relaxed)
             || shared.stop_input.load(Relaxed) != self.stop_input
+            || shared.asked.load(Relaxed) != 0
+            || shared.pause.load(Relaxed) != self.pause
             || shared.bypass.load(Relaxed) != self.bypass;
         let state = self.state();
         let still = matches!(state, MotionState::Idle | MotionState::Fault)
@@ -155,6 +165,14 @@ where
                 self.stream.stop();
             }
         }
+        if self.shared.asked.load(Relaxed) != 0 && self.at_rest() {
+            self.asked();
+        }
+        let pause = self.shared.pause.load(Relaxed);
+        if pause != self.pause {
+            self.pause = pause;
+            self.executor.set_pause(pause);
+        }
         let closed = active || self.shared.hold.load(Relaxed);
         self.jobs
             .look_at(closed, self.shared.go.load(Relaxed), self.executor.epoch());
@@ -163,6 +181,18 @@ where
             self.bypass = bypass;
             self.executor.set_bypass(bypass);
             self.stream.set_bypass(bypass);
+        }
+    }
+
+    /// What can be done at rest only.
+    #[inline(never)]
+    fn asked(&mut self) {
+        let asked = self.shared.asked.swap(0, Relaxed);
+        if asked & CLEAR != 0 {
+            self.executor.clear_fault();
+        }
+        if asked & DECLARE != 0 {
+            self.executor.set_position(self.shared.declared_nm());
         }
     }
 
@@ -180,15 +210,20 @@ where
                 MotionState::Stopping
             };
         }
-        let at_rest = self.executor.idle() && self.jobs.waiting() == 0;
-        if !at_rest {
+        let waits = self.jobs.waiting() > 0;
+        if self.executor.paused() || (waits && self.pause && self.executor.idle()) {
+            MotionState::Paused
+        } else if !self.executor.idle() {
             if self.executor.stopping() {
                 MotionState::Stopping
             } else {
                 MotionState::Running
             }
         } else if self.executor.fault().is_some() {
+            // Whatever still waits is thrown away.
             MotionState::Fault
+        } else if waits {
+            MotionState::Running
         } else if self.shared.program_open(self.executor.epoch()) {
             // It waits for more.
             MotionState::Running
@@ -201,7 +236,7 @@ where
     #[inline]
     fn record(&mut self, output: &Output, state: MotionState) {
         let every = self.shared.every.load(Relaxed);
-        let moving = matches!(state, MotionState::Running | MotionState::Stopping);
+        let moving = state.is_run();
         if every == 0 {
             self.recording = false;
             return;

@@ -4,11 +4,11 @@
 //! first tick with [`flag::MOVING`](super::flag::MOVING) begins what counts, ticks without it (rest, settling) do not.
 use super::planner::Planner;
 use super::{Config, Executor, Output, Planned, Stream, StreamSample};
-use giotto_shared::Axis;
 use giotto_shared::model::Cumulants;
 use giotto_shared::path::{Segment, smoothstep};
 use giotto_shared::table::{Limits, Table, Travel, Zone};
 use giotto_shared::term::Term;
+use giotto_shared::{Actuator, Plane};
 
 const TICK_S: f64 = 1e-3;
 /// As on the images.
@@ -22,40 +22,42 @@ const CUMULANTS: Cumulants<f32> = Cumulants {
     kappa4_s4: -5.5265e-6,
 };
 
-/// Eight profile terms, the dearest there are: reversal pulses and play of both axes, a periodic error.
+/// Eight profile terms, the dearest there are for the tick: periodic errors and reversal pulses of all three slides, a bow,
+/// and one that goes with the rate (those that are linear cost the same for one as for all).
 pub const TERMS: [Term<f32>; 8] = [
-    Term::Squareness { shear_rad: 80e-6 },
     Term::ServoMismatch {
+        plane: Plane::Zx,
         delta_tau_s: 100e-6,
     },
-    Term::BandwidthMismatch {
-        delta_kappa2_s2: 5e-6,
+    Term::Straightness {
+        actuator: Actuator::X,
+        across: Actuator::Z,
+        curvature_per_m: 1e-4,
     },
-    Term::Backlash {
-        axis: Axis::X,
-        step_m: 10e-6,
-    },
-    Term::Backlash {
-        axis: Axis::Y,
-        step_m: 12e-6,
-    },
+    spike(Actuator::X, 8e-6),
+    spike(Actuator::Y, 6e-6),
+    spike(Actuator::Z, 4e-6),
+    cyclic(Actuator::X, 2e-6),
+    cyclic(Actuator::Y, 1e-6),
+    cyclic(Actuator::Z, 1e-6),
+];
+
+const fn spike(actuator: Actuator, peak_m: f32) -> Term<f32> {
     Term::ReversalSpike {
-        axis: Axis::X,
-        peak_m: 8e-6,
+        actuator,
+        peak_m,
         decay_s: 0.05,
-    },
-    Term::ReversalSpike {
-        axis: Axis::Y,
-        peak_m: 6e-6,
-        decay_s: 0.04,
-    },
+    }
+}
+
+const fn cyclic(actuator: Actuator, amplitude_m: f32) -> Term<f32> {
     Term::Cyclic {
-        axis: Axis::X,
-        amplitude_m: 2e-6,
+        actuator,
+        amplitude_m,
         pitch_m: 0.01,
         phase_rad: 0.5,
-    },
-];
+    }
+}
 
 fn table(extended: bool) -> Table {
     let terms = if extended {
@@ -82,6 +84,33 @@ fn table(extended: bool) -> Table {
     }
 }
 
+/// Where the arc of [`Arc`] starts, and its plan.
+pub(crate) fn planned(extended: bool, rise_m: f64) -> ([i32; 3], Option<Planned>) {
+    let config = Config::robot(1000);
+    let normal = [0.0, 0.5, 1.0];
+    // cos and sin of −0.3 rad along two vectors of the plane: X, and the normal crossed with it.
+    let (cos, sin, length) = (0.955_336_5, -0.295_520_2, 1.118_034);
+    let arm = [cos, sin * normal[2] / length, -sin * normal[1] / length];
+    let mut start = [0; 3];
+    for ((nm, centre), arm) in start.iter_mut().zip(CENTRE_M).zip(arm) {
+        *nm = ((centre + RADIUS_M * arm) * 1e9) as i32;
+    }
+    let mut planner = Planner::new(&config, start);
+    let arc = Segment::Arc {
+        centre_m: CENTRE_M,
+        normal,
+        sweep_rad: 3.0 * core::f64::consts::PI,
+        rise_m,
+        feed_m_s: FEED_M_S,
+    };
+    let mut planned = Planned::default();
+    let done = planner.set_table(Some(&table(extended))).is_ok()
+        && arc
+            .exact(start)
+            .is_ok_and(|exact| planner.segment(&exact, &mut planned).is_ok());
+    (start, done.then_some(planned))
+}
+
 /// A planned arc and the executor that runs it (first, where one load reaches two of its words).
 #[repr(C)]
 pub struct Arc {
@@ -93,35 +122,12 @@ impl Arc {
     /// One and a half turns with the β model alone, or with [`TERMS`] as well. Each axis reverses at constant feed, and X
     /// in the rising ramp too. With a rise (m) it is a helix.
     pub fn new(extended: bool, rise_m: f64) -> Self {
-        let config = Config::robot(1000);
-        let normal = [0.0, 0.5, 1.0];
-        // cos and sin of −0.3 rad along two vectors of the plane: X, and the normal crossed with it.
-        let (cos, sin, length) = (0.955_336_5, -0.295_520_2, 1.118_034);
-        let arm = [cos, sin * normal[2] / length, -sin * normal[1] / length];
-        let mut start = [0; 3];
-        for ((nm, centre), arm) in start.iter_mut().zip(CENTRE_M).zip(arm) {
-            *nm = ((centre + RADIUS_M * arm) * 1e9) as i32;
-        }
-        let mut planner = Planner::new(&config, start);
         let mut queue = heapless::spsc::Queue::new();
-        let sweep_rad = 3.0 * core::f64::consts::PI;
-        let arc = Segment::Arc {
-            centre_m: CENTRE_M,
-            normal,
-            sweep_rad,
-            rise_m,
-            feed_m_s: FEED_M_S,
-        };
-        if planner.set_table(Some(&table(extended))).is_ok()
-            && let Ok(exact) = arc.exact(start)
-        {
-            let mut planned = Planned::default();
-            // Looked at in `sound`; the queue is empty.
-            let _ = planner.segment(&exact, &mut planned);
-            let _ = queue.enqueue(planned);
-        }
+        let (start, planned) = planned(extended, rise_m);
+        // Whether there is one is looked at in `sound`; the queue is empty.
+        let _ = planned.map(|planned| queue.enqueue(planned));
         Self {
-            executor: Executor::new(start, config.engage_ticks(), false),
+            executor: Executor::new(start, Config::robot(1000).engage_ticks(), false),
             queue,
         }
     }

@@ -1,5 +1,6 @@
 //! What the engine is told about the machine, and the bounds that no table can widen.
-use giotto_shared::path::MotionLimits;
+use giotto_shared::path::{MAX_POSITION_M, MotionLimits};
+use giotto_shared::wire::{ConfigField, MachineConfig};
 
 /// Slowest and fastest tick the engine is built for, Hz.
 pub const RATE_HZ: [u32; 2] = [250, 20_000];
@@ -29,7 +30,17 @@ pub struct Config {
     pub stream_window_s: f64,
     /// Ticks that a missing set-point of a stream is bridged.
     pub stream_hold_ticks: u32,
+    /// Soft limits by axis, least and most, nm: no path leaves them.
+    pub soft_nm: [[i32; 2]; 3],
+    /// Correct although the ticks are not counted by a crystal.
+    pub internal_clock: bool,
 }
+
+/// The whole of an axis, nm.
+const WHOLE_NM: [i32; 2] = [
+    -((MAX_POSITION_M * 1e9) as i32),
+    (MAX_POSITION_M * 1e9) as i32,
+];
 
 impl Config {
     /// A robot's worth of limits: 1 m/s, 5 m/s², 100 m/s³; offsets to 20 mm at 0.2 m/s.
@@ -48,6 +59,8 @@ impl Config {
             take_up_s: 0.008,
             stream_window_s: 0.015,
             stream_hold_ticks: 5,
+            soft_nm: [WHOLE_NM; 3],
+            internal_clock: false,
         }
     }
 
@@ -82,6 +95,55 @@ impl Config {
             }
         }
         Ok(self)
+    }
+
+    /// As it is said on the wire.
+    pub const fn said(&self) -> MachineConfig {
+        MachineConfig {
+            feed_m_s: self.motion.feed_m_s as f32,
+            acceleration_m_s2: self.motion.acceleration_m_s2 as f32,
+            jerk_m_s3: self.motion.jerk_m_s3 as f32,
+            positioning_m_s: self.positioning_m_s as f32,
+            offset_m: self.offset_m as f32,
+            slew_m_s: self.slew_m_s as f32,
+            stream_window_s: self.stream_window_s as f32,
+            soft_nm: self.soft_nm,
+            internal_clock: self.internal_clock,
+        }
+    }
+
+    /// With the numbers of the wire, if each of them is usable; otherwise the first that is not.
+    pub fn with(self, said: &MachineConfig) -> Result<Self, ConfigField> {
+        let config = Self {
+            motion: MotionLimits {
+                feed_m_s: f64::from(said.feed_m_s),
+                acceleration_m_s2: f64::from(said.acceleration_m_s2),
+                jerk_m_s3: f64::from(said.jerk_m_s3),
+            },
+            positioning_m_s: f64::from(said.positioning_m_s),
+            offset_m: f64::from(said.offset_m),
+            slew_m_s: f64::from(said.slew_m_s),
+            stream_window_s: f64::from(said.stream_window_s),
+            soft_nm: said.soft_nm,
+            internal_clock: said.internal_clock,
+            ..self
+        };
+        let ordered = config
+            .soft_nm
+            .iter()
+            .all(|[least, most]| least < most && *least >= WHOLE_NM[0] && *most <= WHOLE_NM[1]);
+        if !ordered {
+            return Err(ConfigField::Soft);
+        }
+        config.checked().map_err(|ConfigError(name)| match name {
+            "motion.feed_m_s" => ConfigField::Feed,
+            "motion.acceleration_m_s2" => ConfigField::Acceleration,
+            "motion.jerk_m_s3" => ConfigField::Jerk,
+            "positioning_m_s" => ConfigField::Positioning,
+            "offset_m" => ConfigField::Offset,
+            "slew_m_s" => ConfigField::Slew,
+            _ => ConfigField::Window,
+        })
     }
 
     /// Seconds per tick.

@@ -9,8 +9,6 @@ pub(crate) struct Guard {
     easy_slew_nm: u32,
     offset_nm: i32,
     slew_nm: i32,
-    /// Ticks may have passed without `last_nm` being kept.
-    stale: bool,
 }
 
 /// The largest power of two not above a bound; 0 for 0.
@@ -41,7 +39,6 @@ impl Guard {
             easy_slew_nm,
             offset_nm,
             slew_nm,
-            stale: false,
         }
     }
 
@@ -49,7 +46,6 @@ impl Guard {
     pub(crate) fn set(&mut self, offset_nm: i32, slew_nm: i32) {
         *self = Self {
             last_nm: self.last_nm,
-            stale: self.stale,
             ..Self::new(offset_nm, slew_nm)
         };
     }
@@ -65,30 +61,9 @@ impl Guard {
         self.last_nm
     }
 
-    /// From now on [`Self::small`] may be asked instead of [`Self::pass_easily`].
-    pub(crate) fn rely_on_plan(&mut self) {
-        self.stale = true;
-    }
-
-    /// [`Self::rely_on_plan`], unless watched.
-    pub(crate) fn rely_on_plan_if_easy(&mut self) {
-        self.stale = self.easy_offset_nm != 0;
-    }
-
-    /// Comes to rest with an offset after a plan that was relied on; `false` (and no effect) while watched, or if the
-    /// offset is not easily seen to be within its bound.
-    pub(crate) fn rest(&mut self, wanted: [i32; 3]) -> bool {
-        let relied = self.stale && self.small(wanted);
-        if relied {
-            (self.stale, self.last_nm) = (false, wanted);
-        }
-        relied
-    }
-
-    /// The offset is easily seen to be within its bound. Enough for a segment whose change of offset the planner
-    /// proved to be within bounds.
+    /// The offset is easily seen to be within its bound.
     #[inline(always)]
-    pub(crate) fn small(&self, [x, y, z]: [i32; 3]) -> bool {
+    fn small(&self, [x, y, z]: [i32; 3]) -> bool {
         // v or its ones' complement, whichever is not negative: below 2ⁿ if and only if −2ⁿ ≤ v < 2ⁿ.
         let size = |v: i32| (v ^ (v >> 31)) as u32;
         (size(x) | size(y) | size(z)) < self.easy_offset_nm
@@ -135,9 +110,6 @@ impl Guard {
 
     /// The offset that may go out, axis by axis.
     pub(crate) fn pass(&mut self, wanted: [i32; 3]) -> ([i32; 3], Verdict) {
-        if self.stale {
-            (self.stale, self.last_nm) = (false, wanted);
-        }
         let mut verdict = Verdict::default();
         let mut passed = [0; 3];
         for ((out, want), last) in passed.iter_mut().zip(wanted).zip(self.last_nm) {

@@ -51,6 +51,7 @@ pub use giotto_shared::path::{
 };
 pub use planned::Planned;
 pub use planner::{Planner, Refused};
+pub(crate) use stream::{FARTHEST_NM, farthest_nm};
 pub use stream::{PLACES, Stream, StreamCounters, StreamPlan, StreamSample, StreamState};
 pub use zones::ZoneError;
 

@@ -172,8 +172,6 @@ pub struct Planned {
     pub(crate) kind: Kind,
     /// A zone of the table applies.
     pub(crate) corrected: bool,
-    /// The planner proved that the change of the offset stays within its bound.
-    pub(crate) proven: bool,
     /// The zone has profile terms.
     pub(crate) extended: bool,
     /// Segments planned before a stop carry an older one.
@@ -204,6 +202,11 @@ impl Planned {
     /// How many ticks it takes once started, settling not counted.
     pub const fn ticks(&self) -> u64 {
         self.timing.cruise_ticks as u64 + 2 * self.timing.ramp_ticks as u64
+    }
+
+    /// Not counted if no zone applies.
+    pub(crate) const fn leave_out(&mut self) {
+        self.corrected = true;
     }
 
     /// Whether a zone of the table applies.

@@ -1,31 +1,30 @@
-//! The senses in which X and Y travel, and what hangs on them: play, lateral play and friction pulses.
+//! The senses in which X, Y and Z travel, and what hangs on them: play, lateral play and friction pulses.
 //!
-//! A reversal is seen half a take-up time ahead of the axis. Over the take-up time the offset then moves from one side to
+//! A reversal is seen half a take-up time ahead of the slide. Over the take-up time the offset then moves from one side to
 //! the other by the smoothstep of degree 5, S′ = (15/8)·w² with w = 1 − x², added up tick by tick at the middle of each
-//! tick; what the sum leaves (2e-4 of the way at 8 ticks, with the fourth power of their number) is set right at the end.
-//! The friction pulse rises with it and then decays. One axis turns at a time: the other's turn begins when that is over.
+//! tick; what the sum leaves (2e-4 of the way at 8 ticks, with the fourth power of their number) is set right when no
+//! slide turns any more. The friction pulse rises with it and then decays. In a tilted plane two slides may turn at once.
 use super::extra::Extra;
-use core::sync::atomic::{Ordering, compiler_fence};
 use giotto_shared::fixed::{mulh, mulh_add};
 
 /// Fraction bits of offsets here, of nm.
 pub(crate) const FINE: u32 = 8;
-/// Indicators below this, nm, do not turn a side: the axis stands, or stands as good as still.
+/// Indicators below this, nm, do not turn a side: the slide stands, or stands as good as still.
 const DEAD_NM: i32 = 16;
 
 /// Kept from segment to segment: play stays on its side at rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub(crate) struct Sides {
-    side: [Side; 2],
-    /// Offset of X and Y by the sides and by what is constant, in [`FINE`] nm.
-    base: [i32; 2],
-    /// The same when both sides are settled: X backward adds 1 to the place, Y backward 2.
-    settled: [[i32; 2]; 4],
+    side: [Side; 3],
+    /// Offset of X, Y and Z by the sides and by what is constant, in [`FINE`] nm.
+    base: [i32; 3],
+    /// The same when all sides are settled: X backward adds 1 to the place, Y backward 2, Z backward 4.
+    settled: [[i32; 3]; 8],
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 struct Side {
-    /// 0 while the axis travels forward, −1 backward; in a turn, what it turns to.
+    /// 0 while the slide travels forward, −1 backward; in a turn, what it turns to.
     mask: i32,
     /// An indicator below this, turned over by `mask`, is a reversal.
     limit: i32,
@@ -36,40 +35,42 @@ struct Side {
     left: u32,
     /// Middle of the turn's next tick, Q31.
     x: i32,
-    /// What a turn adds per tick to the pulse, and to the offset of X and Y, at w² = 1 (Q31).
+    /// What a turn adds per tick to the pulse, and to the offset of X, Y and Z, at w² = 1 (Q31).
     rise: i32,
-    jump: [i32; 2],
-    /// The axis has moved: its sense is known.
+    jump: [i32; 3],
+    /// The slide has moved: its sense is known.
     known: bool,
 }
 
 impl Sides {
-    /// Before a segment whose indicators are `ahead` where it begins. An axis that never moved takes the side that
+    /// Before a segment whose indicators are `ahead` where it begins. A slide that never moved takes the side that
     /// the segment begins with.
-    pub(crate) fn begin(&mut self, extra: &Extra, ahead: [i32; 2]) {
+    pub(crate) fn begin(&mut self, extra: &Extra, ahead: [i32; 3]) {
         let t = &extra.turning;
-        for (axis, side) in self.side.iter_mut().enumerate() {
-            let moves = extra.ahead[axis]
-                .iter()
-                .any(|nm| nm.unsigned_abs() > DEAD_NM as u32);
+        let by_slide = ahead.into_iter().zip(extra.ahead).zip(t.fade).zip(t.jump);
+        for (side, (((ahead, weights), fade), jump)) in self.side.iter_mut().zip(by_slide) {
+            let moves = weights.iter().any(|nm| nm.unsigned_abs() > DEAD_NM as u32);
             if !side.known && moves {
-                (side.known, side.mask) = (true, if ahead[axis] >= 0 { 0 } else { -1 });
+                (side.known, side.mask) = (true, if ahead >= 0 { 0 } else { -1 });
             }
             side.limit = if extra.sided && moves {
                 DEAD_NM.wrapping_neg()
             } else {
                 i32::MIN
             };
-            side.fade = t.fade[axis];
-            side.jump = t.jump[axis].map(|jump| jump ^ side.mask);
+            side.fade = fade;
+            side.jump = jump.map(|jump| jump ^ side.mask);
         }
-        self.settled = [[0, 0], [-1, 0], [0, -1], [-1, -1]]
-            .map(|[x, y]| self.offset(extra, [sense(x), sense(y)]));
+        self.settled = [0, 1, 2, 3, 4, 5, 6, 7].map(|place: i32| {
+            let backward = |bit: i32| sense(if place & bit == 0 { 0 } else { -1 });
+            let senses = [backward(1), backward(2), backward(4)];
+            self.offset(extra, senses)
+        });
         self.base = self.offset(extra, self.side.map(|side| side.sense(t.dx)));
     }
 
-    /// Offset of X and Y at these senses (Q31), as far as they are known.
-    fn offset(&self, extra: &Extra, senses: [i32; 2]) -> [i32; 2] {
+    /// Offset of X, Y and Z at these senses (Q31), as far as they are known.
+    fn offset(&self, extra: &Extra, senses: [i32; 3]) -> [i32; 3] {
         let mut offset = extra.constant_fine;
         for ((side, by), sense) in self.side.iter().zip(extra.turning.side).zip(senses) {
             for (o, by) in offset.iter_mut().zip(by) {
@@ -79,66 +80,68 @@ impl Sides {
         offset
     }
 
-    /// Offset of X and Y as it stands, nm.
-    pub(crate) fn standing(&self) -> [i32; 2] {
-        let [x, y] = &self.side;
-        let [bx, by] = self.base;
+    /// Offset of X, Y and Z as it stands, nm.
+    pub(crate) fn standing(&self) -> [i32; 3] {
+        let ([x, y, z], [bx, by, bz]) = (&self.side, self.base);
         [
             bx.wrapping_add(x.pulse) >> FINE,
             by.wrapping_add(y.pulse) >> FINE,
+            bz.wrapping_add(z.pulse) >> FINE,
         ]
     }
 
-    /// Offset of X and Y, nm, one tick later, at these weights of the curve's vectors.
+    /// Offset of X, Y and Z, nm, one tick later, at these weights of the curve's vectors.
     #[inline(always)]
-    pub(crate) fn tick(&mut self, extra: &Extra, c: i32, s: i32) -> [i32; 2] {
-        let [ahead_x, ahead_y] = extra.ahead_at(c, s);
-        let [x, y] = &mut self.side;
-        x.pulse = mulh_add(x.pulse, x.pulse, x.fade);
-        y.pulse = mulh_add(y.pulse, y.pulse, y.fade);
-        // What is put away is loaded again: carried over the branches it would have to be put away twice.
-        compiler_fence(Ordering::AcqRel);
-        let mut ended = false;
-        if x.left != 0 {
-            ended = x.turn(&mut self.base, extra.turning.dx);
-        } else if y.left != 0 {
-            ended = y.turn(&mut self.base, extra.turning.dx);
-        } else if (ahead_x ^ x.mask) < x.limit {
-            x.reverse(extra, 0);
-        } else if (ahead_y ^ y.mask) < y.limit {
-            y.reverse(extra, 1);
+    pub(crate) fn tick(&mut self, extra: &Extra, c: i32, s: i32) -> [i32; 3] {
+        let [ahead_x, ahead_y, ahead_z] = extra.ahead_at(c, s);
+        let [x, y, z] = &mut self.side;
+        let mut ended = x.tick(extra, 0, ahead_x, &mut self.base);
+        ended |= y.tick(extra, 1, ahead_y, &mut self.base);
+        ended |= z.tick(extra, 2, ahead_z, &mut self.base);
+        if ended && (x.left | y.left | z.left) == 0 {
+            let place = (x.mask & 1) | (y.mask & 2) | (z.mask & 4);
+            self.base = self.settled[(place & 7) as usize];
         }
-        if ended {
-            let place = (x.mask & 1) | (y.mask & 2);
-            self.base = self.settled[(place & 3) as usize];
-        }
-        compiler_fence(Ordering::AcqRel);
         self.standing()
     }
 }
 
 impl Side {
+    /// One tick; whether it was the last of a turn.
+    #[inline(always)]
+    fn tick(&mut self, extra: &Extra, slide: usize, ahead: i32, base: &mut [i32; 3]) -> bool {
+        self.pulse = mulh_add(self.pulse, self.pulse, self.fade);
+        if self.left != 0 {
+            return self.turn(base, extra.turning.dx);
+        }
+        if (ahead ^ self.mask) < self.limit {
+            self.reverse(extra, slide);
+        }
+        false
+    }
+
     /// Begins a turn.
     #[inline(always)]
-    fn reverse(&mut self, extra: &Extra, axis: usize) {
+    fn reverse(&mut self, extra: &Extra, slide: usize) {
         let t = &extra.turning;
         self.mask = !self.mask;
-        // The axis lags behind its new sense: the correction goes ahead with it. What is left of the last pulse goes.
-        let height = t.spike[axis] ^ self.mask;
+        // The slide lags behind its new sense: the correction goes ahead with it. What is left of the last pulse goes.
+        let height = t.spike[slide] ^ self.mask;
         self.rise = mulh(height.wrapping_sub(self.pulse), t.share_q30).wrapping_mul(4);
-        self.jump = [t.jump[axis][0] ^ self.mask, t.jump[axis][1] ^ self.mask];
+        self.jump = t.jump[slide].map(|jump| jump ^ self.mask);
         (self.left, self.x) = (t.ticks, t.first_x);
     }
 
     /// One tick of a turn; whether it was the last.
     #[inline(always)]
-    fn turn(&mut self, base: &mut [i32; 2], dx: i32) -> bool {
+    fn turn(&mut self, base: &mut [i32; 3], dx: i32) -> bool {
         let x = self.x;
         self.x = x.wrapping_add(dx);
         let w = mulh(x, x).wrapping_mul(2) ^ i32::MAX;
         let w2_q31 = mulh(w, w).wrapping_mul(2);
-        let ([bx, by], [jx, jy]) = (*base, self.jump);
-        *base = [mulh_add(bx, jx, w2_q31), mulh_add(by, jy, w2_q31)];
+        for (base, jump) in base.iter_mut().zip(self.jump) {
+            *base = mulh_add(*base, jump, w2_q31);
+        }
         self.pulse = mulh_add(self.pulse, self.rise, w2_q31);
         self.left = self.left.wrapping_sub(1);
         self.left == 0

@@ -8,21 +8,26 @@
 //!
 //! A set-point that is missing, late or further from the one before than the feed allows is replaced by carrying on
 //! at the last velocity and acceleration, for [`StreamPlan::hold_ticks`] at most ("hold"); a set-point that comes in that time is
-//! joined without a step. After that the path comes to rest along its tangent within the acceleration limit while
+//! joined without a step. After that the path comes to rest along its last curvature, within acceleration and jerk, while
 //! the correction is ramped out, and [`StreamState::Fault`] is latched. Nothing jumps at any time.
+mod brake;
 mod plan;
 
 use super::engage::Engage;
 use super::guard::Guard;
 use super::ramp::{Clock, POLYNOMIAL, clock_step, shapes};
 use super::{Counters, Output, flag};
+use brake::{Before, Brake};
 use core::sync::atomic::{Ordering, compiler_fence};
 
+pub(crate) use brake::farthest_nm;
 pub(super) use plan::StreamNeeds;
 pub use plan::StreamPlan;
 
 /// Places of a [`Stream`] that is told nothing else.
 pub const PLACES: usize = 32;
+/// Farthest coordinate that a brake may lead to, nm: with the largest offset of an image it is still a place.
+pub(crate) const FARTHEST_NM: i32 = 2_126_000_000;
 /// Ticks over which a set-point that comes after a gap is joined.
 const JOIN_TICKS: u32 = 32;
 
@@ -89,6 +94,7 @@ pub struct Stream<const N: usize = PLACES> {
     bias_nm: [i32; 3],
     joining: bool,
     join: Clock,
+    brake: Brake,
     engage: Engage,
     counters: StreamCounters,
 }
@@ -132,6 +138,7 @@ impl<const N: usize> Stream<N> {
             bias_nm: [0; 3],
             joining: false,
             join: Clock::default(),
+            brake: Brake::default(),
             guard: Guard::new(0, 0),
             engage: Engage::new(1, false),
             counters: StreamCounters::default(),
@@ -211,13 +218,12 @@ impl<const N: usize> Stream<N> {
         if self.takes() {
             if self.regular != CARE {
                 self.sequence = self.regular as u16;
-                self.look_back();
             }
             self.begin_rest(StreamState::Ended);
         }
     }
 
-    /// Stops within the acceleration limit, beginning with the next tick; the correction stays.
+    /// Stops within the limits, beginning with the next tick; the correction stays.
     pub fn stop(&mut self) {
         self.finish();
     }
@@ -438,40 +444,27 @@ impl<const N: usize> Stream<N> {
     }
 
     fn begin_rest(&mut self, then: StreamState) {
-        // Finer from now on: the velocity fades by shares of itself.
-        self.velocity = self.velocity.map(|v| v.wrapping_mul(1 << 8));
+        let place_nm = [0, 1, 2, 4, 8].map(|ticks| self.back(ticks));
+        self.brake = Brake::begin(&Before { place_nm }, self.plan.limits);
         self.regular = CARE;
-        self.bias_nm = [0; 3];
         self.state = then;
-        // After ten time constants 5e-5 of the velocity are left; then the filter empties, the correction fades.
-        let braking = if self.velocity == [0; 3] {
-            0
-        } else {
-            10u32 << self.plan.brake_shift
-        };
-        self.settling = braking.saturating_add(self.emptying());
+        // Then the filter empties, the correction fades.
+        self.settling = self.brake.ticks().saturating_add(self.emptying());
     }
 
-    /// Velocity fades along the tangent.
+    /// Comes to rest. Whoever takes set-points sees to it that there is room for that; if not, it ends where the
+    /// coordinates do.
     fn brake(&mut self) -> [i32; 3] {
         let mut taken = self.last_nm();
-        for ((t, v), rest) in taken
-            .iter_mut()
-            .zip(&mut self.velocity)
-            .zip(&mut self.bias_nm)
-        {
-            *v = v.wrapping_sub(*v >> self.plan.brake_shift);
-            // `bias_nm` keeps what is below a nanometre.
-            *rest = rest.wrapping_add(*v);
-            *t = t.wrapping_add(*rest >> 8);
-            *rest &= 0xff;
+        if self.settling > self.emptying() {
+            for (taken, step) in taken.iter_mut().zip(self.brake.step()) {
+                let next = taken.saturating_add(step);
+                *taken = next.clamp(FARTHEST_NM.wrapping_neg(), FARTHEST_NM);
+            }
         }
         self.settling = self.settling.saturating_sub(1);
         if self.settling == 0 && self.state == StreamState::Stopping {
             self.state = StreamState::Fault;
-        }
-        if self.settling <= self.emptying() {
-            self.velocity = [0; 3];
         }
         taken
     }
@@ -481,5 +474,7 @@ impl<const N: usize> Stream<N> {
     }
 }
 
+#[cfg(test)]
+mod brake_tests;
 #[cfg(test)]
 mod tests;

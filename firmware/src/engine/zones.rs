@@ -1,6 +1,7 @@
 //! The table as the planner uses it: each zone's operator and merged terms, checked once.
-use giotto_shared::law::{Operator, Profile, ProfileError};
+use giotto_shared::law::{Operator, Profile};
 use giotto_shared::table::{Limits, Table, Travel, Zone};
+use giotto_shared::term::{self, ProfileError};
 
 /// Why a table cannot be used. Zones count from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,7 +54,7 @@ impl Built {
         let profile = if zone.terms.is_empty() {
             None
         } else {
-            Some(Profile::new(&zone.terms).map_err(|e| ZoneError::Term(index, e))?)
+            Some(term::merged(&zone.terms).map_err(|e| ZoneError::Term(index, e))?)
         };
         let reference_m = zone.place_m.map(|[[x0, y0, z0], [x1, y1, z1]]| {
             [0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (z0 + z1)]

@@ -1,7 +1,7 @@
 //! What no run may ask for, whatever the table says.
 use giotto_shared::path::ExactArc;
 use giotto_shared::table::bounds;
-use giotto_shared::wire::{ExactCircle, ExactSegment, MotionRefusal, Quantity};
+use giotto_shared::wire::{ExactCircle, ExactSegment, MotionRefusal, OVERRIDE_PERCENT, Quantity};
 
 /// Most turns of one run.
 pub const MAX_LAPS: u32 = 10_000;
@@ -35,6 +35,12 @@ pub(super) fn check_segment(segment: &ExactSegment) -> Result<(), MotionRefusal>
         }
         ExactSegment::Dwell { time_s } => within(Quantity::Time, *time_s, 0.0, DWELL_MAX_S),
     }
+}
+
+/// Checks an override of the feed.
+pub(super) fn check_override(percent: u8) -> Result<(), MotionRefusal> {
+    let [lo, hi] = OVERRIDE_PERCENT.map(f32::from);
+    within(Quantity::Override, f32::from(percent), lo, hi)
 }
 
 /// Checks a feed alone.

@@ -6,16 +6,21 @@ use embedded_storage::nor_flash::NorFlash;
 
 /// Bytes taken from the port at once.
 const PIECE: usize = 32;
+/// Pieces taken before the caller has its turn: whoever talks without a pause must not keep it from its other work, such as
+/// the watchdog.
+const PIECES: usize = 16;
 
 impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
-    /// Answers what has arrived and sends the set-points that are due. Returns when nothing is left to do;
-    /// to be called again and again.
+    /// Answers what has arrived, so many bytes at most, and sends the set-points that are due; to be called again and again.
     ///
     /// # Errors
     /// Those of the port; what was being sent is then lost, and asked for again by the host.
     pub fn serve<L: Read + ReadReady + Write>(&mut self, link: &mut L) -> Result<(), L::Error> {
         self.supervise();
-        while link.read_ready()? && !self.reset_requested() {
+        for _ in 0..PIECES {
+            if !link.read_ready()? || self.reset_requested() {
+                break;
+            }
             let mut bytes = [0; PIECE];
             let count = link.read(&mut bytes)?;
             for &byte in bytes.iter().take(count) {

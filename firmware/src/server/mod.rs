@@ -9,8 +9,10 @@
 //! rest, takes it over on probation), `Confirm` (it is what boots from now on).
 mod authority;
 mod bounds;
+mod events;
 mod motion;
 mod session;
+mod settings;
 mod supervision;
 mod tables;
 mod upload;
@@ -22,14 +24,17 @@ mod tests;
 pub use bounds::{CENTRIPETAL_MAX_M_S2, MAX_LAPS};
 pub use motion::{Motion, Snapshot, TimedSetPoint};
 
+use crate::engine::Config;
 use crate::store::{ImageBuffer, Layout, Store, StoredKey};
 use core::ops::DerefMut;
 use embedded_storage::nor_flash::NorFlash;
+use events::Events;
 use giotto_shared::table::{FORMAT_VERSION, MAX_IMAGE_BYTES, SCHEMA_HASH};
 use giotto_shared::wire::{
-    self, Accumulator, CHUNK, Chunk, Command, Counters, ExactCircle, ExactSegment, FromController,
-    Identity, MAX_FRAME, MotionState, PROTOCOL_VERSION, Probation, Refusal, Reply, SET_POINTS,
-    SUPERVISE_MS, SetPoints, Status,
+    self, Accumulator, CHUNK, Chunk, ClockSource, Command, Counters, ExactCircle, ExactSegment,
+    FromController, Identity, MAX_FRAME, MachineConfig, MotionRefusal, MotionState,
+    PROTOCOL_VERSION, Probation, Refusal, Reply, ResetCause, SET_POINTS, SUPERVISE_MS, SetPoints,
+    Status, What,
 };
 use session::{Session, Turn};
 use supervision::Supervision;
@@ -44,6 +49,10 @@ pub struct Board {
     pub build: &'static str,
     /// Ticks a second.
     pub tick_hz: u32,
+    /// What they are counted by.
+    pub clock: ClockSource,
+    /// Why it started.
+    pub reset: ResetCause,
 }
 
 /// Memory of a server that is too large for a stack: a board keeps it in a static, the host on the heap.
@@ -100,8 +109,13 @@ pub struct Server<F, M, B> {
     /// A set-point that does not continue the batch before it.
     held: Option<TimedSetPoint>,
     supervision: Supervision,
+    events: Events,
+    config: MachineConfig,
+    config_stored: bool,
     lost_bytes: u32,
     stack_bytes: u32,
+    stack_left_bytes: u32,
+    worst_tick_permille: Option<u16>,
     idle_permille: Option<u16>,
     reset: bool,
 }
@@ -128,12 +142,20 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             on_link: false,
             held: None,
             supervision: Supervision::new(board.tick_hz),
+            events: Events::new(),
+            config: Config::robot(board.tick_hz).said(),
+            config_stored: false,
             lost_bytes: 0,
             stack_bytes: 0,
+            stack_left_bytes: 0,
+            worst_tick_permille: None,
             idle_permille: None,
             reset: false,
         };
+        server.load_config();
         server.install_last_good();
+        let slot = server.active;
+        server.events.booted(board.reset, slot);
         server
     }
 
@@ -167,9 +189,20 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
         self.lost_bytes = self.lost_bytes.wrapping_add(count);
     }
 
-    /// Deepest stack since boot, as the board measures it.
-    pub const fn note_stack(&mut self, bytes: u32) {
-        self.stack_bytes = bytes;
+    /// Deepest stack since boot, and what is left of it, as the board measures them.
+    pub const fn note_stack(&mut self, bytes: u32, left_bytes: u32) {
+        (self.stack_bytes, self.stack_left_bytes) = (bytes, left_bytes);
+    }
+
+    /// Longest tick since boot, thousandths of the time between two, as the board measures it.
+    pub const fn note_worst_tick(&mut self, permille: u16) {
+        self.worst_tick_permille = Some(permille);
+    }
+
+    /// Keeps it for the log.
+    fn note(&mut self, what: What) {
+        let tick = self.motion.now();
+        self.events.add(tick, what);
     }
 
     /// Share of its time the core sleeps, thousandths, as the board measures it.
@@ -179,16 +212,23 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
 
     /// Looks whether the link is still alive; to be called again and again.
     pub fn supervise(&mut self) {
-        if self.supervision.silent(self.motion.now())
-            && self.supervision.dead(self.motion.snapshot().state)
-        {
+        let snapshot = self.motion.snapshot();
+        self.events.look(&snapshot);
+        let now = self.motion.now();
+        if self.supervision.silent(now) && self.supervision.dead(snapshot.state, now) {
             self.motion.hold();
+            self.note(What::LinkLost);
+        }
+        if self.supervision.overdue(now) {
+            self.motion.stop();
+            self.note(What::Overdue);
         }
     }
 
     /// Takes a byte from the link; returns the frame to send if it completed a request.
     pub fn receive(&mut self, byte: u8) -> Option<&[u8]> {
         let payload = self.buffers.accumulator.push(byte)?;
+        let number = session::number(payload);
         let (head, command) = match session::read(payload) {
             Some(request) => request,
             None => {
@@ -211,7 +251,10 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             }
             Turn::New => {
                 let reply = match command {
-                    Ok(command) => self.execute(&command).unwrap_or_else(Reply::Refused),
+                    Ok(command) => match self.execute(&command) {
+                        Ok(reply) => reply,
+                        Err(why) => self.refuse(number, why),
+                    },
                     Err(session::NotUnderstood) => Reply::Refused(Refusal::NotUnderstood),
                 };
                 self.session.answered(head);
@@ -224,10 +267,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
 
     /// The next frame of set-points, once it is full or the run has ended.
     fn set_points(&mut self) -> Option<&[u8]> {
-        let moving = matches!(
-            self.motion.snapshot().state,
-            MotionState::Running | MotionState::Stopping
-        );
+        let moving = self.motion.snapshot().state.is_run();
         if moving && self.motion.set_points_waiting() < SET_POINTS {
             return None;
         }
@@ -270,21 +310,39 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             Command::WriteChunk { offset, data } => {
                 self.upload.chunk(*offset, data, &mut self.buffers.image)?
             }
-            Command::WriteEnd => return self.program().map(|slot| Reply::Written { slot }),
+            Command::WriteEnd => {
+                let slot = self.program()?;
+                self.note(What::Written { slot });
+                return Ok(Reply::Written { slot });
+            }
             Command::ReadBack {
                 slot,
                 offset,
                 length,
             } => return self.read_back(*slot, *offset, *length),
-            Command::Commit => self.commit()?,
-            Command::Confirm => self.confirm()?,
-            Command::Rollback => self.roll_back()?,
+            Command::Commit => {
+                let slot = self.commit()?;
+                self.note(What::Committed { slot });
+            }
+            Command::Confirm => {
+                let slot = self.confirm()?;
+                self.note(What::Confirmed { slot });
+            }
+            Command::Rollback => {
+                self.roll_back()?;
+                let slot = self.active;
+                self.note(What::RolledBack { slot });
+            }
             Command::Bypass { on } => {
                 if !*on && self.active.is_none() {
                     return Err(Refusal::NoTable);
                 }
+                if !*on && self.clock_forbids() {
+                    return Err(Refusal::Clock);
+                }
                 self.bypass = *on;
                 self.apply_bypass();
+                self.note(What::Bypassed { on: *on });
             }
             Command::RunCircle(run) => self.run_circle(run)?,
             Command::Begin => self.begin()?,
@@ -295,16 +353,52 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             Command::End => self.motion.end().map_err(Refusal::Motion)?,
             Command::BeginStream { feed_m_s, ahead } => self.begin_stream(*feed_m_s, *ahead)?,
             Command::Points { steps } => self.motion.points(steps).map_err(Refusal::Motion)?,
-            Command::Stop => self.motion.stop(),
+            Command::Stop => {
+                self.motion.stop();
+                self.note(What::Stopped);
+            }
             Command::Subscribe { every, on_link } => self.subscribe(*every, *on_link),
             Command::Reset => {
                 self.idle()?;
                 self.reset = true;
             }
+            Command::ClearFault => self.motion.clear_fault().map_err(Refusal::Motion)?,
+            Command::Declare { place_nm } => {
+                self.motion.declare(*place_nm).map_err(Refusal::Motion)?;
+                self.note(What::Declared);
+            }
+            Command::Pause => self.motion.pause(true).map_err(Refusal::Motion)?,
+            Command::Resume => self.motion.pause(false).map_err(Refusal::Motion)?,
+            Command::Override { percent } => self.set_override(*percent)?,
+            Command::Config => return Ok(self.config()),
+            Command::Configure(config) => self.configure(config)?,
+            Command::SaveConfig => self.save_config()?,
+            Command::Events { from } => return Ok(self.events(*from)),
             Command::Supervise { after_ms } => self.supervision.set(*after_ms),
             Command::Provision { key } => self.provision(*key)?,
         }
         Ok(Reply::Done)
+    }
+
+    /// For the log, unless it is only a matter of time.
+    #[inline(never)]
+    fn refuse(&mut self, request: u8, why: Refusal) -> Reply {
+        if why != Refusal::Motion(MotionRefusal::QueueFull) {
+            self.note(What::Refused { request, why });
+        }
+        Reply::Refused(why)
+    }
+
+    #[inline(never)]
+    fn events(&self, from: u32) -> Reply {
+        let (first, events) = self.events.from(from);
+        Reply::Events { first, events }
+    }
+
+    fn set_override(&mut self, percent: u8) -> Result<(), Refusal> {
+        bounds::check_override(percent).map_err(Refusal::Motion)?;
+        self.motion.set_override(percent);
+        Ok(())
     }
 
     /// Sends every so many ticks' set-point, on the link or on the port for set-points; 0: none.
@@ -316,12 +410,14 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     fn idle(&self) -> Result<(), Refusal> {
         match self.motion.snapshot().state {
             MotionState::Idle | MotionState::Fault => Ok(()),
-            MotionState::Running | MotionState::Stopping => Err(Refusal::Busy),
+            MotionState::Running | MotionState::Stopping | MotionState::Paused => {
+                Err(Refusal::Busy)
+            }
         }
     }
 
-    const fn bypassed(&self) -> bool {
-        self.bypass || self.active.is_none()
+    fn bypassed(&self) -> bool {
+        self.bypass || self.active.is_none() || self.clock_forbids()
     }
 
     fn apply_bypass(&mut self) {
@@ -425,6 +521,12 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             idle_permille: self.idle_permille,
             raw_nm: now.raw_nm,
             corrected_nm: now.corrected_nm,
+            position: now.position,
+            reset: self.board.reset,
+            clock: self.board.clock,
+            worst_tick_permille: self.worst_tick_permille,
+            stack_left_bytes: self.stack_left_bytes,
+            override_percent: now.override_percent,
             counters: Counters {
                 tick_overruns: now.tick_overruns,
                 offset_clamps: now.offset_clamps,

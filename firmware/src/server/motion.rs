@@ -1,6 +1,8 @@
 //! What the server needs of an engine.
+use crate::engine::Config;
 use giotto_shared::wire::{
-    ExactCircle, ExactSegment, FaultCause, MotionRefusal, MotionState, Pose, Refusal, SetPoint,
+    ExactCircle, ExactSegment, FaultCause, MotionRefusal, MotionState, Pose, PositionState,
+    Refusal, SetPoint,
 };
 
 /// The engine as its tick last left it.
@@ -42,6 +44,10 @@ pub struct Snapshot {
     pub fault: Option<FaultCause>,
     /// The stop input is active.
     pub stop_input: bool,
+    /// What is known of where the machine stands.
+    pub position: PositionState,
+    /// Override of the feed, percent.
+    pub override_percent: u8,
 }
 
 /// A set-point with its time.
@@ -116,6 +122,33 @@ pub trait Motion {
 
     /// The segment in hand finishes; what waits is thrown away. Until the next program is accepted.
     fn hold(&mut self);
+
+    /// Plans within these limits from now on.
+    ///
+    /// # Errors
+    /// [`MotionRefusal::Busy`].
+    fn configure(&mut self, config: &Config) -> Result<(), MotionRefusal>;
+
+    /// Holds the feed within limits (`true`), or lets it go on.
+    ///
+    /// # Errors
+    /// [`MotionRefusal::NotHeld`]: nothing runs, or a stream does.
+    fn pause(&mut self, on: bool) -> Result<(), MotionRefusal>;
+
+    /// Share of the feed asked for, percent, of what is accepted from now on.
+    fn set_override(&mut self, percent: u8);
+
+    /// Forgets a fault, at rest, in the next tick.
+    ///
+    /// # Errors
+    /// [`MotionRefusal::Busy`].
+    fn clear_fault(&mut self) -> Result<(), MotionRefusal>;
+
+    /// Says where the machine stands, at rest, nm.
+    ///
+    /// # Errors
+    /// [`MotionRefusal::Busy`]; [`MotionRefusal::Path`] if that is no place.
+    fn declare(&mut self, place_nm: Pose) -> Result<(), MotionRefusal>;
 
     /// Gives every so many ticks' set-point of a run to [`Motion::next_set_point`]; 0: none.
     fn subscribe(&mut self, every: u16);

@@ -25,6 +25,16 @@ pub(super) fn read(payload: &[u8]) -> Option<(Head, Result<Command, NotUnderstoo
     Some((Head { session, seq }, command))
 }
 
+/// Number of a request, as in the protocol; 255 if it cannot be read.
+pub(super) fn number(payload: &[u8]) -> u8 {
+    let number = || {
+        let (_, rest) = wire::take::<u16>(payload)?;
+        let (_, rest) = wire::take::<u16>(rest)?;
+        wire::take::<u32>(rest)
+    };
+    number().map_or(u8::MAX, |(number, _)| number.min(255) as u8)
+}
+
 /// What to do with a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Turn {

@@ -85,7 +85,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
 
     /// Hands the written table to the engine, on probation.
     #[inline(never)]
-    pub(super) fn commit(&mut self) -> Result<(), Refusal> {
+    pub(super) fn commit(&mut self) -> Result<u8, Refusal> {
         self.idle()?;
         let slot = self.written.ok_or(Refusal::NothingToCommit)?;
         if let Err(refusal) = self.install(slot) {
@@ -94,12 +94,12 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
         }
         self.written = None;
         self.probation = Probation::Fresh;
-        Ok(())
+        Ok(slot)
     }
 
     /// Makes the table on probation the one that boots.
     #[inline(never)]
-    pub(super) fn confirm(&mut self) -> Result<(), Refusal> {
+    pub(super) fn confirm(&mut self) -> Result<u8, Refusal> {
         let slot = match self.probation {
             Probation::None => None,
             Probation::Fresh | Probation::FirstRun => self.active,
@@ -110,7 +110,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             .confirm(slot, &mut self.buffers.image)
             .map_err(Refusal::Flash)?;
         self.probation = Probation::None;
-        Ok(())
+        Ok(slot)
     }
 
     /// Ends a probation, or else makes the other confirmed table the one that boots.

@@ -1,6 +1,7 @@
 //! Two slots of NOR flash, one table each, and never half a one.
 //!
 //! ```text
+//! config = two erase units, if the board has them (see `config`)
 //! key  = one erase unit, if the board has one for it: up to 4 places of 40 bytes (see `key`)
 //! slot = one or more erase units
 //!   0                the image of the table, padded with FF to the write size
@@ -22,12 +23,14 @@
 //! No word is programmed twice between erasures (parts with ECC forbid it): the image goes once into a
 //! slot just erased, each confirmation into a place still blank. `sequential-storage` was considered; its map
 //! moves items between pages and erases on its own accord, and costs four times the text for two items.
+mod config;
 mod key;
 mod record;
 
 pub mod power_cut;
 pub mod ram;
 
+use config::CONFIG_BYTES;
 use embedded_storage::nor_flash::NorFlash;
 use giotto_shared::table::{Header, MAX_IMAGE_BYTES, image::FORMAT_VERSION};
 use giotto_shared::wire::{FlashFault, SlotState, TableInfo};
@@ -55,6 +58,8 @@ pub struct Layout {
     pub size: u32,
     /// First byte of the erase unit that keeps the key; `None`: no key can be provisioned.
     pub key: Option<u32>,
+    /// First byte of each of the two erase units that keep the configuration; `None`: none can be stored.
+    pub config: Option<[u32; 2]>,
 }
 
 impl Layout {
@@ -72,6 +77,7 @@ impl Layout {
             base,
             size,
             key: None,
+            config: None,
         }
     }
 
@@ -86,6 +92,14 @@ impl Layout {
         );
         Self {
             key: Some(at),
+            ..self
+        }
+    }
+
+    /// With two erase units of their own for the configuration.
+    pub const fn with_config(self, at: [u32; 2]) -> Self {
+        Self {
+            config: Some(at),
             ..self
         }
     }
@@ -111,6 +125,7 @@ impl<F: NorFlash> Store<F> {
     const FITS: () = assert!(
         RECORD_BYTES.is_multiple_of(F::WRITE_SIZE)
             && KEY_BYTES.is_multiple_of(F::WRITE_SIZE)
+            && CONFIG_BYTES.is_multiple_of(F::WRITE_SIZE)
             && PIECE.is_multiple_of(F::WRITE_SIZE)
             && F::READ_SIZE == 1,
         "flash geometry not supported"

@@ -32,11 +32,11 @@ pub(crate) fn run(peers: &mut Peers) -> Result<Table, Error> {
         servo: [PositionLoop {
             kv_per_s: KV_PER_S,
             feed_forward: 0.0,
-        }; 2],
+        }; 3],
         mechanics: [Some(SecondOrder {
             omega_n_rad_s: OMEGA_N_RAD_S,
             zeta: ZETA,
-        }); 2],
+        }); 3],
         ..Machine::default()
     };
     let turn_s = TAU * RADIUS_M / FEED_M_S;

@@ -1,8 +1,10 @@
 //! `giotto analyze`: least-squares circle, radius size error, out-of-roundness, harmonics, ISO 230-4 of each run.
-use super::source::Source;
+use super::grid::Grid;
+use super::source::{Source, length};
 use super::{Failure, Output};
-use comfy_table::{CellAlignment, Table, presets};
-use giotto::analysis::{self, Document, Harmonic, Report};
+use giotto::analysis::tolerance::{self, Held};
+use giotto::analysis::uncertainty::{self, Conditions, Iso230Budget, Verdict};
+use giotto::analysis::{self, Assessment, Document, Harmonic, Report};
 use giotto::campaign::import::ballbar20::{self, Ballbar20};
 use giotto::campaign::{CampaignError, Direction};
 use std::path::PathBuf;
@@ -15,6 +17,15 @@ pub struct Args {
     /// Results of Ballbar 20 to set beside giotto's own.
     #[arg(long, value_name = "FILE.b5r")]
     ballbar: Option<PathBuf>,
+    /// Holds every figure of ISO 230-4 against this and names the largest feed that keeps it; exit 5 if one fails.
+    #[arg(long, value_name = "UM", value_parser = length)]
+    tolerance: Option<f64>,
+    /// Expanded uncertainty (k = 2) of the instrument by its certificate; without it 0.7 µm is assumed.
+    #[arg(long, value_name = "UM", value_parser = length)]
+    instrument: Option<f64>,
+    /// Half the range of temperature during the measurement; without it that of the runs, or 1 K.
+    #[arg(long, value_name = "K", value_parser = length)]
+    temperature: Option<f64>,
 }
 
 /// Runs the command.
@@ -30,14 +41,41 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     bar.finish_and_clear();
     let report = report?;
     report.notes.iter().for_each(|note| out.note(note));
+    let conditions = Conditions {
+        instrument_m: args.instrument.map(|um| um * 1e-6),
+        temperature_k: args.temperature,
+        repeatability_m: None,
+    };
+    let assessment = Assessment {
+        budgets: uncertainty::of_report(&report, &conditions),
+        tolerance_m: args.tolerance.map(|um| um * 1e-6),
+    };
     if out.json {
-        return out.document(&Document::of(&report, ballbar.as_ref()));
+        out.document(&Document::of(&report, ballbar.as_ref(), &assessment))?;
+    } else {
+        show(&report, &assessment, out);
+        if let Some(ballbar) = ballbar {
+            beside(&report, &ballbar, out);
+        }
     }
-    show(&report, out);
-    if let Some(ballbar) = ballbar {
-        beside(&report, &ballbar, out);
+    keeps(&report, &assessment)
+}
+
+/// The check that `--tolerance` asks for: no figure is certain to leave it.
+fn keeps(report: &Report, assessment: &Assessment) -> Result<(), Failure> {
+    let Some(tolerance_m) = assessment.tolerance_m else {
+        return Ok(());
+    };
+    let held = tolerance::hold(report, &assessment.budgets, tolerance_m);
+    let failed = |h: &Held| h.verdicts.contains(&Some(Verdict::Fail));
+    match held.iter().filter(|h| failed(h)).count() {
+        0 => Ok(()),
+        n => Err(Failure::check(format_args!(
+            "{n} of {} circles leave the tolerance of {} µm",
+            held.len(),
+            um(tolerance_m)
+        ))),
     }
-    Ok(())
 }
 
 impl From<CampaignError> for Failure {
@@ -47,77 +85,27 @@ impl From<CampaignError> for Failure {
     }
 }
 
-fn table(header: &[&str]) -> Table {
-    let mut table = Table::new();
-    table
-        .load_style(presets::NOTHING)
-        .set_header(header.iter().copied());
-    for (k, column) in table.column_iter_mut().enumerate() {
-        column.set_cell_alignment(if k == 0 {
-            CellAlignment::Left
-        } else {
-            CellAlignment::Right
-        });
-    }
-    table
-}
-
 fn um(si: f64) -> String {
-    format!("{:.1}", si * 1e6)
+    let text = format!("{:.1}", si * 1e6);
+    if text == "-0.0" {
+        "0.0".to_owned()
+    } else {
+        text
+    }
 }
 
-fn show(report: &Report, out: Output) {
+fn mm(si: f64) -> String {
+    format!("{}", (si * 1e6).round() / 1e3)
+}
+
+fn show(report: &Report, assessment: &Assessment, out: Output) {
     let title = [&report.name, &report.machine]
         .map(String::as_str)
         .join(" — ");
-    out.say(format_args!("{title}: {} runs", report.runs.len()));
+    let s = if report.runs.len() == 1 { "" } else { "s" };
+    out.say(format_args!("{title}: {} run{s}", report.runs.len()));
     out.say("");
-    let mut runs = table(&[
-        "run",
-        "R mm",
-        "feed mm/s",
-        "",
-        "measured",
-        "ΔR µm",
-        "±95 %",
-        "roundness µm",
-        "2θ",
-        "3θ",
-        "4θ",
-        "noise µm",
-        "centre mm",
-    ]);
-    for run in &report.runs {
-        let size = |order: usize| {
-            let found = run.harmonics.iter().find(|h| h.order == order);
-            found.map_or_else(|| "–".to_owned(), |h: &Harmonic| um(h.cos_m.hypot(h.sin_m)))
-        };
-        let arc = run
-            .arc_rad
-            .map_or_else(String::new, |a| format!(" ({:.0}°)", a.to_degrees()));
-        runs.add_row([
-            format!("{}{arc}", run.file),
-            format!("{}", (run.radius_m * 1e6).round() / 1e3),
-            format!("{}", (run.feed_m_s * 1e6).round() / 1e3),
-            if run.direction == Direction::Ccw {
-                "ccw"
-            } else {
-                "cw"
-            }
-            .to_owned(),
-            run.measured_feed_m_s
-                .map_or_else(|| "–".to_owned(), |f| format!("{:.1}", f * 1e3)),
-            um(run.radius_error_m),
-            format!("{:.2}", 1.96 * run.radius_error_se_m * 1e6),
-            um(run.out_of_roundness_m),
-            size(2),
-            size(3),
-            size(4),
-            format!("{:.2}", run.noise_m * 1e6),
-            format!("{:.3} {:.3}", run.centre_m[0] * 1e3, run.centre_m[1] * 1e3),
-        ]);
-    }
-    out.say(runs);
+    show_runs(report, out);
     for (run, frame) in report.runs.iter().zip(&report.frames) {
         if let Some(plane) = frame.and_then(|f| f.plane) {
             let (tilt, flat) = (plane.tilt_rad.to_degrees(), plane.flatness_m * 1e6);
@@ -128,31 +116,139 @@ fn show(report: &Report, out: Output) {
         }
     }
     out.say("");
-    out.say("ISO 230-4, µm (G about the least-squares circle, F from the nominal circle as centred, D of both directions)");
-    let mut iso = table(&[
+    show_iso(report, &assessment.budgets, out);
+    if let Some(tolerance_m) = assessment.tolerance_m {
+        show_tolerance(report, &assessment.budgets, tolerance_m, out);
+    }
+}
+
+fn show_runs(report: &Report, out: Output) {
+    let header = [
+        "run",
         "R mm",
-        "feed mm/s",
-        "G cw",
-        "G ccw",
-        "G(b)",
-        "F max",
-        "F min",
-        "D",
-    ]);
-    let maybe = |v: Option<f64>| v.map_or_else(|| "–".to_owned(), um);
-    for row in &report.iso230_4 {
-        iso.add_row([
-            format!("{}", (row.radius_m * 1e6).round() / 1e3),
-            format!("{}", (row.feed_m_s * 1e6).round() / 1e3),
-            maybe(row.g_cw_m),
-            maybe(row.g_ccw_m),
-            maybe(row.g_b_m),
-            um(row.f_max_m),
-            um(row.f_min_m),
-            maybe(row.d_m),
+        "f mm/s",
+        "way",
+        "ΔR µm",
+        "±95 %",
+        "round µm",
+        "2θ",
+        "3θ",
+        "4θ",
+        "noise µm",
+        "measured f",
+        "centre mm",
+    ];
+    let mut runs = Grid::new(&header, 1, 1);
+    for run in &report.runs {
+        let size = |order: usize| {
+            let found = run.harmonics.iter().find(|h| h.order == order);
+            found.map_or_else(|| "–".to_owned(), |h: &Harmonic| um(h.cos_m.hypot(h.sin_m)))
+        };
+        let arc = run
+            .arc_rad
+            .map_or_else(String::new, |a| format!(" ({:.0}°)", a.to_degrees()));
+        let way = if run.direction == Direction::Ccw {
+            "ccw"
+        } else {
+            "cw"
+        };
+        runs.row([
+            format!("{}{arc}", run.file),
+            mm(run.radius_m),
+            mm(run.feed_m_s),
+            way.to_owned(),
+            um(run.radius_error_m),
+            format!("{:.2}", 1.96 * run.radius_error_se_m * 1e6),
+            um(run.out_of_roundness_m),
+            size(2),
+            size(3),
+            size(4),
+            format!("{:.2}", run.noise_m * 1e6),
+            run.measured_feed_m_s
+                .map_or_else(|| "–".to_owned(), |f| format!("{:.1}", f * 1e3)),
+            format!("{:.3} {:.3}", run.centre_m[0] * 1e3, run.centre_m[1] * 1e3),
         ]);
     }
-    out.say(iso);
+    runs.show(out);
+}
+
+/// The figures in order of radius and feed, with their expanded uncertainties.
+fn show_iso(report: &Report, budgets: &[Iso230Budget], out: Output) {
+    out.say("ISO 230-4, µm, each with its expanded uncertainty (k = 2)");
+    let mut iso = Grid::new(
+        &[
+            "R mm", "f mm/s", "G cw", "G ccw", "G(b)", "F max", "F min", "D",
+        ],
+        0,
+        2,
+    );
+    let mut order: Vec<usize> = (0..report.iso230_4.len()).collect();
+    let key = |at: &usize| (report.iso230_4[*at].radius_m, report.iso230_4[*at].feed_m_s);
+    order.sort_by(|a, b| {
+        key(a)
+            .partial_cmp(&key(b))
+            .unwrap_or(std::cmp::Ordering::Equal)
+    });
+    for at in order {
+        let row = &report.iso230_4[at];
+        let figures = tolerance::figures(row, &budgets[at]).map(|figure| {
+            figure.map_or_else(
+                || "–".to_owned(),
+                |(value, budget)| format!("{} ±{}", um(value), um(budget.expanded_m())),
+            )
+        });
+        iso.row(
+            [mm(row.radius_m), mm(row.feed_m_s)]
+                .into_iter()
+                .chain(figures),
+        );
+    }
+    iso.show(out);
+    out.say("G is about the least-squares circle, F from the nominal circle as centred, D of both directions.");
+    if let Some(budget) = budgets.first() {
+        out.say(format_args!("{}", uncertainty::words(&budget.f)));
+    }
+}
+
+fn show_tolerance(report: &Report, budgets: &[Iso230Budget], tolerance_m: f64, out: Output) {
+    let held = tolerance::hold(report, budgets, tolerance_m);
+    out.say("");
+    out.say(format_args!("Tolerance {} µm", um(tolerance_m)));
+    let header = [
+        "R mm", "f mm/s", "G cw", "G ccw", "G(b)", "F max", "F min", "D",
+    ];
+    let mut grid = Grid::new(&header, 0, 2);
+    for (row, held) in report.iso230_4.iter().zip(&held) {
+        let words = held.verdicts.map(|v| {
+            match v {
+                Some(Verdict::Pass) => "pass",
+                Some(Verdict::Fail) => "FAIL",
+                Some(Verdict::Undecided) => "within U",
+                None => "–",
+            }
+            .to_owned()
+        });
+        grid.row(
+            [mm(row.radius_m), mm(row.feed_m_s)]
+                .into_iter()
+                .chain(words),
+        );
+    }
+    grid.show(out);
+    out.say("pass and FAIL hold with the uncertainty counted in (ISO 14253-1); within U: it decides neither.");
+    for feed in tolerance::largest_feeds(report, tolerance_m) {
+        let limit = feed.limited_by.map_or_else(String::new, |name| {
+            format!("; {} leaves it first", tolerance::name(name))
+        });
+        let words = match (feed.measured_mm_s, feed.interpolated_mm_s) {
+            (None, _) => "no measured feed holds it".to_owned(),
+            (Some(f), None) => format!("held up to {f} mm/s, the fastest measured"),
+            (Some(f), Some(between)) => {
+                format!("held up to {f} mm/s, about {between} mm/s between the measured feeds")
+            }
+        };
+        out.say(format_args!("R {} mm: {words}{limit}.", feed.radius_mm));
+    }
 }
 
 /// Ballbar 20's figures with giotto's for the same, where a pair of runs gives them.
@@ -180,7 +276,7 @@ fn beside(report: &Report, ballbar: &Ballbar20, out: Output) {
             (p.feed_m_s * 1e6).round() / 1e3
         )
     }));
-    let mut rows = table(&header.iter().map(String::as_str).collect::<Vec<_>>());
+    let mut rows = Grid::new(&header.iter().map(String::as_str).collect::<Vec<_>>(), 1, 2);
     for feature in &ballbar.features {
         let mut row = vec![
             feature.name.clone(),
@@ -191,7 +287,7 @@ fn beside(report: &Report, ballbar: &Ballbar20, out: Output) {
             p.get(&feature.name, &feature.unit)
                 .map_or_else(|| "–".to_owned(), |v| format!("{v:.3}"))
         }));
-        rows.add_row(row);
+        rows.row(row);
     }
-    out.say(rows);
+    rows.show(out);
 }

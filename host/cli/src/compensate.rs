@@ -1,44 +1,154 @@
 //! `giotto compensate`: rewrite the arcs of an NC program with the inverse correction.
+mod output_file;
+mod summary;
+
 use super::{Failure, Output};
 use giotto::model_file::ModelFile;
-use giotto_nc::{self, Compensated, Fate, Keep, Left, Options};
+use giotto_nc::check::Controller;
+use giotto_nc::{self, Code, Fate, Keep, Mark, Options, Report};
+use output_file::OutputFile;
 use serde::Serialize;
-use std::collections::BTreeMap;
+use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
-
-/// What remains at a joint is said from this share of the correction on.
-const JOINT_BAR: f64 = 0.05;
+use summary::Summary;
 
 /// Arguments of `giotto compensate`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// NC program, RS-274 as LinuxCNC and Grbl speak it; or a plain RAPID module.
+    /// NC program, RS-274 as LinuxCNC, Grbl, Fanuc and Haas speak it; or a plain RAPID module.
     #[arg(value_name = "IN.nc")]
     program: PathBuf,
     /// Model of the machine, from `giotto fit` or `giotto diagnose`.
     #[arg(long, value_name = "MODEL.toml")]
     model: PathBuf,
-    /// Corrected program.
+    /// Corrected program; a file that is no program is not written over.
     #[arg(short, long, value_name = "OUT.nc")]
     output: PathBuf,
     /// What stays when a radius changes: the feed, or the angular rate (the feed then grows with the radius).
     #[arg(long, value_enum, default_value_t = KeepArg::Feed)]
     keep: KeepArg,
-    /// Acceleration that the transitions may ask for, mm/s².
-    #[arg(long, value_name = "MM_S2", default_value_t = Options::default().acceleration_mm_s2)]
-    acceleration: f64,
-    /// Largest change of a radius, mm.
-    #[arg(long, value_name = "MM", default_value_t = Options::default().max_offset_mm)]
-    max_offset: f64,
+    /// Acceleration that the transitions may ask for, mm/s²; 2000 unless `--for` says otherwise.
+    #[arg(long, value_name = "MM_S2")]
+    acceleration: Option<f64>,
+    /// Largest change of a radius, mm; 0.5 unless `--for` says otherwise.
+    #[arg(long, value_name = "MM")]
+    max_offset: Option<f64>,
     /// Correct arcs in G18 and G19 as well, though the model was measured in one plane.
     #[arg(long)]
     all_planes: bool,
+    /// What the program is for: acceleration, largest change and codes that go with it.
+    #[arg(long = "for", value_enum)]
+    purpose: Option<Purpose>,
+    /// What I, J and K count from where the program says neither G90.1 nor G91.1: a setting of the controller.
+    #[arg(long, value_enum, default_value_t = Centres::Relative)]
+    centres: Centres,
+    /// A code of the machine's own that moves nothing, as M150 or G77; may be given again.
+    #[arg(long, value_name = "CODE", value_parser = |text: &str| text.parse::<Code>())]
+    harmless: Vec<Code>,
+    /// Hold the output against the rules of the controller it is for; exit 5 where it would be refused.
+    #[arg(long, value_enum)]
+    check: Option<Target>,
 }
 
 #[derive(clap::ValueEnum, Clone, Copy, Debug)]
 enum KeepArg {
     Feed,
     Omega,
+}
+
+#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+enum Centres {
+    Relative,
+    Absolute,
+}
+
+#[derive(clap::ValueEnum, Clone, Copy, Debug)]
+enum Purpose {
+    /// Light axes: 5000 mm/s², changes up to 0.3 mm.
+    Laser,
+    /// 2000 mm/s², changes up to 0.2 mm.
+    Mill,
+    /// 3000 mm/s², M-codes of Marlin and Klipper.
+    Printer,
+    /// 2000 mm/s², changes up to 2 mm.
+    Robot,
+}
+
+#[derive(clap::ValueEnum, Clone, Copy, Debug)]
+enum Target {
+    Linuxcnc,
+    Grbl,
+    Abb,
+}
+
+impl Args {
+    fn options(&self) -> Result<Options, Failure> {
+        let (acceleration, offset) = match self.purpose {
+            Some(Purpose::Laser) => (5000.0, 0.3),
+            Some(Purpose::Mill) => (2000.0, 0.2),
+            Some(Purpose::Printer) => (3000.0, 0.5),
+            Some(Purpose::Robot) => (2000.0, 2.0),
+            None => {
+                let usual = Options::default();
+                (usual.acceleration_mm_s2, usual.max_offset_mm)
+            }
+        };
+        let options = Options {
+            keep: match self.keep {
+                KeepArg::Feed => Keep::Feed,
+                KeepArg::Omega => Keep::Omega,
+            },
+            acceleration_mm_s2: self.acceleration.unwrap_or(acceleration),
+            max_offset_mm: self.max_offset.unwrap_or(offset),
+            all_planes: self.all_planes,
+            absolute_centres: self.centres == Centres::Absolute,
+            printer: matches!(self.purpose, Some(Purpose::Printer)),
+            harmless: self.harmless.clone(),
+        };
+        for (name, value) in [
+            ("--acceleration", options.acceleration_mm_s2),
+            ("--max-offset", options.max_offset_mm),
+        ] {
+            if value.is_nan() || value <= 0.0 || value.is_infinite() {
+                return Err(Failure::usage(format_args!(
+                    "{name} {value}: expected a positive number"
+                )));
+            }
+        }
+        Ok(options)
+    }
+
+    fn mark(&self, options: &Options) -> Result<Mark, Failure> {
+        let text = std::fs::read(&self.model).map_err(|e| {
+            Failure::input(format_args!(
+                "{}: cannot be read: {e}",
+                self.model.display()
+            ))
+        })?;
+        let digest = Sha256::digest(&text);
+        let keep = match options.keep {
+            Keep::Feed => "feed",
+            Keep::Omega => "omega",
+        };
+        let planes = if options.all_planes {
+            ", all planes"
+        } else {
+            ""
+        };
+        let centres = if options.absolute_centres {
+            ", absolute centres"
+        } else {
+            ""
+        };
+        Ok(Mark {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            model: digest[..6].iter().map(|b| format!("{b:02x}")).collect(),
+            options: format!(
+                "keep {keep}, acceleration {}, max offset {}{planes}{centres}",
+                options.acceleration_mm_s2, options.max_offset_mm
+            ),
+        })
+    }
 }
 
 #[derive(Serialize)]
@@ -69,41 +179,78 @@ struct Arc {
 
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
-    for (name, value) in [
-        ("--acceleration", args.acceleration),
-        ("--max-offset", args.max_offset),
-    ] {
-        if value.is_nan() || value <= 0.0 || value.is_infinite() {
-            return Err(Failure::usage(format_args!(
-                "{name} {value}: expected a positive number"
-            )));
-        }
-    }
+    let options = args.options()?;
     let program = read(&args.program, Kind::Any)?;
-    let model = ModelFile::load(&args.model)?;
-    let options = Options {
-        keep: match args.keep {
-            KeepArg::Feed => Keep::Feed,
-            KeepArg::Omega => Keep::Omega,
-        },
-        acceleration_mm_s2: args.acceleration,
-        max_offset_mm: args.max_offset,
-        all_planes: args.all_planes,
-    };
-    let compensate = if giotto_nc::rapid::is_rapid(&program) {
-        giotto_nc::rapid::compensate
-    } else {
-        giotto_nc::compensate
-    };
-    let result = compensate(&program, &model, &options);
-    std::fs::write(&args.output, &result.program)
-        .map_err(|e| super::failure::cannot_write(&args.output, &e))?;
-    let document = document(&result, &model);
-    if out.json {
-        out.document(&document)
-    } else {
-        say(&args, &result, &document, out)
+    if let Some((line, words)) = giotto_nc::marked(&program) {
+        return Err(Failure::input(format_args!(
+            "{}:{line}:1: corrected before ({words}); expected a program as the post wrote it",
+            args.program.display()
+        ))
+        .help("correct the original; twice corrected is wrong by as much as not at all"));
     }
+    let model = ModelFile::load(&args.model)?;
+    let mark = args.mark(&options)?;
+    let place = OutputFile::at(&args.output, &[&args.program, &args.model])?;
+    let mut arcs = Vec::new();
+    place.write(|file| {
+        arcs = if giotto_nc::rapid::is_rapid(&program) {
+            giotto_nc::rapid::compensate_to(&program, &model, &options, Some(&mark), file)?
+        } else {
+            giotto_nc::compensate_to(&program, &model, &options, Some(&mark), file)?
+        };
+        Ok(())
+    })?;
+    if out.json {
+        out.document(&document(&arcs, &model))?;
+    } else {
+        Summary {
+            args: &args,
+            model: &model,
+            arcs: &arcs,
+        }
+        .say(out);
+    }
+    match args.check {
+        Some(target) => check(&args.output, target, out),
+        None => Ok(()),
+    }
+}
+
+/// Holds the output against the rules of its controller.
+fn check(path: &Path, target: Target, out: Output) -> Result<(), Failure> {
+    let text = std::fs::read(path).map_err(|e| {
+        Failure::input(format_args!(
+            "{}: cannot be read again: {e}",
+            path.display()
+        ))
+    })?;
+    let (rules, name) = match target {
+        Target::Linuxcnc => (Controller::LinuxCnc, "LinuxCNC"),
+        Target::Grbl => (Controller::Grbl, "Grbl"),
+        Target::Abb => (Controller::Abb, "ABB"),
+    };
+    let found = giotto_nc::check::check(&text, rules);
+    let Some(first) = found.first() else {
+        out.note(format_args!("{name}: nothing that it would refuse"));
+        return Ok(());
+    };
+    for trouble in &found {
+        out.note(format_args!(
+            "  {}:{}: {}",
+            path.display(),
+            trouble.line,
+            trouble.what
+        ));
+    }
+    Err(Failure::check(format_args!(
+        "{}:{}:1: {name} would refuse {} line{}, this one first: {}",
+        path.display(),
+        first.line,
+        found.len(),
+        if found.len() == 1 { "" } else { "s" },
+        first.what
+    ))
+    .help("what stands in the original as well is the post's; see the lines above"))
 }
 
 /// What a program may be written in.
@@ -143,9 +290,8 @@ pub(super) fn read(path: &Path, kind: Kind) -> Result<Vec<u8>, Failure> {
     }
 }
 
-fn document(result: &Compensated, model: &ModelFile) -> Document {
-    let arcs: Vec<Arc> = result
-        .arcs
+fn document(arcs: &[Report], model: &ModelFile) -> Document {
+    let arcs: Vec<Arc> = arcs
         .iter()
         .map(|report| {
             let none = Arc {
@@ -186,68 +332,12 @@ fn document(result: &Compensated, model: &ModelFile) -> Document {
             .iter()
             .filter_map(|a| a.change_um)
             .fold(0.0, |m, c| f64::max(m, c.abs())),
-        not_applied: model
-            .effects
-            .iter()
-            .map(|e| e.cause.id().to_owned())
-            .collect(),
+        not_applied: not_applied(model),
         arcs,
     }
 }
 
-fn say(args: &Args, result: &Compensated, document: &Document, out: Output) -> Result<(), Failure> {
-    out.say(format_args!(
-        "{}: {} of {} arcs corrected, radius changed by up to {:.1} µm",
-        args.output.display(),
-        document.corrected,
-        document.arcs.len(),
-        document.largest_change_um
-    ));
-    let name = args.program.display();
-    let mut negligible = 0;
-    let mut reasons: BTreeMap<usize, Left> = BTreeMap::new();
-    for report in &result.arcs {
-        match report.fate {
-            Fate::Left(Left::Negligible) => negligible += 1,
-            Fate::Left(left) => _ = reasons.insert(report.line, left),
-            Fate::Corrected {
-                radius_mm,
-                feed_mm_s,
-                delta_mm,
-                blocks,
-                joint_share,
-            } => {
-                let joints = if joint_share > JOINT_BAR {
-                    let left_um = joint_share * delta_mm.abs() * 1e3;
-                    format!(
-                        "; up to {:.0} % of that ({left_um:.1} µm) remains at a joint",
-                        100.0 * joint_share
-                    )
-                } else {
-                    String::new()
-                };
-                out.say(format_args!(
-                    "  {name}:{}: R {radius_mm:.3} mm at {feed_mm_s:.1} mm/s: {:+.1} µm, {blocks} block{}{joints}",
-                    report.line,
-                    delta_mm * 1e3,
-                    if blocks == 1 { "" } else { "s" }
-                ));
-            }
-        }
-    }
-    for (line, left) in reasons {
-        out.say(format_args!("  {name}:{line}: left as it was: {left}"));
-    }
-    if negligible > 0 {
-        out.say(format_args!(
-            "  {negligible} arcs need less than 0.5 µm and were left as they were"
-        ));
-    }
-    if !document.not_applied.is_empty() {
-        out.say(format_args!(
-            "only the radius law is applied; {} act on lines too and belong to the controller's table",
-            document.not_applied.join(", ")
-        ));
-    }
-    Ok(())
+fn not_applied(model: &ModelFile) -> Vec<String> {
+    let names = model.effects.iter().map(|e| e.cause().id().to_owned());
+    names.collect()
 }

@@ -1,7 +1,8 @@
 //! `giotto controller`: start a virtual controller.
 use super::{Failure, Output};
 use giotto_link::emulator::{Emulator, Pace};
-use giotto_link::virtual_controller;
+use giotto_link::serve::serve;
+use giotto_link::virtual_controller::VirtualLink;
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -31,17 +32,17 @@ fn announce(path: &str) {
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     match args.kind {
-        Kind::Sim => match virtual_controller::serve(&mut announce)? {},
+        Kind::Sim => match serve(VirtualLink::new(), &mut announce)? {},
         Kind::Qemu => {
             let mut note = |text: &str| out.note(text);
-            let mut emulator = Emulator::start(args.image.as_deref(), Pace::Clock, &mut note)?;
-            announce(emulator.pty());
-            out.note(format_args!(
-                "set-points: {}",
-                emulator.stream_path().display()
-            ));
-            emulator.wait();
-            Err(Failure::controller("the emulator has ended"))
+            let emulator = Emulator::start(args.image.as_deref(), Pace::Stepped, &mut note)?;
+            let set_points = emulator.stream_path();
+            // Its ticks are granted by the clock: a busy computer delays them, and none of them is ever late.
+            let mut ready = |path: &str| {
+                announce(path);
+                out.note(format_args!("set-points: {}", set_points.display()));
+            };
+            match serve(emulator.into_link()?, &mut ready)? {}
         }
     }
 }

@@ -1,10 +1,11 @@
 //! `giotto demo`: the whole loop on a bundled campaign and a simulated machine.
-use super::failure::{Failure, cannot_write};
+use super::destination::{Destination, Kind as FileKind};
+use super::failure::Failure;
+use super::grid::{Grid, width};
 use super::output::Output;
 use crate::ring::{
     DemoError, LEFT_M, Learned, Proof, REDUCTION_PERCENT, Size, bundled, learn, picture, prove,
 };
-use comfy_table::{CellAlignment, Table, presets};
 use giotto_link::{Controller, OpenOptions, Port, open};
 use giotto_shared::Direction;
 use indicatif::ProgressBar;
@@ -71,6 +72,7 @@ impl From<DemoError> for Failure {
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let started = Instant::now();
+    let drawing = Destination::maybe(args.svg.as_deref(), FileKind::Svg, &[])?;
     let plan = bundled()?;
     out.say(format_args!(
         "The machine is SIMULATED: a {} and a ballbar with {:.1} µm noise. Controller: {}. Seed {}.",
@@ -101,9 +103,10 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     );
     bar.finish_and_clear();
     let proof = proof?;
-    if let Some(path) = &args.svg {
-        std::fs::write(path, picture(&proof)).map_err(|e| cannot_write(path, &e))?;
-        out.note(format_args!("picture written to {}", path.display()));
+    if let Some(drawing) = &drawing {
+        drawing.write(picture(&proof))?;
+        let path = drawing.path().display();
+        out.note(format_args!("picture written to {path}"));
     }
     if out.json {
         out.document(&document(
@@ -168,21 +171,6 @@ fn document(kind: Kind, machine: &str, seed: u64, proof: &Proof) -> Value {
     })
 }
 
-fn table(header: &[&str], left: usize) -> Table {
-    let mut table = Table::new();
-    table
-        .load_style(presets::NOTHING)
-        .set_header(header.iter().copied());
-    for (k, column) in table.column_iter_mut().enumerate() {
-        column.set_cell_alignment(if k < left {
-            CellAlignment::Left
-        } else {
-            CellAlignment::Right
-        });
-    }
-    table
-}
-
 fn show_learned(learned: &Learned, out: Output) {
     let runs = &learned.report.runs;
     let rms = |of: fn(&giotto::analysis::RunAnalysis) -> f64| {
@@ -223,32 +211,26 @@ fn show_learned(learned: &Learned, out: Output) {
         "3 diagnose  against {}:",
         diagnosis.baseline.name
     ));
-    let mut found = table(
-        &[
-            "cause",
-            "axis",
-            "size",
-            "95 % from",
-            "to",
-            "unit",
-            "share %",
-            "correctable",
-        ],
-        2,
-    );
+    let header = [
+        "cause",
+        "of",
+        "size",
+        "95 % from",
+        "to",
+        "unit",
+        "share %",
+        "correctable",
+    ];
+    let mut found = Grid::new(&header, 2, 2);
     for f in &diagnosis.findings {
-        let axis = match f.axis {
-            Some(giotto_shared::Axis::X) => "x",
-            Some(giotto_shared::Axis::Y) => "y",
-            None => "",
-        };
-        found.add_row([
+        let shown = giotto::units::shown(f.estimate.value, f.estimate.ci95, f.estimate.unit);
+        found.row([
             f.cause.model().words().name.to_owned(),
-            axis.to_owned(),
-            number(f.estimate.value),
-            number(f.estimate.ci95[0]),
-            number(f.estimate.ci95[1]),
-            f.estimate.unit.to_owned(),
+            f.place(),
+            shown.value,
+            shown.low,
+            shown.high,
+            shown.unit,
             format!("{:.1}", f.share_percent),
             if f.compensable { "yes" } else { "no" }.to_owned(),
         ]);
@@ -282,21 +264,19 @@ fn show_proof(proof: &Proof, out: Output) {
         flashed.bytes, flashed.slot, flashed.generation
     ));
     out.say("6 run       circles whose radii and speeds are not in the campaign, last of the steady turns measured:");
-    let mut circles = table(
-        &[
-            "R mm",
-            "mm/s",
-            "",
-            "ΔR before",
-            "ΔR after",
-            "roundness before",
-            "after (µm)",
-        ],
-        0,
-    );
+    let header = [
+        "R mm",
+        "mm/s",
+        "way",
+        "ΔR before",
+        "ΔR after",
+        "roundness before",
+        "after (µm)",
+    ];
+    let mut circles = Grid::new(&header, 0, 3);
     for pair in &proof.circles {
         let (before, after) = (&pair.before.analysis, &pair.after.analysis);
-        circles.add_row([
+        circles.row([
             format!("{:.0}", before.radius_m * 1e3),
             format!("{:.0}", before.feed_m_s * 1e3),
             word(before.direction).to_owned(),
@@ -324,19 +304,11 @@ fn show_proof(proof: &Proof, out: Output) {
     ));
 }
 
-fn indented(table: &Table) -> String {
-    table
+fn indented(grid: &Grid) -> String {
+    const INDENT: usize = 12;
+    grid.text(width().saturating_sub(INDENT))
         .lines()
-        .map(|line| format!("            {line}"))
+        .map(|line| format!("{:INDENT$}{line}", ""))
         .collect::<Vec<_>>()
         .join("\n")
-}
-
-/// Four digits, in the form that is short.
-fn number(value: f64) -> String {
-    if value != 0.0 && value.abs() < 1e-2 {
-        format!("{value:.3e}")
-    } else {
-        format!("{value:.4}")
-    }
 }

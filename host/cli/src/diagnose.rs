@@ -1,5 +1,7 @@
 //! `giotto diagnose`: what the simulation gets wrong, why, the extended model, the gain.
-use super::failure::{Failure, cannot_write};
+use super::destination::{Destination, Kind, quoted};
+use super::failure::Failure;
+use super::grid::Grid;
 use super::output::Output;
 use super::source::Source;
 use comfy_table::{CellAlignment, Table, presets};
@@ -41,6 +43,9 @@ fn repeatability(text: &str) -> Result<f64, String> {
 
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
+    let inputs = args.source.inputs(args.model.as_deref());
+    Destination::maybe(args.output.as_deref(), Kind::Model, &inputs)?;
+    let page = Destination::maybe(args.report.as_deref(), Kind::Html, &inputs)?;
     let campaign = args.source.read(out)?;
     let model = args.model.as_deref().map(ModelFile::load).transpose()?;
     let bar = out.spinner("diagnosing");
@@ -65,10 +70,10 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         Some(path) => refused = Some(nothing_real(path, &diagnosis)),
         None => {}
     }
-    if let Some(path) = &args.report {
+    if let Some(page) = &page {
         let html = giotto_report::html(&campaign, &diagnosis).map_err(Failure::input)?;
-        std::fs::write(path, html).map_err(|e| cannot_write(path, &e))?;
-        out.note(format_args!("wrote {}", path.display()));
+        page.write(html)?;
+        out.note(format_args!("wrote {}", page.path().display()));
     }
     if out.json {
         out.document(&diagnosis)?;
@@ -117,22 +122,19 @@ fn show(name: &str, d: &Diagnosis, extended: Option<&Path>, out: &Output) {
     if d.findings.is_empty() && !d.unexplained.present && d.cannot_tell.is_empty() {
         out.say("Nothing found: the simulation explains the data.");
     } else if !d.findings.is_empty() {
-        let mut table = Table::new();
-        table.load_style(presets::NOTHING).set_header([
+        let header = [
             "cause",
-            "axis",
+            "of",
             "size",
             "95 % interval",
             "share",
             "probability",
             "correctable",
-        ]);
-        for f in &d.findings {
-            table.add_row(row(f));
-        }
-        right(&mut table, 2);
+        ];
+        let mut grid = Grid::new(&header, 2, 2);
+        d.findings.iter().for_each(|f| grid.row(row(f)));
         out.say("");
-        out.say(&table);
+        grid.show(*out);
         out.say("");
         for f in &d.findings {
             let words = f.cause.model().words();
@@ -196,35 +198,16 @@ fn right(table: &mut Table, first: usize) {
 
 fn row(f: &Finding) -> [String; 7] {
     let e = &f.estimate;
-    let axis = f.axis.map_or("", |axis| {
-        if axis == giotto_shared::Axis::X {
-            "x"
-        } else {
-            "y"
-        }
-    });
+    let shown = giotto::units::shown(e.value, e.ci95, e.unit);
     [
         f.cause.model().words().name.to_string(),
-        axis.to_string(),
-        format!("{} {}", number(e.value), e.unit),
-        format!("{} … {}", number(e.ci95[0]), number(e.ci95[1])),
+        f.place(),
+        format!("{} {}", shown.value, shown.unit),
+        format!("{} … {}", shown.low, shown.high),
         format!("{:.0} %", f.share_percent),
         format!("{:.3}", f.probability),
         if f.compensable { "yes" } else { "no" }.to_string(),
     ]
-}
-
-/// Four digits, in the form that is short.
-fn number(value: f64) -> String {
-    if value != 0.0 && (value.abs() < 1e-3 || value.abs() >= 1e5) {
-        return format!("{value:.3e}");
-    }
-    let before_point = if value == 0.0 {
-        0
-    } else {
-        value.abs().log10().floor() as i32
-    };
-    format!("{value:.*}", (3 - before_point).clamp(0, 6) as usize)
 }
 
 /// The one thing to do now, with the file that was written.
@@ -233,7 +216,7 @@ fn recommendation(d: &Diagnosis, extended: Option<&Path>) -> String {
     match extended.filter(|_| d.model_written) {
         Some(path) => words
             .replace("write the extended model with -o EXTENDED.toml and flash it", "flash it")
-            .replace("EXTENDED.toml", &path.display().to_string()),
+            .replace("EXTENDED.toml", &quoted(path)),
         None => words.clone(),
     }
 }

@@ -1,5 +1,6 @@
 //! The one place where an error becomes words and an exit code.
 use std::fmt::Display;
+use std::io::Write;
 use std::process::ExitCode;
 
 /// Why a command did not do what it was asked, by the contract's exit codes.
@@ -61,9 +62,11 @@ impl Failure {
 
     /// Prints the error on stderr and gives the exit code.
     pub fn report(&self) -> ExitCode {
-        eprintln!("error: {}", self.message);
+        // A closed or full stderr must not make a panic of an error: the exit code still says it.
+        let mut stderr = std::io::stderr();
+        let _ = writeln!(stderr, "error: {}", self.message);
         if let Some(help) = &self.help {
-            eprintln!(" help: {help}");
+            let _ = writeln!(stderr, " help: {help}");
         }
         ExitCode::from(self.kind as u8)
     }

@@ -1,14 +1,18 @@
 //! `giotto fit`: the radius model of the paper: stepwise partial F, intervals, prediction of other radii.
+use super::destination::{Destination, Kind};
 use super::failure::cannot_write;
+use super::grid::Grid;
 use super::source::Source;
 use super::{Failure, Output};
 use clap::ValueEnum;
-use comfy_table::{CellAlignment, Table, presets};
 use giotto::analysis;
+use giotto::campaign::{Direction, Manifest, Run};
 use giotto::fit::{
-    Action, FitError, Observation, Offset, Options, PartialF, RadiusFit, Step, TERMS,
+    Action, FitError, Observation, Offset, Options, PartialF, Point, RadiusFit, Step, TERMS,
 };
 use giotto::model_file::{FORMAT, ModelFile, Servo, Valid};
+use giotto_report::figures::Figure;
+use giotto_report::forms::Form;
 use giotto_shared::model::Element;
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
@@ -36,7 +40,7 @@ pub struct Args {
     /// Write the model here.
     #[arg(short, long, value_name = "MODEL.toml")]
     output: Option<PathBuf>,
-    /// Draw the paper's Figures 8 to 11 as SVG into this directory.
+    /// Draw the paper's Figures 2 to 11 into this directory, as SVG with the numbers that they draw as CSV.
     #[arg(long, value_name = "DIR")]
     figures: Option<PathBuf>,
 }
@@ -77,6 +81,8 @@ impl From<FitError> for Failure {
 
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
+    let inputs = args.source.inputs(None);
+    Destination::maybe(args.output.as_deref(), Kind::Model, &inputs)?;
     let manifest = &args.source.open(out)?;
     let bar = if out.draws() {
         indicatif::ProgressBar::new(manifest.runs.len() as u64).with_message("runs")
@@ -131,7 +137,14 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
             })?;
     }
     if let Some(directory) = &args.figures {
-        draw(&fit, &observations, directory)?;
+        let points = fit.points(&observations);
+        let directions = directions(&points, &observations, &report);
+        let mut figures = giotto_report::forms::forms(&forms(manifest)?);
+        figures.extend(
+            giotto_report::figures::figures(&points, &directions, &fit.model)
+                .map_err(Failure::input)?,
+        );
+        draw(&figures, directory)?;
     }
     if out.json {
         return out.document(&document(&fit));
@@ -142,22 +155,63 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     }
     if let Some(directory) = &args.figures {
         out.say(format_args!(
-            "figures 8 to 11 written to {}",
+            "figures 2 to 11 written to {}",
             directory.display()
         ));
     }
     Ok(())
 }
 
-fn draw(fit: &RadiusFit, runs: &[Observation], directory: &Path) -> Result<(), Failure> {
+fn draw(figures: &[Figure], directory: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(directory).map_err(|e| cannot_write(directory, &e))?;
-    for figure in
-        giotto_report::figures::figures(&fit.points(runs), &fit.model).map_err(Failure::input)?
-    {
-        let path = directory.join(figure.file);
-        std::fs::write(&path, figure.svg).map_err(|e| cannot_write(&path, &e))?;
+    for figure in figures {
+        let path = directory.join(&figure.file);
+        Destination::new(&path, Kind::Svg, &[])?.write(&figure.svg)?;
+        let path = path.with_extension("csv");
+        Destination::new(&path, Kind::Csv, &[])?.write(&figure.csv)?;
     }
     Ok(())
+}
+
+/// The direction of each point; points stand radius by radius, runs as they were measured.
+fn directions(
+    points: &[Point],
+    observations: &[Observation],
+    report: &analysis::Report,
+) -> Vec<Direction> {
+    let mut taken = vec![false; observations.len()];
+    let of = |point: &Point| {
+        let found = (0..observations.len())
+            .find(|&i| !taken[i] && observations[i] == point.observation)
+            .unwrap_or(0);
+        taken[found] = true;
+        report.runs[found].direction
+    };
+    points.iter().map(of).collect()
+}
+
+/// The form errors of the runs: deviations from the nominal circle about the least-squares centre.
+fn forms(manifest: &Manifest) -> Result<Vec<Form>, Failure> {
+    let (campaign, _) = manifest.read()?;
+    let form = |run: Run| {
+        let centre = analysis::of_run(&run, None).map_or([0.0; 2], |a| a.set_up_m);
+        let place = |(angle, deviation): (&f64, &f64)| {
+            let ((sin, cos), r) = (angle.sin_cos(), run.radius_m + deviation);
+            let (x, y) = (r * cos - centre[0], r * sin - centre[1]);
+            (y.atan2(x), x.hypot(y) - run.radius_m)
+        };
+        let samples = run.samples.angle_rad.iter().zip(&run.samples.deviation_m);
+        let (angle_rad, deviation_m) = samples.map(place).unzip();
+        Form {
+            file: run.file.clone(),
+            radius_m: run.radius_m,
+            feed_m_s: run.feed_m_s,
+            direction: run.direction,
+            angle_rad,
+            deviation_m,
+        }
+    };
+    Ok(campaign.runs.into_iter().map(form).collect())
 }
 
 fn model_file(fit: &RadiusFit, runs: &[Observation], campaign: &str, machine: &str) -> ModelFile {
@@ -247,21 +301,6 @@ fn document(fit: &RadiusFit) -> Value {
     })
 }
 
-fn table(header: &[&str]) -> Table {
-    let mut table = Table::new();
-    table
-        .load_style(presets::NOTHING)
-        .set_header(header.iter().copied());
-    for (k, column) in table.column_iter_mut().enumerate() {
-        column.set_cell_alignment(if k == 0 {
-            CellAlignment::Left
-        } else {
-            CellAlignment::Right
-        });
-    }
-    table
-}
-
 fn show(fit: &RadiusFit, runs: &[Observation], campaign: &str, out: Output) {
     out.say(format_args!("{campaign}: ΔR = β0(R) + β1 f²/R + β2 f⁴/R³"));
     out.say(match fit.options.offset {
@@ -280,28 +319,31 @@ fn show(fit: &RadiusFit, runs: &[Observation], campaign: &str, out: Output) {
     out.say("");
     show_steps(fit, out);
     out.say("");
-    let mut coefficients = table(&["coefficient", "estimate", "95 % from", "to", ""]);
+    let header = ["coefficient", "estimate", "95 % from", "to", "unit"];
+    let mut coefficients = Grid::new(&header, 1, 1);
+    let mut remarks = Vec::new();
     for (name, unit, value, ci, term) in [
         ("β1", "1e-6 s²", fit.model.beta1_s2, fit.ci95[0], 0),
         ("β2", "1e-6 s⁴", fit.model.beta2_s4, fit.ci95[1], 1),
     ] {
         let micro = |v: f64| format!("{:.4}", v * 1e6);
-        let remark = if fit.entered(term) {
-            ""
-        } else {
-            "  not in the model; interval with both terms in"
-        };
-        coefficients.add_row([
+        if !fit.entered(term) {
+            remarks.push(format!(
+                "{name} is not in the model; its interval is that with both terms in."
+            ));
+        }
+        coefficients.row([
             name.to_owned(),
             micro(value),
             micro(ci[0]),
             micro(ci[1]),
-            format!("{unit}{remark}"),
+            unit.to_owned(),
         ]);
     }
-    out.say(coefficients);
+    coefficients.show(out);
+    remarks.iter().for_each(|remark| out.say(remark));
     out.say("");
-    let mut radii = table(&[
+    let header = [
         "R mm",
         "part",
         "β0 µm",
@@ -309,7 +351,8 @@ fn show(fit: &RadiusFit, runs: &[Observation], campaign: &str, out: Output) {
         "rms µm",
         "largest µm",
         "explained %",
-    ]);
+    ];
+    let mut radii = Grid::new(&header, 0, 1);
     for (radius, offset) in &fit.offsets_m {
         let of_radius = |r: &f64| (r - radius).abs() < 1e-9;
         let trained = fit.options.train_radius_m.is_none_or(|r| of_radius(&r));
@@ -336,9 +379,9 @@ fn show(fit: &RadiusFit, runs: &[Observation], campaign: &str, out: Output) {
                 "–".to_owned(),
             ]),
         }
-        radii.add_row(row);
+        radii.row(row);
     }
-    out.say(radii);
+    radii.show(out);
     out.say("");
     let (runs, rms) = fit.train;
     out.say(format_args!(
@@ -364,14 +407,15 @@ fn show(fit: &RadiusFit, runs: &[Observation], campaign: &str, out: Output) {
 }
 
 fn show_steps(fit: &RadiusFit, out: Output) {
-    let mut steps = table(&["step", "term", "partial F", "critical F", "dof"]);
+    let header = ["step", "term", "partial F", "critical F", "dof"];
+    let mut steps = Grid::new(&header, 1, 2);
     for s in &fit.steps {
         let action = match s.action {
             Action::Enter => "enters",
             Action::Remove => "leaves",
             Action::Reject => "stays out",
         };
-        steps.add_row([
+        steps.row([
             action.to_owned(),
             ["f²/R", "f⁴/R³"][s.column].to_owned(),
             format!("{:.2}", s.partial_f),
@@ -379,7 +423,7 @@ fn show_steps(fit: &RadiusFit, out: Output) {
             format!("{}, {}", s.dof.0, s.dof.1),
         ]);
     }
-    out.say(steps);
+    steps.show(out);
 }
 
 fn show_chain(fit: &RadiusFit, out: Output) {

@@ -4,13 +4,17 @@
 mod analyze;
 mod bypass;
 mod choice;
+mod compare;
 mod compensate;
 mod completions;
 mod controller;
 mod demo;
+pub mod destination;
 mod diagnose;
 mod fit;
 mod flash;
+mod grid;
+mod history;
 mod import;
 mod key;
 mod man;
@@ -69,6 +73,10 @@ enum Command {
     Diagnose(diagnose::Args),
     /// The next runs that would best separate what cannot be told apart yet.
     Plan(plan::Args),
+    /// What changed between campaigns, figure by figure, cause by cause, with intervals.
+    Compare(compare::Args),
+    /// Every campaign of a folder diagnosed and kept; what drifts, what stepped.
+    History(history::Args),
     /// Self-contained HTML report with plots.
     Report(report::Args),
     /// Rewrite the arcs of an NC program with the inverse correction.
@@ -109,6 +117,8 @@ fn dispatch(command: Command, out: Output) -> Result<(), Failure> {
         Command::Simulate(args) => simulate::run(args, out),
         Command::Diagnose(args) => diagnose::run(args, out),
         Command::Plan(args) => plan::run(args, out),
+        Command::Compare(args) => compare::run(args, out),
+        Command::History(args) => history::run(args, out),
         Command::Report(args) => report::run(args, out),
         Command::Compensate(args) => compensate::run(args, out),
         Command::Table(args) => table::run(args, out),
@@ -129,7 +139,10 @@ fn dispatch(command: Command, out: Output) -> Result<(), Failure> {
 
 /// Runs the command line of this process.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(words) => return told(&words),
+    };
     let out = Output {
         json: cli.json,
         quiet: cli.quiet,
@@ -141,13 +154,24 @@ pub fn main() -> ExitCode {
             return shown(out.document(&serde_json::json!({ "words": words })));
         }
         out.say(words);
-        return ExitCode::SUCCESS;
+        return shown(Ok(()));
     };
     shown(dispatch(command, out))
 }
 
+/// Help, version or wrong usage: to stdout or stderr, with the exit code that belongs to it.
+fn told(words: &clap::Error) -> ExitCode {
+    match words.print() {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            Failure::input(format_args!("stdout: {error}")).report()
+        }
+        _ if words.use_stderr() => ExitCode::from(2),
+        _ => shown(Ok(())),
+    }
+}
+
 fn shown(result: Result<(), Failure>) -> ExitCode {
-    match result {
+    match result.and_then(|()| output::finish()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(),
     }

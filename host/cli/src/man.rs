@@ -1,4 +1,5 @@
 //! `giotto man`: manual pages, one a command.
+use super::destination::{Destination, Kind};
 use super::failure::cannot_write;
 use super::{Failure, Output};
 use clap::Command;
@@ -48,9 +49,8 @@ fn write(
     let rendered = Man::new(command.clone())
         .title(name.to_uppercase())
         .render(&mut text);
-    rendered
-        .and_then(|()| std::fs::write(&path, &text))
-        .map_err(|e| cannot_write(&path, &e))?;
+    rendered.map_err(|e| cannot_write(&path, &e))?;
+    Destination::new(&path, Kind::Text, &[])?.write(&text)?;
     pages.push(page);
     command
         .get_subcommands()

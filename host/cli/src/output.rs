@@ -3,6 +3,7 @@ use super::failure::Failure;
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::io::{IsTerminal, Write};
+use std::sync::Mutex;
 use std::time::Duration;
 
 /// How results are shown, from the flags every command takes.
@@ -20,8 +21,7 @@ impl Output {
     /// A line for a person: stdout, or nothing with `--json`.
     pub fn say(&self, text: impl std::fmt::Display) {
         if !self.json {
-            // A closed pipe (`giotto … | head`) is no error of ours.
-            let _ = writeln!(std::io::stdout(), "{text}");
+            print(format_args!("{text}\n"));
         }
     }
 
@@ -52,7 +52,39 @@ impl Output {
         let text = serde_json::to_string_pretty(value).map_err(|e| {
             Failure::input(format_args!("the result cannot be written as JSON: {e}"))
         })?;
-        let _ = writeln!(std::io::stdout(), "{text}");
-        Ok(())
+        print(format_args!("{text}\n"));
+        finish()
+    }
+}
+
+/// Why stdout takes no more, once it does not.
+static LOST: Mutex<Option<std::io::Error>> = Mutex::new(None);
+
+/// Writes to stdout and remembers the first failure; after it nothing more is written.
+pub fn print(text: std::fmt::Arguments<'_>) {
+    let Ok(mut lost) = LOST.lock() else { return };
+    if lost.is_none() {
+        *lost = std::io::stdout().write_fmt(text).err();
+    }
+}
+
+/// Brings out what is still held back, and says whether all of the result was written. A closed pipe
+/// (`giotto … | head`) is no error of ours: who reads has seen enough.
+///
+/// # Errors
+/// The disk is full or the device failed (exit 3).
+pub fn finish() -> Result<(), Failure> {
+    let Ok(mut lost) = LOST.lock() else {
+        return Ok(());
+    };
+    if lost.is_none() {
+        *lost = std::io::stdout().flush().err();
+    }
+    match &*lost {
+        Some(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            let message = format_args!("the result was not written: stdout: {error}");
+            Err(Failure::input(message).help("make room where the output goes"))
+        }
+        _ => Ok(()),
     }
 }

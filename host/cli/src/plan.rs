@@ -1,4 +1,5 @@
 //! `giotto plan`: the next runs that would best separate what cannot be told apart yet.
+use super::destination::{Destination, Kind as FileKind};
 use super::source::{Source, length};
 use super::{Failure, Output};
 use comfy_table::{CellAlignment, Table, presets};
@@ -7,7 +8,7 @@ use giotto::causes::Cause;
 use giotto::diagnosis::{Options, diagnose};
 use giotto::model_file::ModelFile;
 use giotto::planning::{self, Limits, Plan, Purpose};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Arguments of `giotto plan`.
 #[derive(clap::Args, Debug)]
@@ -26,9 +27,13 @@ pub struct Args {
     /// Simulation to start from; without it one servo lag with fitted kv.
     #[arg(long, value_name = "MODEL.toml")]
     model: Option<PathBuf>,
-    /// Radii that the instrument has, separated by commas; without it half to three times those measured.
+    /// Radii that the instrument has, separated by commas; without it those measured and the lengths of usual bars (50,
+    /// 100, 150 mm, …) up to the largest measured.
     #[arg(long, value_name = "MM,MM", value_delimiter = ',', value_parser = length)]
     radii: Vec<f64>,
+    /// Largest radius; without it the largest of the campaign.
+    #[arg(long, value_name = "MM", value_parser = length)]
+    max_radius: Option<f64>,
     /// Highest feed; without it the highest of the campaign.
     #[arg(long, value_name = "MM_S", value_parser = length)]
     max_feed: Option<f64>,
@@ -45,6 +50,13 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
+    let inputs = args.source.inputs(args.model.as_deref());
+    let place = |path: &Option<PathBuf>, kind| Destination::maybe(path.as_deref(), kind, &inputs);
+    let file = place(&args.output, FileKind::Plan)?;
+    let programs = [
+        place(&args.gcode, FileKind::Text)?,
+        place(&args.rapid, FileKind::Text)?,
+    ];
     let campaign = args.source.read(out)?;
     let model = args.model.as_deref().map(ModelFile::load).transpose()?;
     let bar = out.spinner("diagnosing");
@@ -61,6 +73,7 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let options = planning::Options {
         limits: Limits {
             radii_m: args.radii.iter().map(|mm| mm * 1e-3).collect(),
+            largest_radius_m: args.max_radius.map(|mm| mm * 1e-3),
             highest_feed_m_s: args.max_feed.map(|mm| mm * 1e-3),
             highest_acceleration_m_s2: args.max_acceleration.map(|mm| mm * 1e-3),
         },
@@ -70,24 +83,24 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let plan = planning::propose(&campaign, &diagnosis, &options);
     let asked = args.output.is_some() || args.gcode.is_some() || args.rapid.is_some();
     if asked && plan.runs.is_empty() {
-        let why = "no runs to plan: circles have nothing more to tell apart";
-        return Err(Failure::check(why)
+        return Err(Failure::check(nothing(&plan))
             .help("leave out -o, --gcode and --rapid to see what the campaign tells"));
     }
-    if let Some(path) = &args.output {
+    if let Some(file) = &file {
         let text = toml::to_string(&plan.file(&campaign))
-            .map_err(|e| Failure::input(format_args!("{}: {e}", path.display())))?;
+            .map_err(|e| Failure::input(format_args!("{}: {e}", file.path().display())))?;
         let text = format!(
             "# The next measurement, in this order. Warm up before it: {} turns of the first circle.\n# To simulate it, name the machine here: model = \"MODEL.toml\"\n{text}",
             plan.warm_up_turns
         );
-        write(path, &text, out)?;
+        write(file, &text, out)?;
     }
-    if let Some(path) = &args.gcode {
-        write(path, &plan.gcode(&campaign.name), out)?;
+    let [gcode, rapid] = &programs;
+    if let Some(file) = gcode {
+        write(file, &plan.gcode(&campaign.name), out)?;
     }
-    if let Some(path) = &args.rapid {
-        write(path, &plan.rapid(&campaign.name), out)?;
+    if let Some(file) = rapid {
+        write(file, &plan.rapid(&campaign.name), out)?;
     }
     if out.json {
         return out.document(&plan);
@@ -96,10 +109,20 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     Ok(())
 }
 
-fn write(path: &Path, text: &str, out: Output) -> Result<(), Failure> {
-    giotto::campaign::replace(path, text)?;
-    out.note(format_args!("wrote {}", path.display()));
+fn write(file: &Destination, text: &str, out: Output) -> Result<(), Failure> {
+    file.write(text)?;
+    out.note(format_args!("wrote {}", file.path().display()));
     Ok(())
+}
+
+/// Why no run is planned: nothing is open, or what is open needs circles that were not allowed.
+fn nothing(plan: &Plan) -> &'static str {
+    if plan.open.is_empty() {
+        "No runs to plan: circles have nothing more to tell apart here."
+    } else {
+        "No runs to plan within these limits, though something is open: allow other circles with --radii, --max-radius, \
+         --max-feed or --max-acceleration."
+    }
 }
 
 fn name(id: &str) -> String {
@@ -129,7 +152,7 @@ fn show(plan: &Plan, out: Output) {
         ));
     }
     if plan.runs.is_empty() {
-        out.say("No runs to plan: circles have nothing more to tell apart here.");
+        out.say(nothing(plan));
         return;
     }
     let mut table = Table::new();

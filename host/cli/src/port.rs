@@ -1,7 +1,7 @@
 //! `--port` and what goes with it, and a controller's errors in words.
 use super::{Failure, Output};
 use giotto_link::port::BAUD;
-use giotto_link::{Controller, ControllerError, OpenOptions, Pace, Port, open};
+use giotto_link::{Controller, ControllerError, OpenOptions, Port, open};
 use std::path::PathBuf;
 
 /// Which controller.
@@ -26,20 +26,10 @@ impl PortArgs {
 
     /// As [`Self::open`], for those who look at the error.
     pub(super) fn connect(&self, out: Output) -> Result<Controller, ControllerError> {
-        self.connect_at(Pace::Fast, out)
-    }
-
-    /// As [`Self::connect`], with the emulator's time going so fast.
-    pub(super) fn connect_at(
-        &self,
-        pace: Pace,
-        out: Output,
-    ) -> Result<Controller, ControllerError> {
         let Ok(port) = self.port.parse::<Port>();
         let options = OpenOptions {
             image: self.image.clone(),
             baud: self.baud,
-            pace,
         };
         open(&port, &options, &mut |note| out.note(note))
     }

@@ -77,6 +77,13 @@ impl Foreign {
 }
 
 impl Source {
+    /// Every file that must not be written over: the campaign or file given, and `more`.
+    pub(super) fn inputs<'a>(&'a self, more: Option<&'a Path>) -> Vec<&'a Path> {
+        std::iter::once(self.campaign.as_path())
+            .chain(more)
+            .collect()
+    }
+
     /// Opens the campaign, or the foreign file as a campaign of one run.
     pub fn open(&self, out: Output) -> Result<Manifest, Failure> {
         let path = &self.campaign;

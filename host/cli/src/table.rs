@@ -1,8 +1,12 @@
 //! `giotto table`: model to controller table, and back to words.
-use super::failure::cannot_write;
+use super::destination::{Destination, Kind};
 use super::table_file::{self, TableFile};
 use super::{Failure, Output};
-use giotto_shared::table::{Header, SCHEMA_HASH, Table, image};
+use giotto::units::number;
+use giotto_shared::model::Cumulants;
+use giotto_shared::table::{Header, SCHEMA_HASH, Table, Travel, image};
+use giotto_shared::term::Term;
+use giotto_shared::{Actuator, Plane};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -34,8 +38,9 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     match (args.command, args.model, args.output) {
         (Some(Show::Show { table }), ..) => show(&table_file::read(&table, out)?, out),
         (None, Some(model), Some(output)) => {
+            let place = Destination::new(&output, Kind::Table, &[&model])?;
             let made = table_file::from_model(&model, out)?;
-            std::fs::write(&output, &made.image).map_err(|error| cannot_write(&output, &error))?;
+            place.write(&made.image)?;
             if out.json {
                 return out.document(&json!({ "table": output, "bytes": made.image.len() }));
             }
@@ -83,30 +88,139 @@ fn bytes(count: usize) -> String {
 }
 
 fn words(table: &Table, out: Output) {
-    let mm = |metres: f32| metres * 1e3;
+    let mm = |metres: f32| number(f64::from(metres) * 1e3);
     out.say(format_args!(
-        "limits: offset up to {:.4} mm, changing by up to {:.3} mm/s",
+        "No correction is larger than {} mm or changes faster than {} mm/s.",
         mm(table.limits.offset_m),
         mm(table.limits.slew_m_s)
     ));
-    for (number, zone) in table.zones.iter().enumerate() {
+    for (at, zone) in table.zones.iter().enumerate() {
         let ([r0, r1], [f0, f1]) = (zone.radius_m.map(mm), zone.feed_m_s.map(mm));
+        let travel = match zone.travel {
+            Travel::Both => "both directions",
+            Travel::Ccw => "counter-clockwise",
+            Travel::Cw => "clockwise",
+        };
+        let place = match zone.place_m {
+            Some([lo, hi]) => format!(
+                "centre from {} to {} mm",
+                lo.map(mm).join(" "),
+                hi.map(mm).join(" ")
+            ),
+            None => "any place".to_owned(),
+        };
         out.say(format_args!(
-            "zone {}: radius {r0:.3} to {r1:.3} mm, feed {f0:.3} to {f1:.3} mm/s, {:?}, {}",
-            number + 1,
-            zone.travel,
-            match zone.place_m {
-                Some([lo, hi]) => format!("centre {:?} to {:?} mm", lo.map(mm), hi.map(mm)),
-                None => "any place".to_owned(),
-            }
+            "Zone {}: radius {r0} to {r1} mm, feed {f0} to {f1} mm/s, {travel}, {place}",
+            at + 1
         ));
-        let cumulants = zone.cumulants;
-        out.say(format_args!(
-            "  kappa2 {:.6e} s^2, kappa4 {:.6e} s^4",
-            cumulants.kappa2_s2, cumulants.kappa4_s4
-        ));
+        out.say(format_args!("  {}", response(&zone.cumulants)));
         for term in &zone.terms {
-            out.say(format_args!("  {term:?}"));
+            out.say(format_args!("  {}", in_words(term)));
         }
+    }
+}
+
+/// The shared response: what it does to a circle, and its cumulants.
+fn response(cumulants: &Cumulants<f32>) -> String {
+    let [k2, k4] = [cumulants.kappa2_s2, cumulants.kappa4_s4].map(f64::from);
+    let what = if k2 > 0.0 {
+        format!(
+            "response as of a lag with kv {} /s: circles shrink by {} µm for each m/s² of f²/R",
+            number(k2.powf(-0.5)),
+            number(0.5e6 * k2)
+        )
+    } else if k2 < 0.0 {
+        format!(
+            "response that swings out: circles grow by {} µm for each m/s² of f²/R",
+            number(-0.5e6 * k2)
+        )
+    } else {
+        "no response of the servo".to_owned()
+    };
+    format!(
+        "{what} (κ2 {} ms², κ4 {} 10⁻⁶ s⁴)",
+        number(k2 * 1e6),
+        number(k4 * 1e6)
+    )
+}
+
+/// A term as a person says it; what stands in the table is the machine's error, the controller does the opposite.
+fn in_words(term: &Term<f32>) -> String {
+    let n = |value: f32, factor: f64| number(f64::from(value) * factor);
+    let of = |actuator: Actuator| actuator.name().to_uppercase();
+    let pair = |plane: Plane| plane.axes().map(of);
+    match *term {
+        Term::RadiusOffset { offset_m } => format!("radius offset {} µm", n(offset_m, 1e6)),
+        Term::ScaleError { relative } => format!("scale error {} µm/m", n(relative, 1e6)),
+        Term::AxisScale { actuator, relative } => {
+            format!("scale error of {} {} µm/m", of(actuator), n(relative, 1e6))
+        }
+        Term::ScaleMismatch { plane, relative } => {
+            let [a, b] = pair(plane);
+            let size = n(relative, 1e6);
+            format!("scale mismatch, {a} longer than {b} by {size} µm/m")
+        }
+        Term::Squareness { plane, shear_rad } => {
+            let [a, b] = pair(plane);
+            format!("squareness of {a} and {b} {} µm/m", n(shear_rad, 1e6))
+        }
+        Term::ServoMismatch { plane, delta_tau_s } => {
+            let [a, b] = pair(plane);
+            let size = n(delta_tau_s, 1e6);
+            format!("servo mismatch, {a} follows {size} µs later than {b}")
+        }
+        Term::BandwidthMismatch {
+            plane,
+            delta_kappa2_s2,
+        } => {
+            let [a, b] = pair(plane);
+            let size = n(delta_kappa2_s2, 1e6);
+            format!("bandwidth mismatch, κ2 of {a} less that of {b} {size} ms²")
+        }
+        Term::Backlash { actuator, step_m } => {
+            format!("backlash of {} {} µm", of(actuator), n(step_m, 1e6))
+        }
+        Term::LateralPlay {
+            actuator,
+            across,
+            shift_m,
+        } => format!(
+            "lateral play along {} with the travel of {} {} µm",
+            of(across),
+            of(actuator),
+            n(shift_m, 1e6)
+        ),
+        Term::ReversalSpike {
+            actuator,
+            peak_m,
+            decay_s,
+        } => format!(
+            "reversal spike of {} {} µm, dying away in {} ms",
+            of(actuator),
+            n(peak_m, 1e6),
+            n(decay_s, 1e3)
+        ),
+        Term::Cyclic {
+            actuator,
+            amplitude_m,
+            pitch_m,
+            phase_rad,
+        } => format!(
+            "cyclic error of {} {} µm, pitch {} mm, phase {}°",
+            of(actuator),
+            n(amplitude_m, 1e6),
+            n(pitch_m, 1e3),
+            n(phase_rad.to_degrees(), 1.0)
+        ),
+        Term::Straightness {
+            actuator,
+            across,
+            curvature_per_m,
+        } => format!(
+            "bow of the guide of {} along {}: {} µm over ±100 mm",
+            of(actuator),
+            of(across),
+            n(curvature_per_m, 1e4)
+        ),
     }
 }

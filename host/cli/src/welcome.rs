@@ -1,4 +1,5 @@
 //! What `giotto` alone says: what to do next, from what lies in the directory.
+use super::destination::quoted;
 use std::path::Path;
 
 const COMMANDS: &str =
@@ -49,15 +50,6 @@ fn next(folder: &Path) -> String {
             quoted(file)
         ),
         None => "giotto demo".to_owned(),
-    }
-}
-
-fn quoted(name: &str) -> String {
-    let plain = |c: char| c.is_alphanumeric() || "-_.+".contains(c);
-    if name.chars().all(plain) {
-        name.to_owned()
-    } else {
-        format!("'{}'", name.replace('\'', "'\\''"))
     }
 }
 

@@ -169,13 +169,90 @@ fn offsets_and_partial_f_are_named_in_words() {
         text.contains("as the paper does") && text.contains("divided by p"),
         "{text}"
     );
-    for figure in [
-        "figure08.svg",
-        "figure09.svg",
-        "figure10.svg",
-        "figure11.svg",
-    ] {
-        assert!(directory.path().join("figures").join(figure).is_file());
+    for number in 2..=11 {
+        for ending in ["svg", "csv"] {
+            let file = format!("figures/figure{number:02}.{ending}");
+            assert!(directory.path().join(&file).is_file(), "{file}");
+        }
+    }
+}
+
+/// What the figures draw is what the campaign holds: every run of 8 to 11 by its ΔR and roundness, the forms of 2 to 7 by
+/// their samples.
+#[test]
+fn the_figures_draw_the_campaign() {
+    let directory = written();
+    let folder = directory.path();
+    giotto(
+        folder,
+        &[
+            "fit",
+            "campaign",
+            "--train-radius",
+            "100",
+            "--figures",
+            "figures",
+        ],
+    );
+    let rows = |number: usize| -> Vec<Vec<String>> {
+        let text = std::fs::read_to_string(folder.join(format!("figures/figure{number:02}.csv")));
+        let text = text.unwrap();
+        let row = |line: &str| {
+            line.split(',')
+                .map(|c| c.trim_matches('"').to_owned())
+                .collect()
+        };
+        text.lines().skip(1).map(row).collect()
+    };
+    let report: Value =
+        serde_json::from_slice(&giotto(folder, &["analyze", "campaign", "--json"]).stdout).unwrap();
+    let runs = report["runs"].as_array().unwrap();
+    let near = |a: f64, b: f64, within: f64| (a - b).abs() <= within;
+    let number = |text: &str| text.parse::<f64>().unwrap();
+    for (figure, field) in [(8, "radius_error_um"), (9, "out_of_roundness_um")] {
+        let rows = rows(figure);
+        assert_eq!(rows.len(), runs.len());
+        for run in runs {
+            let of = |key: &str| run[key].as_f64().unwrap();
+            let found = rows.iter().any(|row| {
+                near(number(&row[0]), of("radius_mm"), 1e-6)
+                    && near(number(&row[1]), of("feed_mm_s"), 1e-6)
+                    && row[2] == run["direction"].as_str().unwrap()
+                    && (row[3] == "fitted") == near(of("radius_mm"), 100.0, 1e-6)
+                    && near(
+                        number(&row[4]),
+                        1e-3 * of("feed_mm_s").powi(2) / of("radius_mm"),
+                        1e-5,
+                    )
+                    && near(number(&row[5]), of(field), 1e-4)
+            });
+            assert!(found, "figure {figure}: {run}");
+        }
+    }
+    assert_eq!([rows(10).len(), rows(11).len()], [runs.len(); 2]);
+    let campaign = campaign();
+    for figure in 2..=7 {
+        let rows = rows(figure);
+        assert!(rows.len() >= 300, "figure {figure}: {}", rows.len());
+        for row in &rows {
+            let run = campaign.runs.iter().find(|run| run.file == row[0]).unwrap();
+            assert!(near(run.radius_m * 1e3, number(&row[1]), 1e-6));
+            assert!(near(run.feed_m_s * 1e3, number(&row[2]), 1e-6));
+            let mean = run.samples.deviation_m.iter().sum::<f64>() * 1e6
+                / run.samples.deviation_m.len() as f64;
+            // The circles of this campaign are round: every sector is their mean but for noise.
+            assert!(
+                near(number(&row[5]), mean, 1.0),
+                "figure {figure}: {row:?} {mean}"
+            );
+        }
+        let ways: std::collections::BTreeSet<&str> = rows.iter().map(|r| r[3].as_str()).collect();
+        let both = figure <= 4;
+        assert_eq!(
+            ways.len(),
+            if both { 2 } else { 1 },
+            "figure {figure}: {ways:?}"
+        );
     }
 }
 

@@ -7,6 +7,8 @@ use giotto_shared::wire::{
     self, Accumulator, Command, FromController, Identity, MAX_FRAME, PROTOCOL_VERSION, Refusal,
     Reply, Request, SUPERVISE_MS, SetPoints, Status,
 };
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 /// After so long without an answer a request is sent again.
@@ -29,6 +31,10 @@ pub struct Controller {
     identity: Identity,
     repeats: u32,
     supervise_ms: u16,
+    /// Set by whoever wants the run that is recorded to stop.
+    pub(super) wish: Option<Arc<AtomicBool>>,
+    /// It was.
+    pub(super) stopped: bool,
 }
 
 impl std::fmt::Debug for Controller {
@@ -74,6 +80,8 @@ impl Controller {
             identity: nobody,
             repeats: 0,
             supervise_ms: SUPERVISE_MS,
+            wish: None,
+            stopped: false,
         };
         controller.hello()?;
         Ok(controller)

@@ -3,6 +3,7 @@ use super::error::ControllerError;
 use super::image::{self, Board, SerialPort};
 use super::link::Link;
 use super::serial::SerialLink;
+use super::stepped::SteppedLink;
 use std::io::{self, BufRead, BufReader};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
@@ -16,6 +17,9 @@ pub const PROGRAM: &str = "qemu-system-arm";
 /// How long it may take to say where its pty is.
 const START_TIME: Duration = Duration::from_secs(10);
 
+/// Ticks of the boards' images, those of the feature `fast` apart.
+const TICK: Duration = Duration::from_millis(1);
+
 /// Runs the emulator until its own input ends, which it does however this process ends.
 const KEEPER: &str = r#"exec 3<&0; "$@" </dev/null 3<&- & emulator=$!
 exec >/dev/null 2>&1; cat <&3; kill $emulator; wait $emulator"#;
@@ -23,21 +27,19 @@ exec >/dev/null 2>&1; cat <&3; kill $emulator; wait $emulator"#;
 /// How fast time goes in the emulator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
-    /// Time counts instructions and skips over waiting: faster than the clock, and the same every time.
-    Fast,
-    /// By the clock on the wall.
-    Clock,
-    /// Time counts instructions and skips over nothing, at a tenth of the clock or so: a host that has to keep up with it can.
-    /// The workspace's image is the one that never sleeps.
-    Slow,
+    /// By itself: it counts instructions and skips over waiting, faster than a host that is busy elsewhere can follow. For what
+    /// only counts instructions, and for images that know nothing of grants.
+    Free,
+    /// As the host grants it, tick by tick: see [`stepped`](super::stepped).
+    Stepped,
 }
 
 /// An emulator that runs an image; dropped, it is ended.
 #[derive(Debug)]
 pub struct Emulator {
     process: Child,
-    words: mpsc::Receiver<String>,
     pty: String,
+    pace: Pace,
     folder: TempDir,
 }
 
@@ -87,8 +89,7 @@ impl Emulator {
                     reason,
                 });
             }
-            None if pace == Pace::Slow => image::ensure_with(board, &["awake"], note)?,
-            None => image::ensure(board, note)?,
+            None => image::ensure_with(board, board.features(pace == Pace::Stepped), note)?,
         };
         let folder = tempfile::Builder::new()
             .prefix("giotto-qemu-")
@@ -121,28 +122,20 @@ impl Emulator {
             };
         }
         // Time counts instructions, so that a busy host delays the controller but never makes a tick late.
-        let sleep = match pace {
-            Pace::Fast | Pace::Slow => "off",
-            Pace::Clock => "on",
-        };
-        let shift = if pace == Pace::Slow {
-            board.slow_shift()
-        } else {
-            board.instruction_shift()
-        };
+        let shift = board.instruction_shift();
         command
             .arg("-icount")
-            .arg(format!("shift={shift},sleep={sleep},align=off"));
+            .arg(format!("shift={shift},sleep=off,align=off"));
         command
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped());
         let mut process = command.spawn().map_err(|error| failed(&error))?;
         match find_pty(&mut process) {
-            Ok((pty, words)) => Ok(Self {
+            Ok(pty) => Ok(Self {
                 process,
-                words,
                 pty,
+                pace,
                 folder,
             }),
             Err(error) => {
@@ -178,21 +171,31 @@ impl Emulator {
         UnixStream::connect(self.folder.path().join("log"))
     }
 
-    /// Waits until the emulator ends by itself.
-    pub fn wait(&mut self) {
-        while self.words.recv().is_ok() {}
-    }
-
     /// Opens the link; the emulator ends with it.
     ///
     /// # Errors
     /// Those of [`SerialLink::open`].
     pub fn into_link(self) -> Result<EmulatorLink, ControllerError> {
-        let serial = SerialLink::open(&self.pty, super::port::BAUD)?;
+        let link = self.open()?;
         Ok(EmulatorLink {
-            serial,
+            link,
             _emulator: self,
         })
+    }
+
+    /// Opens the pty of the link with a serial port's means, in the emulator's time.
+    ///
+    /// # Errors
+    /// Those of [`SerialLink::open`]; [`ControllerError::Emulator`] if the image knows nothing of grants.
+    pub fn open(&self) -> Result<Box<dyn Link>, ControllerError> {
+        let serial = SerialLink::open(&self.pty, super::port::BAUD)?;
+        match self.pace {
+            Pace::Free => Ok(Box::new(serial)),
+            Pace::Stepped => {
+                let link = SteppedLink::begin(serial, TICK).map_err(|error| failed(&error))?;
+                Ok(Box::new(link))
+            }
+        }
     }
 }
 
@@ -215,7 +218,7 @@ fn failed(error: &io::Error) -> ControllerError {
 }
 
 /// Reads "char device redirected to PATH (label serial0)".
-fn find_pty(process: &mut Child) -> Result<(String, mpsc::Receiver<String>), ControllerError> {
+fn find_pty(process: &mut Child) -> Result<String, ControllerError> {
     let (sender, lines) = mpsc::channel();
     let readers: [Option<Box<dyn io::Read + Send>>; 2] = [
         process.stdout.take().map(|pipe| Box::new(pipe) as _),
@@ -237,8 +240,7 @@ fn find_pty(process: &mut Child) -> Result<(String, mpsc::Receiver<String>), Con
             .strip_prefix("char device redirected to ")
             .and_then(|rest| rest.split(' ').next());
         if let Some(path) = path {
-            let path = path.to_owned();
-            return Ok((path, lines));
+            return Ok(path.to_owned());
         }
         words.push(line);
     }
@@ -252,20 +254,20 @@ fn find_pty(process: &mut Child) -> Result<(String, mpsc::Receiver<String>), Con
 
 /// The link of an emulator, which lives as long as this.
 pub struct EmulatorLink {
-    serial: SerialLink,
+    link: Box<dyn Link>,
     _emulator: Emulator,
 }
 
 impl Link for EmulatorLink {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.serial.send(bytes)
+        self.link.send(bytes)
     }
 
     fn receive(&mut self, buffer: &mut [u8], until: Duration) -> io::Result<usize> {
-        self.serial.receive(buffer, until)
+        self.link.receive(buffer, until)
     }
 
     fn now(&self) -> Duration {
-        self.serial.now()
+        self.link.now()
     }
 }

@@ -90,6 +90,9 @@ pub enum ControllerError {
         /// Ticks for which none had come.
         missing: u32,
     },
+    /// The person here stopped the run.
+    #[error("stopped")]
+    Stopped,
     /// Set-points were lost on the way.
     #[error("{lost} set-points of the run were lost on the way")]
     SetPointsLost {
@@ -143,7 +146,7 @@ impl ControllerError {
             }
             Self::Table(_) => "make the table anew with `giotto table MODEL.toml -o TABLE.bin`",
             Self::Starved { .. } => {
-                "reset it (`giotto status` shows the fault) and stream over a faster port, from a less busy computer"
+                "`giotto reset` clears the fault; stream over a faster port, from a less busy computer"
             }
             Self::SetPointsLost { .. } => "run again; a shorter run or a faster port loses less",
             Self::NoEmulator { .. } => {
@@ -152,7 +155,7 @@ impl ControllerError {
             Self::Emulator { .. } | Self::NoImage { .. } => {
                 "run .ci/setup once, or give an image with --image PATH, or use --port sim"
             }
-            Self::WrongReply => return None,
+            Self::WrongReply | Self::Stopped => return None,
         })
     }
 }
@@ -174,9 +177,15 @@ fn refusal_help(refusal: &Refusal) -> Option<&'static str> {
         }
         Refusal::KeyProvisioned => "a controller keeps its first key; sign with that one",
         Refusal::NoSignatures => "build the firmware with its feature `signed`",
+        Refusal::Motion(MotionRefusal::NoPosition) => {
+            "`giotto reset --at X,Y,Z` says where it stands, mm; a stream begins where its first set-point is"
+        }
+        Refusal::Motion(MotionRefusal::NoRoomToStop) => {
+            "slow the path down before it nears 2.1 m from the machine's origin"
+        }
         Refusal::Motion(MotionRefusal::StopInput) => "release the stop input",
         Refusal::Motion(MotionRefusal::Fault) => {
-            "`giotto status` names the fault; reset the controller"
+            "`giotto status` names the fault, `giotto reset` clears it"
         }
         Refusal::NotUnderstood => "use the giotto and the firmware of the same release",
         _ => return None,

@@ -70,12 +70,17 @@ impl Board {
         }
     }
 
-    /// The same where time has to go slowly: several times less than the board needs.
-    pub const fn slow_shift(self) -> u8 {
+    /// Features of the firmware beside the board's own, for time by grant: the emulator's own board has it always.
+    pub const fn features(self, stepped: bool) -> &'static [&'static str] {
         match self {
-            Self::Mps2An386 | Self::Ticks => 1,
-            Self::Stm32f405 => 0,
+            Self::Stm32f405 if stepped => &["stepped"],
+            Self::Mps2An386 | Self::Stm32f405 | Self::Ticks => &[],
         }
+    }
+
+    /// Whether an image of this board takes grants though it was not built for them.
+    pub const fn always_steps(self) -> bool {
+        matches!(self, Self::Mps2An386)
     }
 
     /// QEMU's machine that the image runs on.

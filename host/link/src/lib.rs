@@ -10,8 +10,10 @@
 //! | [`program`], [`streaming`] | programs and set-points, sent ahead of the machine |
 //! | [`port`] | what `--port` may name, and opening it |
 //! | [`serial`] | a serial device |
+//! | [`stepped`] | an emulator whose time passes only while someone waits |
 //! | [`virtual_controller`] | the firmware's library in this process, in simulated time, or behind a pty |
 //! | [`emulator`] | the firmware image in QEMU |
+//! | [`serve`] | either of them on a pty, by the clock |
 //! | [`image`] | finding or building that image |
 #![forbid(unsafe_code)]
 
@@ -26,7 +28,9 @@ pub mod program;
 pub mod recording;
 pub mod serial;
 mod series;
+pub mod serve;
 pub mod signing;
+pub mod stepped;
 pub mod streaming;
 pub mod virtual_controller;
 

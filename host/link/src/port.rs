@@ -5,6 +5,7 @@ use super::error::ControllerError;
 use super::image::Board;
 use super::serial::SerialLink;
 use super::virtual_controller::VirtualLink;
+use giotto_shared::wire::{Command, PositionState};
 use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -47,8 +48,6 @@ pub struct OpenOptions {
     pub image: Option<PathBuf>,
     /// Baud rate of a serial device.
     pub baud: u32,
-    /// How fast time goes in the emulator.
-    pub pace: Pace,
 }
 
 impl Default for OpenOptions {
@@ -56,7 +55,6 @@ impl Default for OpenOptions {
         Self {
             image: None,
             baud: BAUD,
-            pace: Pace::Fast,
         }
     }
 }
@@ -78,11 +76,22 @@ pub fn open(
             } else {
                 Board::Mps2An386
             };
-            let emulator =
-                Emulator::start_board(board, options.image.as_deref(), options.pace, note)?;
+            let image = options.image.as_deref();
+            let pace = if image.is_none() || board.always_steps() {
+                Pace::Stepped
+            } else {
+                Pace::Free
+            };
+            let emulator = Emulator::start_board(board, image, pace, note)?;
             let mut controller = Controller::connect(Box::new(emulator.into_link()?), "qemu", 1)?;
-            // Its time does not wait for ours: a second of silence there may be a moment here.
-            controller.supervise(None)?;
+            if controller.status()?.position == PositionState::Unknown {
+                // Nothing hangs on an emulated board: it stands where we say.
+                controller.command(Command::Declare { place_nm: [0; 3] })?;
+            }
+            if pace == Pace::Free {
+                // Its time does not wait for ours: a second of silence there may be a moment here.
+                controller.supervise(None)?;
+            }
             Ok(controller)
         }
         Port::Device(path) => {

@@ -3,7 +3,7 @@ use super::client::Controller;
 use super::error::ControllerError;
 use super::recording::Recording;
 use giotto_shared::path::{Segment, Step};
-use giotto_shared::wire::{Command, ExactSegment, MotionRefusal, MotionState, Refusal, Status};
+use giotto_shared::wire::{Command, ExactSegment, MotionRefusal, Refusal, Status};
 use std::time::Duration;
 
 /// From one attempt to append to a full queue to the next, unless set-points come before.
@@ -52,8 +52,11 @@ impl Controller {
         self.command(Command::Begin)?;
         let sent = self.append_all(&segments);
         let recording = self.end_recording(every);
-        sent?;
-        Ok(recording?)
+        match sent {
+            // What was recorded up to there is wanted.
+            Err(error) if !matches!(error.error, ControllerError::Stopped) => Err(error),
+            _ => Ok(recording?),
+        }
     }
 
     /// Sends a program and returns when all of it is accepted: where it will end, nm.
@@ -91,7 +94,7 @@ impl Controller {
     pub(super) fn at_rest(&mut self) -> Result<Status, ControllerError> {
         loop {
             let status = self.status()?;
-            if !matches!(status.motion, MotionState::Running | MotionState::Stopping) {
+            if !status.motion.is_run() {
                 return Ok(status);
             }
             self.listen(ROOM_AFTER)?;
@@ -118,6 +121,9 @@ impl Controller {
     /// Waits for room.
     pub(super) fn append(&mut self, append: &Command) -> Result<(), ControllerError> {
         loop {
+            if self.obey()? {
+                return Err(ControllerError::Stopped);
+            }
             match self.command(append.clone()) {
                 Err(ControllerError::Refused(Refusal::Motion(MotionRefusal::QueueFull))) => {
                     self.wait_for_set_points(ROOM_AFTER)?;

@@ -1,20 +1,25 @@
 //! Runs on a controller, and the set-points it made of them.
 use super::client::Controller;
 use super::error::ControllerError;
-use giotto_shared::Direction;
 use giotto_shared::path::CircleRun;
-use giotto_shared::wire::{Command, MotionState, Pose, SUPERVISE_MS};
+use giotto_shared::wire::{Command, Pose, SUPERVISE_MS};
+use giotto_shared::{Direction, Plane};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Duration;
 
 /// How often the controller hears from us during a run, by the link's clock, so that it does not take us for dead.
 const KEEP_ALIVE: Duration = Duration::from_millis(SUPERVISE_MS as u64 / 4);
+/// How often it is looked whether the person here has had enough.
+const ATTENTION: Duration = Duration::from_millis(50);
 
-/// `laps` turns about the origin from polar angle 0; SI.
+/// `laps` turns about the origin in XY from polar angle 0; SI.
 pub const fn circle(radius_m: f64, feed_m_s: f64, direction: Direction, laps: u32) -> CircleRun {
     CircleRun {
         centre_m: [0.0; 3],
         radius_m,
         feed_m_s,
+        plane: Plane::Xy,
         direction,
         laps,
         start_rad: 0.0,
@@ -39,6 +44,8 @@ pub struct Recording {
     pub dt_s: f64,
     /// The set-points.
     pub points: Vec<SetPointRecord>,
+    /// The person here stopped the run before its end.
+    pub stopped: bool,
 }
 
 fn metres(nm: Pose) -> [f64; 3] {
@@ -68,6 +75,21 @@ impl Controller {
         self.end_recording(every)
     }
 
+    /// While a run is recorded it is stopped as soon as `wish` is set; what was recorded is kept.
+    pub fn stop_on(&mut self, wish: Arc<AtomicBool>) {
+        self.wish = Some(wish);
+    }
+
+    /// Stops what runs if that is wanted; whether it was, now or before.
+    pub(super) fn obey(&mut self) -> Result<bool, ControllerError> {
+        let wanted = self.wish.as_ref().is_some_and(|wish| wish.load(Relaxed));
+        if wanted && !self.stopped {
+            self.stopped = true;
+            self.command(Command::Stop)?;
+        }
+        Ok(self.stopped)
+    }
+
     /// Set-points are put away from now on.
     pub(super) fn begin_recording(&mut self, every: u16) -> Result<(), ControllerError> {
         // What is left of another run comes before the second answer.
@@ -80,28 +102,34 @@ impl Controller {
             on_link: true,
         })?;
         self.set_points.clear();
+        self.stopped = false;
         Ok(())
     }
 
     /// All set-points to the end of the run.
     pub(super) fn end_recording(&mut self, every: u16) -> Result<Recording, ControllerError> {
         let every = every.max(1);
+        // The last set-point is that of the next tick of the record after rest: so long by the controller's own ticks, and as
+        // long again in case there was no room for it at first.
+        let patience = 2 * u32::from(every) + self.identity().tick_hz / 2;
         let mut spoke_at = self.now();
-        let mut at_rest = false;
+        let mut rests_since = None;
         while !self.set_points.last().is_some_and(|batch| batch.last) {
-            let came = self.wait_for_set_points(KEEP_ALIVE)?;
-            if came && self.now() < spoke_at + KEEP_ALIVE {
+            self.obey()?;
+            let came = self.wait_for_set_points(ATTENTION)?;
+            if self.now() < spoke_at + KEEP_ALIVE {
                 continue;
             }
-            // Nothing came though it was at rest: the last one is not on its way.
-            if at_rest && !came {
+            spoke_at = self.now();
+            let status = self.status()?;
+            if status.motion.is_run() {
+                rests_since = None;
+                continue;
+            }
+            let since = *rests_since.get_or_insert(status.tick);
+            if !came && status.tick.wrapping_sub(since) > patience {
                 return Err(ControllerError::SetPointsLost { lost: 1 });
             }
-            spoke_at = self.now();
-            at_rest = !matches!(
-                self.status()?.motion,
-                MotionState::Running | MotionState::Stopping
-            );
         }
         self.command(Command::Subscribe {
             every: 0,
@@ -139,6 +167,7 @@ impl Controller {
         Ok(Recording {
             dt_s,
             points: timed.collect(),
+            stopped: self.stopped,
         })
     }
 }

@@ -66,7 +66,11 @@ impl SigningKey {
         options.write(true).create_new(true);
         #[cfg(unix)]
         std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
-        writeln!(options.open(path)?, "{MARK}{}", hex(&*self.0.sk.seed()))
+        let mut file = options.open(path)?;
+        // Half a key signs nothing and would stand in the way of the next attempt.
+        writeln!(file, "{MARK}{}", hex(&*self.0.sk.seed())).inspect_err(|_| {
+            let _ = std::fs::remove_file(path);
+        })
     }
 
     /// Its public half.

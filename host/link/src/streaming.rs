@@ -40,6 +40,10 @@ impl Controller {
         let sent = self
             .send_points(before.raw_nm, places_nm)
             .and_then(|()| self.append(&Command::End));
+        if sent.is_err() {
+            // Refused, it would be followed to where it ends and starve there.
+            let _ = self.command(Command::Stop);
+        }
         let recording = self.end_recording(every);
         let after = self.status()?;
         let (was, is) = (before.counters, after.counters);
@@ -47,7 +51,10 @@ impl Controller {
         if after.fault == Some(FaultCause::Starved) {
             return Err(ControllerError::Starved { missing });
         }
-        sent?;
+        match sent {
+            Ok(()) | Err(ControllerError::Stopped) => {}
+            Err(error) => return Err(error),
+        }
         Ok(Streamed {
             recording: recording?,
             missing,

@@ -1,33 +1,37 @@
 //! The firmware's library on the host: the same server, store, planner and tick, over a flash in memory.
 //!
 //! In this process ([`VirtualLink`]) time is simulated: it passes only while someone waits for an answer, as fast
-//! as the ticks can be computed. Behind a pty ([`serve`]) it is the clock's.
-use super::error::ControllerError;
+//! as the ticks can be computed. Behind a pty ([`serve`](super::serve::serve)) it is the clock's.
 use super::link::Link;
 use giotto_firmware::control::{Desk, Job, Receiver, SEGMENTS, SET_POINTS, Sender, Shared, Tick};
 use giotto_firmware::engine::{Config, Executor, Planner};
-use giotto_firmware::server::{Board, Buffers, Server, TimedSetPoint};
+use giotto_firmware::server::{Board, Buffers, Motion, Server, TimedSetPoint};
 use giotto_firmware::store::{Layout, ram::RamFlash};
+use giotto_shared::wire::{ClockSource, Pose, PositionState, ResetCause};
 use std::collections::VecDeque;
 use std::convert::Infallible;
-use std::io::{self, Read, Write};
+use std::io;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Ticks a second.
 pub const TICK_HZ: u32 = 1000;
 /// Bytes of a slot.
 const SLOT: usize = 4096;
-/// Two slots and the key, each one erase unit.
-const LAYOUT: Layout = Layout::new([0, SLOT as u32], SLOT as u32).with_key(2 * SLOT as u32);
+/// Two slots, the key and two units of the configuration, each one erase unit.
+const LAYOUT: Layout = Layout::new([0, SLOT as u32], SLOT as u32)
+    .with_key(2 * SLOT as u32)
+    .with_config([3 * SLOT as u32, 4 * SLOT as u32]);
 const BOARD: Board = Board {
     name: "virtual",
     build: env!("CARGO_PKG_VERSION"),
     tick_hz: TICK_HZ,
+    clock: ClockSource::Crystal,
+    reset: ResetCause::Power,
 };
 
 /// Flash of a virtual controller.
-pub type Flash = RamFlash<{ 3 * SLOT }, SLOT>;
+pub type Flash = RamFlash<{ 5 * SLOT }, SLOT>;
 
 /// A queue whose two ends are in one process.
 #[derive(Debug)]
@@ -149,15 +153,26 @@ impl Default for VirtualController {
 impl VirtualController {
     /// Boots with what is in the flash.
     pub fn boot(flash: Flash) -> Self {
+        Self::boot_at(flash, [0; 3], PositionState::Known)
+    }
+
+    /// The same, its machine standing somewhere.
+    pub fn boot_at(flash: Flash, place_nm: Pose, known: PositionState) -> Self {
         let config = Config::robot(TICK_HZ);
         let shared = Arc::new(Shared::new());
         let (segments_in, segments_out) = Queue::new(SEGMENTS);
         let (points_in, points_out) = Queue::new(SET_POINTS);
-        let origin = [0; 3];
-        let executor = Executor::new(origin, config.engage_ticks(), true);
-        let planner = Box::new(Planner::new(&config, origin));
+        shared.stands(place_nm, known);
+        let executor = Executor::new(place_nm, config.engage_ticks(), true);
+        let planner = Box::new(Planner::new(&config, place_nm));
         let desk = Desk::new(planner, Arc::clone(&shared), segments_in, points_out);
-        let server = Server::boot(BOARD, flash, LAYOUT, desk, Box::default());
+        let reset = if known == PositionState::Kept {
+            ResetCause::Request
+        } else {
+            BOARD.reset
+        };
+        let board = Board { reset, ..BOARD };
+        let server = Server::boot(board, flash, LAYOUT, desk, Box::default());
         let tick = Tick::new(executor, Arc::clone(&shared), segments_out, points_in);
         Self {
             server,
@@ -197,15 +212,16 @@ impl VirtualController {
         count
     }
 
-    /// Warm reset: the flash stays.
+    /// Warm reset: the flash stays, and so does what the drives were told last.
     fn reset(&mut self) {
+        let place_nm = self.server.motion_mut().snapshot().corrected_nm;
         let flash = self.server.store_mut().flash_mut().clone();
         let wires = std::mem::take(&mut self.wires);
         let ticks = self.ticks;
         *self = Self {
             wires,
             ticks,
-            ..Self::boot(flash)
+            ..Self::boot_at(flash, place_nm, PositionState::Kept)
         };
     }
 }
@@ -241,49 +257,5 @@ impl Link for VirtualLink {
 
     fn now(&self) -> Duration {
         Duration::from_millis(self.controller.ticks * 1000 / u64::from(TICK_HZ))
-    }
-}
-
-/// Serves a virtual controller on a pty, by the clock, until the process ends. `ready` is told the path once
-/// it can be opened.
-///
-/// # Errors
-/// Those of the pty.
-pub fn serve(ready: &mut dyn FnMut(&str)) -> Result<Infallible, ControllerError> {
-    use serialport::{SerialPort, TTYPort};
-    let cannot = |reason: String| ControllerError::CannotOpen {
-        port: "pty".to_owned(),
-        reason,
-    };
-    let (mut near, far) = TTYPort::pair().map_err(|error| cannot(error.description))?;
-    let path = far
-        .name()
-        .ok_or_else(|| cannot("it has no name".to_owned()))?;
-    // Closed, because it is locked: a client could not open it. Until one does, the near end reads as hung up.
-    drop(far);
-    near.set_timeout(Duration::from_millis(1))
-        .map_err(|error| cannot(error.description))?;
-    ready(&path);
-    let mut controller = VirtualController::default();
-    let started = Instant::now();
-    let mut buffer = [0; 4096];
-    loop {
-        match near.read(&mut buffer) {
-            Ok(count) => controller.receive(&buffer[..count]),
-            Err(error)
-                if matches!(
-                    error.kind(),
-                    io::ErrorKind::TimedOut | io::ErrorKind::Interrupted
-                ) => {}
-            // No client: nothing to do but to let time pass.
-            Err(_) => std::thread::sleep(Duration::from_millis(5)),
-        }
-        let due = (started.elapsed().as_secs_f64() * f64::from(TICK_HZ)) as u64;
-        while controller.ticks < due {
-            controller.step();
-            let count = controller.take(&mut buffer);
-            // A client that went away, or does not read, loses what it does not take; it will ask again.
-            let _ = near.write_all(&buffer[..count]);
-        }
     }
 }

@@ -21,6 +21,10 @@ pub(super) struct Entry {
     pub(super) length_mm: f64,
     /// How it gets there.
     pub(super) shape: Transition,
+    /// Largest error that the step leaves, mm; 0 where that is not known.
+    pub(super) remaining_mm: f64,
+    /// It goes on where the corrected arc before it ends.
+    pub(super) held: bool,
 }
 
 /// How a corrected arc ends.
@@ -34,6 +38,8 @@ pub(super) enum Exit {
         length_mm: f64,
         /// How.
         shape: Transition,
+        /// Largest error that it leaves, mm.
+        remaining_mm: f64,
         /// Direction of the line.
         along: [f64; 2],
     },
@@ -41,6 +47,8 @@ pub(super) enum Exit {
     Inside {
         /// Way, mm.
         length_mm: f64,
+        /// A last stretch on the programmed circle, mm, so that the arc ends in its own G-code.
+        tail_mm: f64,
     },
 }
 
@@ -50,8 +58,8 @@ pub(super) const INSIDE_CURVATURE: f64 = 36.0;
 impl Exit {
     /// Way inside the arc, mm.
     pub(super) fn inside_mm(self) -> f64 {
-        if let Self::Inside { length_mm } = self {
-            length_mm
+        if let Self::Inside { length_mm, tail_mm } = self {
+            length_mm + tail_mm
         } else {
             0.0
         }
@@ -81,10 +89,13 @@ pub(super) struct Piece {
     /// Share of the programmed sweep at the end.
     pub(super) share: f64,
     pub(super) length_mm: f64,
+    /// Behind the arc's end, on the line that follows.
+    pub(super) beyond: bool,
 }
 
-/// Beyond this radius, mm, an arc is written as a line; over a millimetre they differ by 0.1 nm.
-const STRAIGHT_MM: f64 = 1e6;
+/// An arc that bulges by less, mm, is written as a line: half the last digit of a program, and far from where the f32 of
+/// small controllers takes a flat arc for a full circle.
+const STRAIGHT_MM: f64 = 2e-5;
 
 /// Biarcs to a step with overshoot.
 const INSIDE_BIARCS: usize = 4;
@@ -140,32 +151,50 @@ pub(super) fn pieces(arc: &Arc, delta_mm: f64, entry: Entry, exit: Exit) -> Vec<
         more_turns: turns as u32,
         share: 1.0 - out_rad / total,
         length_mm: swept * (arc.radius_mm + delta_mm),
+        beyond: false,
     });
     last = next;
     match exit {
         Exit::Held => {}
-        Exit::Inside { length_mm } => {
+        Exit::Inside { length_mm, tail_mm } => {
+            // The programmed end may lie off the circle by the program's rounding; it stays.
+            let [x, y] = sub(arc.end, arc.centre);
+            let end_mm = x.hypot(y) - arc.radius_mm;
+            let (step_rad, tail_rad) = (length_mm / arc.radius_mm, tail_mm / arc.radius_mm);
             for k in (0..INSIDE_BIARCS).rev() {
                 let u = k as f64 / INSIDE_BIARCS as f64;
                 let [g, slope] = step_of_equal_area(u);
+                let behind = tail_rad + u * step_rad;
                 let mut next = node(
-                    total - u * out_rad,
-                    delta_mm * g,
-                    -delta_mm * slope / length_mm,
+                    total - behind,
+                    end_mm + (delta_mm - end_mm) * g,
+                    -(delta_mm - end_mm) * slope / length_mm,
                 );
-                if k == 0 {
-                    // The programmed end may lie off the circle by the program's rounding; it stays.
+                if k == 0 && tail_mm == 0.0 {
                     next.0 = arc.end;
                 }
-                biarc(&mut list, last, next, 1.0 - u * out_rad / total);
+                biarc(&mut list, last, next, 1.0 - behind / total);
                 last = next;
+            }
+            if tail_mm > 0.0 {
+                list.push(Piece {
+                    end: arc.end,
+                    centre: Some(arc.centre),
+                    ccw: side > 0.0,
+                    more_turns: 0,
+                    share: 1.0,
+                    length_mm: tail_mm,
+                    beyond: false,
+                });
             }
         }
         Exit::RunOut {
             length_mm,
             shape,
             along,
+            ..
         } => {
+            let arc_pieces = list.len();
             // Outward of a CCW arc is to the right of travel.
             let across = [along[1] * side, -along[0] * side];
             for (u, g, slope) in shape.nodes() {
@@ -181,6 +210,7 @@ pub(super) fn pieces(arc: &Arc, delta_mm: f64, entry: Entry, exit: Exit) -> Vec<
                 biarc(&mut list, last, (place, direction), 1.0);
                 last = (place, direction);
             }
+            list[arc_pieces..].iter_mut().for_each(|p| p.beyond = true);
         }
     }
     list
@@ -210,7 +240,7 @@ fn piece(from: [f64; 2], end: [f64; 2], at: [f64; 2], tangent: [f64; 2], share: 
     let [dx, dy] = sub(other, at);
     let radius = (dx * dx + dy * dy) / (2.0 * (normal[0] * dx + normal[1] * dy));
     let chord = dx.hypot(dy);
-    let straight = !radius.is_finite() || radius.abs() > STRAIGHT_MM;
+    let straight = !radius.is_finite() || chord * chord < 8.0 * STRAIGHT_MM * radius.abs();
     let half = if straight {
         0.0
     } else {
@@ -222,6 +252,7 @@ fn piece(from: [f64; 2], end: [f64; 2], at: [f64; 2], tangent: [f64; 2], share: 
         ccw: radius > 0.0,
         more_turns: 0,
         share,
+        beyond: false,
         length_mm: if straight {
             chord
         } else {

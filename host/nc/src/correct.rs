@@ -3,8 +3,8 @@ use super::blend::{Entry, Exit, INSIDE_CURVATURE, Piece, pieces};
 use super::inverse::{Inverse, Twin};
 use super::state::{Action, Arc, Plane, Straight};
 use super::transition::Transition;
-use super::word::Line;
-use super::{Left, Options};
+use super::word::{Line, Sort};
+use super::{Fate, Left, Options};
 
 /// Smallest correction worth a block, mm.
 const NEGLIGIBLE_MM: f64 = 5e-4;
@@ -27,60 +27,86 @@ const INSIDE_SHARE: f64 = 0.4;
 impl Plan {
     /// Largest share of the correction that remains as an error at a joint of the arc; what is not known counts as nothing.
     pub(super) fn joint_share(&self) -> f64 {
-        let known = |shape: Transition| {
-            Some(shape.remaining())
-                .filter(|share| share.is_finite())
-                .unwrap_or(0.0)
-        };
-        let delta = self.twin.delta_mm;
-        let entry = known(self.entry.shape) * ((delta - self.entry.from_mm) / delta).abs();
+        let share = |remaining_mm: f64| remaining_mm / self.twin.delta_mm.abs();
         let exit = match self.exit {
             Exit::Held => 0.0,
-            Exit::RunOut { shape, .. } => known(shape),
+            Exit::RunOut { remaining_mm, .. } => share(remaining_mm),
             Exit::Inside { .. } => INSIDE_SHARE,
         };
-        entry.max(exit)
+        share(self.entry.remaining_mm).max(exit)
+    }
+
+    pub(super) fn fate(&self, arc: &Arc, blocks: usize) -> Fate {
+        Fate::Corrected {
+            radius_mm: arc.radius_mm,
+            feed_mm_s: arc.feed_mm_s,
+            delta_mm: self.twin.delta_mm,
+            blocks,
+            joint_share: self.joint_share(),
+        }
     }
 }
 
 /// Length of the step from standstill in units of σ·f: a lag has (1 − exp(−t/σ))².
 const START_RESPONSES: f64 = 3.0;
-/// A step longer than this many σ·f answers slowly enough to be taken as smooth.
-const LONGEST_RESPONSES: f64 = 6.0;
 /// A line keeps at least this much of its length behind a run-out, mm.
 const LINE_LEFT_MM: f64 = 0.1;
 
-/// One decision a line; `None` where there is no arc. Arcs that would need a block shorter than `least_mm` are left.
-pub(super) fn decide(
-    lines: &[Line<'_>],
-    actions: &[Action],
-    inverse: &Inverse,
-    options: &Options,
-    least_mm: f64,
-) -> Vec<Option<Result<Plan, Left>>> {
-    let mut twins: Vec<Option<Result<Twin, Left>>> = actions
-        .iter()
-        .map(|action| match action {
-            Action::Arc(arc) => Some(twin(arc, inverse, options)),
+/// A line as it is run, and what the law makes of its arc.
+#[derive(Clone, Debug)]
+pub(super) struct Visit<'a> {
+    /// From 0.
+    pub(super) index: usize,
+    pub(super) line: Line<'a>,
+    pub(super) action: Action,
+    pub(super) twin: Option<Result<Twin, Left>>,
+}
+
+impl<'a> Visit<'a> {
+    pub(super) fn new(index: usize, line: Line<'a>, action: Action, law: &Law<'_>) -> Self {
+        let twin = match &action {
+            Action::Arc(arc) => Some(twin(arc, law)),
             Action::LostArc(left) => Some(Err(*left)),
-            Action::Nothing | Action::Line(_) | Action::Other => None,
-        })
-        .collect();
+            Action::Nothing | Action::Line(_) | Action::Stop | Action::Other => None,
+        };
+        Self {
+            index,
+            line,
+            action,
+            twin,
+        }
+    }
+
+    /// Whether what lies before and what lies behind can be decided apart.
+    pub(super) fn is_wall(&self) -> bool {
+        match self.action {
+            Action::Nothing => false,
+            Action::Arc(_) => !matches!(self.twin, Some(Ok(_))),
+            Action::Line(_) | Action::LostArc(_) | Action::Stop | Action::Other => true,
+        }
+    }
+}
+
+/// What decides about arcs.
+pub(super) struct Law<'a> {
+    pub(super) inverse: &'a Inverse,
+    pub(super) options: &'a Options,
+    /// Shortest block, mm.
+    pub(super) least_mm: f64,
+    /// Last stretch of an arc whose offset ends inside it, mm: it leaves the arc's own G-code in force.
+    pub(super) tail_mm: f64,
+}
+
+/// One decision a line; `None` where there is no arc. Twins of arcs that turn out too short are taken back.
+pub(super) fn decide(visits: &mut [Visit<'_>], law: &Law<'_>) -> Vec<Option<Result<Plan, Left>>> {
     // An arc that turns out too short may have carried on its neighbour's offset: until nothing changes.
     loop {
-        let room = Room {
-            lines,
-            actions,
-            twins: &twins,
-            inverse,
-            options,
-            least_mm,
-        };
-        let plans: Vec<_> = (0..lines.len()).map(|i| room.plan(i)).collect();
+        let room = Room { visits, law };
+        let plans: Vec<_> = (0..visits.len()).map(|i| room.plan(i)).collect();
         let mut changed = false;
-        for (twin, plan) in twins.iter_mut().zip(&plans) {
-            if let (Some(Ok(_)), Some(Err(left))) = (&twin, plan) {
-                *twin = Some(Err(*left));
+        for (visit, plan) in visits.iter_mut().zip(&plans) {
+            if let (Some(Ok(_)), Some(Err(left))) = (&visit.twin, plan) {
+                visit.twin = Some(Err(*left));
                 changed = true;
             }
         }
@@ -90,42 +116,39 @@ pub(super) fn decide(
     }
 }
 
-fn twin(arc: &Arc, inverse: &Inverse, options: &Options) -> Result<Twin, Left> {
-    if arc.plane != Plane::Xy && !options.all_planes {
+fn twin(arc: &Arc, law: &Law<'_>) -> Result<Twin, Left> {
+    if arc.plane != Plane::Xy && !law.options.all_planes {
         return Err(Left::OtherPlane);
     }
-    let twin = inverse.twin(arc.radius_mm, arc.feed_mm_s)?;
+    let twin = law.inverse.twin(arc.radius_mm, arc.feed_mm_s)?;
     if twin.delta_mm.abs() < NEGLIGIBLE_MM {
-        Err(Left::Negligible)
-    } else {
-        Ok(twin)
+        return Err(Left::Negligible);
+    }
+    match arc.exact_stop {
+        Some(because) => Err(Left::ExactStop(because)),
+        None => Ok(twin),
     }
 }
 
 /// What a decision looks at.
-struct Room<'a> {
-    lines: &'a [Line<'a>],
-    actions: &'a [Action],
-    twins: &'a [Option<Result<Twin, Left>>],
-    inverse: &'a Inverse,
-    options: &'a Options,
-    least_mm: f64,
+struct Room<'a, 'b> {
+    visits: &'a [Visit<'b>],
+    law: &'a Law<'a>,
 }
 
-impl Room<'_> {
+impl Room<'_, '_> {
     fn plan(&self, i: usize) -> Option<Result<Plan, Left>> {
-        let twin = match self.twins[i]? {
+        let twin = match self.visits[i].twin? {
             Ok(twin) => twin,
             Err(left) => return Some(Err(left)),
         };
-        let Action::Arc(arc) = &self.actions[i] else {
+        let Action::Arc(arc) = &self.visits[i].action else {
             return None;
         };
         let (entry, exit) = (self.entry(i, arc, twin), self.exit(i, arc, twin));
         let room = entry.length_mm + exit.inside_mm() < arc.length_mm();
-        let long = |piece: &Piece| piece.length_mm >= self.least_mm;
-        let fits = room
-            && (self.least_mm == 0.0 || pieces(arc, twin.delta_mm, entry, exit).iter().all(long));
+        let long = |piece: &Piece| piece.length_mm >= self.law.least_mm;
+        let fits = room && pieces(arc, twin.delta_mm, entry, exit).iter().all(long);
         Some(if fits {
             Ok(Plan { twin, entry, exit })
         } else {
@@ -134,88 +157,77 @@ impl Room<'_> {
     }
 
     fn entry(&self, i: usize, arc: &Arc, twin: Twin) -> Entry {
+        let (f, a) = (arc.feed_mm_s, self.law.options.acceleration_mm_s2);
+        let curvature = 1.0 / arc.radius_mm;
         match self.neighbour(i, arc, false) {
             Neighbour::Corrected(before, other) => {
                 // The same offset in space is outward of one and inward of the other where the turn changes.
-                let from_mm = other.delta_mm * (before.sweep_rad * arc.sweep_rad).signum();
+                let side = (before.sweep_rad * arc.sweep_rad).signum();
+                let from_mm = other.delta_mm * side;
                 let rise = twin.delta_mm - from_mm;
                 if rise.abs() < SAME_OFFSET_MM {
                     return Entry {
                         from_mm,
                         length_mm: 0.0,
                         shape: Transition::SMOOTH,
+                        remaining_mm: 0.0,
+                        held: true,
                     };
                 }
-                let (length_mm, shape) = self.step(arc, rise);
+                // What the joint asks for anew: the acceleration across, in units of this arc's.
+                let slower = before.feed_mm_s / f;
+                let step = curvature - side * slower * slower / before.radius_mm;
                 Entry {
                     from_mm,
-                    length_mm,
-                    shape,
+                    held: true,
+                    ..self.step(f, rise, step)
                 }
             }
-            Neighbour::Line(..) | Neighbour::OtherArc => {
-                let (length_mm, shape) = self.step(arc, twin.delta_mm);
-                Entry {
-                    from_mm: 0.0,
-                    length_mm,
-                    shape,
-                }
-            }
+            Neighbour::Line { .. } | Neighbour::OtherArc => self.step(f, twin.delta_mm, curvature),
             Neighbour::Rest => {
-                let (f, a) = (arc.feed_mm_s, self.options.acceleration_mm_s2);
-                let least = START_RESPONSES * f * self.inverse.response_s() + f * f / (2.0 * a);
+                let least = START_RESPONSES * f * self.law.inverse.response_s() + f * f / (2.0 * a);
                 let shape = Transition::SMOOTH;
                 let gentle = f * (shape.curvature() * twin.delta_mm.abs() / a).sqrt();
                 Entry {
                     from_mm: 0.0,
                     length_mm: gentle.max(least),
                     shape,
+                    remaining_mm: 0.0,
+                    held: false,
                 }
             }
         }
     }
 
-    /// Length and shape of a step of so much, mm: as the machine answers, or longer where that would ask for more
-    /// acceleration than is allowed.
-    fn step(&self, arc: &Arc, rise_mm: f64) -> (f64, Transition) {
-        let (f, a) = (arc.feed_mm_s, self.options.acceleration_mm_s2);
-        let response = self.inverse.response();
-        let unit_mm = f * self.inverse.response_s();
-        let (mut length, mut shape) = (response.length(), response.transition(response.length()));
-        if unit_mm > 0.0 {
-            let gentle =
-                |shape: Transition| f * (shape.curvature() * rise_mm.abs() / a).sqrt() / unit_mm;
-            // A longer step is a flatter one; a few rounds find where both agree.
-            for _ in 0..4 {
-                if gentle(shape) <= length {
-                    break;
-                }
-                length = gentle(shape).min(LONGEST_RESPONSES);
-                shape = if length < LONGEST_RESPONSES {
-                    response.transition(length)
-                } else {
-                    Transition::SMOOTH
-                };
-            }
-            length = length.max(gentle(shape));
+    /// Length and shape of a step of so much, mm, where the curvature changes by so much, 1/mm: as the machine answers,
+    /// or longer where that would ask for more acceleration than is allowed.
+    fn step(&self, f: f64, rise_mm: f64, curvature: f64) -> Entry {
+        let a = self.law.options.acceleration_mm_s2;
+        let step = self.law.inverse.step(f, rise_mm, curvature, a);
+        Entry {
+            from_mm: 0.0,
+            length_mm: step.length_mm,
+            shape: step.shape,
+            remaining_mm: step.remaining_mm,
+            held: false,
         }
-        (length * unit_mm, shape)
     }
 
     fn exit(&self, i: usize, arc: &Arc, twin: Twin) -> Exit {
-        let (f, a) = (arc.feed_mm_s, self.options.acceleration_mm_s2);
-        let response_mm = f * self.inverse.response_s();
+        let (f, a) = (arc.feed_mm_s, self.law.options.acceleration_mm_s2);
+        let response_mm = f * self.law.inverse.response_s();
         let gentle = |curvature: f64| f * (curvature * twin.delta_mm.abs() / a).sqrt();
         let inside = Exit::Inside {
             length_mm: gentle(INSIDE_CURVATURE).max(0.25 * response_mm),
+            tail_mm: self.law.tail_mm,
         };
         match self.neighbour(i, arc, true) {
             Neighbour::Corrected(..) => Exit::Held,
-            Neighbour::Line(line, along) => {
-                let (length_mm, shape) = self.step(arc, twin.delta_mm);
+            Neighbour::Line { line, along, clean } => {
+                let step = self.step(f, twin.delta_mm, 1.0 / arc.radius_mm);
                 let [first, second, third] = arc.plane.axes();
                 let long = |s: f64, e: f64, t: f64, u: f64| {
-                    (e - s).hypot(u - t) > length_mm + LINE_LEFT_MM
+                    (e - s).hypot(u - t) > step.length_mm + LINE_LEFT_MM
                 };
                 let reaches = match (
                     line.start[first],
@@ -227,10 +239,15 @@ impl Room<'_> {
                     _ => false,
                 };
                 let level = line.start[third] == line.end[third];
-                if line.absolute && arc.modes.absolute && level && reaches {
+                let as_fast = line
+                    .feed_mm_s
+                    .is_none_or(|speed| (speed / f - 1.0).abs() < 1e-9);
+                let plain = line.bare && clean && line.absolute && arc.modes.absolute;
+                if plain && level && reaches && as_fast {
                     Exit::RunOut {
-                        length_mm,
-                        shape,
+                        length_mm: step.length_mm,
+                        shape: step.shape,
+                        remaining_mm: step.remaining_mm,
                         along,
                     }
                 } else {
@@ -239,28 +256,30 @@ impl Room<'_> {
             }
             Neighbour::OtherArc => inside,
             Neighbour::Rest => Exit::Inside {
-                length_mm: inside.inside_mm().max(f * f / (2.0 * a)),
+                length_mm: (gentle(INSIDE_CURVATURE).max(0.25 * response_mm))
+                    .max(f * f / (2.0 * a)),
+                tail_mm: self.law.tail_mm,
             },
         }
     }
 
     /// The motion before or after arc `i`, as far as it is tangent and passed at speed.
     fn neighbour(&self, i: usize, arc: &Arc, after: bool) -> Neighbour<'_> {
-        let Some(other) = motion_beside(i, after, self.lines, self.actions) else {
+        let Some((other, clean)) = motion_beside(i, after, self.visits) else {
             return Neighbour::Rest;
         };
         let tangent = arc.tangent(after);
-        match &self.actions[other] {
+        match &self.visits[other].action {
             Action::Arc(next)
                 if next.plane == arc.plane && parallel(tangent, next.tangent(!after)) =>
             {
-                match self.twins[other] {
+                match self.visits[other].twin {
                     Some(Ok(twin)) => Neighbour::Corrected(next, twin),
                     _ => Neighbour::OtherArc,
                 }
             }
             Action::Line(line) => match direction(line, arc).filter(|d| parallel(tangent, *d)) {
-                Some(along) => Neighbour::Line(line, along),
+                Some(along) => Neighbour::Line { line, along, clean },
                 None => Neighbour::Rest,
             },
             _ => Neighbour::Rest,
@@ -273,30 +292,39 @@ enum Neighbour<'a> {
     /// Standstill, a corner, or nothing.
     Rest,
     /// A line along the arc's tangent.
-    Line(&'a Straight, [f64; 2]),
+    Line {
+        line: &'a Straight,
+        along: [f64; 2],
+        /// Nothing stands between that acts where it stands.
+        clean: bool,
+    },
     /// A tangent arc that is corrected too.
     Corrected(&'a Arc, Twin),
     /// A tangent arc that stays as it was.
     OtherArc,
 }
 
-/// The motion before or after, if nothing between stops the machine.
-fn motion_beside(i: usize, after: bool, lines: &[Line<'_>], actions: &[Action]) -> Option<usize> {
+/// The motion before or after, if nothing between stops the machine, and whether only comments stand between.
+fn motion_beside(i: usize, after: bool, visits: &[Visit<'_>]) -> Option<(usize, bool)> {
     let mut at = i;
+    let mut clean = true;
     loop {
         at = if after { at + 1 } else { at.checked_sub(1)? };
-        match actions.get(at)? {
+        let visit = visits.get(at)?;
+        let words = &visit.line.words;
+        match visit.action {
             // A dwell, a stop or a tool change is an M- or G4-word; a bare feed or comment is neither.
-            Action::Nothing if lines[at].words.iter().all(|w| b"NF".contains(&w.letter)) => {}
-            Action::Nothing | Action::Other | Action::LostArc(_) => return None,
+            Action::Nothing
+                if visit.line.sort == Sort::Plain
+                    && words.iter().all(|w| b"NF".contains(&w.letter)) =>
+            {
+                clean &= words.iter().all(|w| w.letter == b'N');
+            }
+            Action::Nothing | Action::Stop | Action::Other | Action::LostArc(_) => return None,
             // M0, M1, M2, M30, M60 in a block act at its end.
             Action::Line(_) | Action::Arc(_) => {
-                let stops = |m: i64| matches!(m, 0 | 10 | 20 | 300 | 600);
-                let stopped = lines[at]
-                    .words
-                    .iter()
-                    .any(|w| w.letter == b'M' && stops(w.tenths()));
-                return (!stopped).then_some(at);
+                let stopped = visit.line.has_m(&[0, 10, 20, 300, 600]);
+                return (!stopped).then_some((at, clean));
             }
         }
     }

@@ -1,300 +1,308 @@
-//! Writing the program: rewritten arcs as blocks, the rest byte by byte.
-use super::blend::{self, Piece};
+//! Writing arcs as blocks. Each arc leaves modes, feed and motion in force as its own line would have left them, so that
+//! no other line has to be touched.
+use super::blend::Piece;
 use super::correct::Plan;
-use super::state::{Action, Arc, FeedMode};
+use super::digits::push_number;
+use super::state::{Arc, FeedMode, Plane, Shared, sub};
 use super::word::{Line, Word};
-use super::{Compensated, Fate, Left, Report};
-use std::fmt::Write as _;
 
-pub(super) fn emit(
-    lines: &[Line<'_>],
-    actions: &[Action],
-    plans: &[Option<Result<Plan, Left>>],
-) -> Compensated {
-    let end = lines
-        .iter()
-        .map(|l| l.end)
-        .find(|e| !e.is_empty())
-        .unwrap_or(b"\n");
-    let mut out = Writer {
-        program: Vec::new(),
-        end,
-        place: None,
-        modal: None,
-        feed: None,
-    };
-    let mut arcs = Vec::new();
-    for (i, line) in lines.iter().enumerate() {
-        let fate = match (&actions[i], plans[i]) {
-            (Action::Arc(arc), Some(Ok(plan))) => {
-                let pieces = blend::pieces(arc, plan.twin.delta_mm, plan.entry, plan.exit);
-                out.arc(line, arc, &plan, &pieces);
-                let (radius_mm, feed_mm_s, delta_mm) =
-                    (arc.radius_mm, arc.feed_mm_s, plan.twin.delta_mm);
-                Some(Fate::Corrected {
-                    radius_mm,
-                    feed_mm_s,
-                    delta_mm,
-                    blocks: pieces.len(),
-                    joint_share: plan.joint_share(),
-                })
-            }
-            (action, plan) => {
-                out.copy(line, action);
-                plan.and_then(Result::err).map(Fate::Left)
-            }
-        };
-        arcs.extend(fate.map(|fate| Report { line: i + 1, fate }));
-    }
-    Compensated {
-        program: out.program,
-        arcs,
-    }
+/// Writes the blocks that take the place of arcs.
+pub(super) struct Writer {
+    /// End of the lines of the program.
+    end: Vec<u8>,
+    /// How far from its programmed end the last corrected arc ended as written, mm, and its plane.
+    aside: Option<([f64; 2], Plane)>,
 }
 
-struct Writer<'a> {
-    program: Vec<u8>,
-    end: &'a [u8],
-    /// Where the last rewritten arc ended as written, if the next one goes on from there, in program units.
-    place: Option<[f64; 2]>,
-    /// Motion in force and that of the original, where they differ.
-    modal: Option<&'static str>,
-    /// F word to be set again, in program units.
-    feed: Option<f64>,
-}
-
-impl Writer<'_> {
-    /// A line that is not rewritten.
-    fn copy(&mut self, line: &Line<'_>, action: &Action) {
-        self.place = None;
-        if line.has(b'F') {
-            self.feed = None;
-        } else if *action != Action::Nothing
-            && let Some(feed) = self.feed.take()
-        {
-            self.program
-                .extend_from_slice(format!("F{}", number(feed, 6)).as_bytes());
-            self.program.extend_from_slice(self.end);
+impl Writer {
+    pub(super) fn new(end: &[u8]) -> Self {
+        Self {
+            end: end.to_vec(),
+            aside: None,
         }
-        let motion = line.words.iter().find(|w| is_motion(w));
-        let mut text = line.text.to_vec();
-        if motion.is_some() {
-            self.modal = None;
-        } else if matches!(action, Action::Arc(_) | Action::LostArc(_))
-            && let Some(modal) = self.modal.take()
-        {
-            // The arc relied on the direction of the one before, whose last block may have the other one.
-            let at = line
-                .words
-                .iter()
-                .find(|w| !b"N".contains(&w.letter))
-                .map_or(0, |w| w.range.start);
-            text.splice(at..at, format!("{modal} ").into_bytes());
-        }
-        self.program.extend_from_slice(&text);
-        self.program.extend_from_slice(line.end);
     }
 
-    /// The blocks of an arc.
-    fn arc(&mut self, line: &Line<'_>, arc: &Arc, plan: &Plan, pieces: &[Piece]) {
-        let modes = arc.modes;
-        let (unit, decimals) = if modes.inch { (25.4, 6) } else { (1.0, 5) };
-        let scale = 10f64.powi(decimals);
-        let round = |v: f64| (v / unit * scale).round() / scale;
-        let axes = arc.plane.axes();
-        let [a, b, c] = axes;
-        let mut place = self
-            .place
-            .take()
-            .unwrap_or_else(|| arc.start.map(|v| v / unit));
-        let mut height = arc.lift.map_or(0.0, |[from, _]| from / unit);
+    /// The blocks of an arc, appended to `out`.
+    pub(super) fn arc(
+        &mut self,
+        line: &Line<'_>,
+        arc: &Arc,
+        plan: &Plan,
+        pieces: &[Piece],
+        out: &mut Vec<u8>,
+    ) {
+        let aside = self.aside.take();
+        let carried = aside.filter(|(_, plane)| plan.entry.held && *plane == arc.plane);
+        let [dx, dy] = carried.map_or([0.0; 2], |(aside, _)| aside);
+        let start = [arc.start[0] + dx, arc.start[1] + dy];
+        let mut block = Block::new(line, arc, pieces, start);
         let factor = plan.twin.feed_factor;
-        let total: f64 = pieces.iter().map(|p| p.length_mm).sum();
-        let own = if arc.sweep_rad > 0.0 { "G3" } else { "G2" };
-        let mut last_code = own;
         for (k, piece) in pieces.iter().enumerate() {
             let last = k + 1 == pieces.len();
-            let code = match piece.centre {
-                None => "G1",
-                Some(_) if piece.ccw => "G3",
-                Some(_) => "G2",
+            let code: &[u8] = match piece.centre {
+                None => b"G1",
+                Some(_) if piece.ccw => b"G3",
+                Some(_) => b"G2",
             };
-            last_code = code;
-            let mut words = String::new();
-            // The end of the arc, if it is where it was, in the program's own digits.
-            let kept = |letter: usize| {
-                let word = line
-                    .word(b"XYZ"[letter])
-                    .filter(|_| last && modes.absolute)?;
-                std::str::from_utf8(&line.text[word.range.start + 1..word.range.end])
-                    .ok()
-                    .map(str::trim)
-            };
-            let at_programmed_end = piece.end == arc.end;
-            let mut next = place;
-            for (slot, axis) in [a, b].into_iter().enumerate() {
-                let target = piece.end[slot] / unit;
-                let letter = char::from(b"XYZ"[axis]);
-                if at_programmed_end && let Some(text) = kept(axis) {
-                    next[slot] = target;
-                    let _ = write!(words, "{letter}{text} "); // writing to a String cannot fail
-                } else {
-                    next[slot] = if at_programmed_end && last {
-                        target
-                    } else {
-                        round(piece.end[slot])
-                    };
-                    let value = if modes.absolute {
-                        next[slot]
-                    } else {
-                        next[slot] - place[slot]
-                    };
-                    let _ = write!(words, "{letter}{} ", number(value, decimals + 1));
-                }
-            }
-            if let Some([from, to]) = arc.lift {
-                let letter = char::from(b"XYZ"[c]);
-                let target = if last {
-                    to / unit
-                } else {
-                    round(from + (to - from) * piece.share)
-                };
-                match kept(c) {
-                    Some(text) => _ = write!(words, "{letter}{text} "),
-                    None => {
-                        let value = if modes.absolute {
-                            target
-                        } else {
-                            target - height
-                        };
-                        let _ = write!(words, "{letter}{} ", number(value, decimals + 1));
-                    }
-                }
-                height = target;
-            }
-            if let Some(centre) = piece.centre {
-                for (slot, axis) in [a, b].into_iter().enumerate() {
-                    let from = if modes.absolute_centres {
-                        0.0
-                    } else {
-                        place[slot]
-                    };
-                    let letter = char::from(b"IJK"[axis]);
-                    let _ = write!(
-                        words,
-                        "{letter}{} ",
-                        number(centre[slot] / unit - from, decimals + 1)
-                    );
-                }
-                if piece.more_turns > 0 {
-                    let _ = write!(words, "P{} ", piece.more_turns + 1);
-                }
-            }
-            let feed = match modes.feed_mode {
-                FeedMode::InverseTime => {
-                    // The programmed time, longer by the radius where the feed is kept, shared out by length.
-                    let slower = if factor == 1.0 {
-                        1.0 + plan.twin.delta_mm / arc.radius_mm
-                    } else {
-                        1.0
-                    };
-                    Some(arc.feed_word / slower * total / piece.length_mm)
-                }
-                _ if factor != 1.0 && (k == 0) => Some(self.scaled_feed(arc, factor)),
+            let mut words = Vec::with_capacity(64);
+            block.end(piece, last, &mut words);
+            block.height(piece, &mut words);
+            block.along(piece, k, &mut words);
+            block.centre(piece, &mut words);
+            let feed = match arc.modes.feed_mode {
+                // Each block takes its own time at the speed of the arc.
+                FeedMode::InverseTime => Some(60.0 * arc.feed_mm_s * factor / piece.length_mm),
+                _ if factor != 1.0 && k == 0 => Some(scaled_feed(arc, factor)),
                 _ => None,
             };
             if let Some(feed) = feed {
-                let _ = write!(words, "F{} ", number(feed, 6));
+                words.extend_from_slice(b" F");
+                push_number(&mut words, feed, 6);
             }
-            let words = words.trim_end();
             if k == 0 {
-                self.first(line, code, words, &axes, feed.is_some());
+                first(line, code, &words, arc.plane, feed.is_some(), out);
             } else {
-                self.program
-                    .extend_from_slice(format!("{code} {words}").as_bytes());
+                out.extend_from_slice(code);
+                out.extend_from_slice(&words);
             }
-            self.program
-                .extend_from_slice(if last { line.end } else { self.end });
-            place = next;
+            out.extend_from_slice(if last { line.end } else { &self.end });
+            block.place = block.next;
         }
-        self.modal = (last_code != own).then_some(own);
-        if factor != 1.0 && modes.feed_mode == FeedMode::PerMinute {
-            self.feed = Some(arc.feed_word);
-        } else if line.has(b'F') {
-            self.feed = None;
+        if factor != 1.0 && arc.modes.feed_mode == FeedMode::PerMinute {
+            if line.end.is_empty() {
+                out.extend_from_slice(&self.end);
+            }
+            out.push(b'F');
+            push_number(out, arc.feed_word, 6);
+            out.extend_from_slice(line.end);
         }
-        self.place = Some(place);
+        self.aside = Some((sub(block.place, arc.end), arc.plane));
     }
+}
 
-    /// F word with the angular rate kept: the block, with its lift, takes its time.
-    fn scaled_feed(&self, arc: &Arc, factor: f64) -> f64 {
-        let climb = arc.lift.map_or(0.0, |[from, to]| to - from);
-        let length = arc.length_mm();
-        arc.feed_word * (length * factor).hypot(climb) / length.hypot(climb)
-    }
+/// F word with the angular rate kept: the block, with its lift, takes its time.
+fn scaled_feed(arc: &Arc, factor: f64) -> f64 {
+    let climb = arc.lift.map_or(0.0, |[from, to]| to - from);
+    let length = arc.length_mm();
+    arc.feed_word * (length * factor).hypot(climb) / length.hypot(climb)
+}
 
-    /// The original line with its geometry replaced and the rest in place.
-    fn first(
-        &mut self,
-        line: &Line<'_>,
-        code: &str,
-        words: &str,
-        axes: &[usize; 3],
-        new_feed: bool,
-    ) {
-        let geometry = |w: &Word| {
-            axes.iter()
-                .any(|a| [b"XYZ"[*a], b"IJK"[*a]].contains(&w.letter))
-                || matches!(w.letter, b'R' | b'P')
-                || (w.letter == b'F' && new_feed)
+/// The words of the blocks of one arc.
+struct Block<'a> {
+    line: &'a Line<'a>,
+    arc: &'a Arc,
+    unit: f64,
+    decimals: usize,
+    scale: f64,
+    /// Last block on the arc itself.
+    arc_ends: usize,
+    /// Where the block begins and ends as written, mm.
+    place: [f64; 2],
+    next: [f64; 2],
+    height: f64,
+    shared: [Option<f64>; 4],
+}
+
+impl<'a> Block<'a> {
+    fn new(line: &'a Line<'a>, arc: &'a Arc, pieces: &[Piece], place: [f64; 2]) -> Self {
+        let (unit, decimals, scale) = if arc.modes.inch {
+            (25.4, 6, 1e6)
+        } else {
+            (1.0, 5, 1e5)
         };
-        let mut text = Vec::new();
-        let mut at = 0;
-        let mut written = false;
-        let has_code = line.words.iter().any(is_motion);
-        for word in &line.words {
-            if is_motion(word) {
-                text.extend_from_slice(&line.text[at..word.range.start]);
-                text.extend_from_slice(code.as_bytes());
-                at = word.range.end;
-            } else if geometry(word) {
-                text.extend_from_slice(&line.text[at..word.range.start]);
-                if !written {
-                    if text.last().is_some_and(|b| !b.is_ascii_whitespace()) {
-                        text.push(b' ');
-                    }
-                    if !has_code {
-                        text.extend_from_slice(format!("{code} ").as_bytes());
-                    }
-                    text.extend_from_slice(words.as_bytes());
-                    written = true;
-                } else {
-                    // One blank between words is enough where a word was taken out.
-                    while text.last().is_some_and(u8::is_ascii_whitespace) {
-                        text.pop();
-                    }
-                }
-                at = word.range.end;
+        Self {
+            line,
+            arc,
+            unit,
+            decimals,
+            scale,
+            arc_ends: pieces.iter().rposition(|p| !p.beyond).unwrap_or(0),
+            place,
+            next: place,
+            height: arc.lift.map_or(0.0, |[from, _]| from / unit),
+            shared: arc.shared.map(|s| s.map(|s| s.from)),
+        }
+    }
+
+    fn round(&self, mm: f64) -> f64 {
+        (mm / self.unit * self.scale).round() / self.scale * self.unit
+    }
+
+    /// A word of the arc in the program's own digits, where it holds as it stands.
+    fn kept(&self, letter: u8) -> Option<&'a [u8]> {
+        let word = self.line.word(letter).filter(|_| self.arc.modes.absolute)?;
+        Some(self.line.text[word.range.start + 1..word.range.end].trim_ascii())
+    }
+
+    fn end(&mut self, piece: &Piece, last: bool, words: &mut Vec<u8>) {
+        let arc = self.arc;
+        let [a, b, _] = arc.plane.axes();
+        for (slot, axis) in [a, b].into_iter().enumerate() {
+            let letter = b"XYZ"[axis];
+            // On a line along an axis the other coordinate is that of the arc's end.
+            let at_end = last && piece.end[slot] == arc.end[slot];
+            words.extend_from_slice(&[b' ', letter]);
+            if at_end && let Some(text) = self.kept(letter) {
+                self.next[slot] = piece.end[slot];
+                words.extend_from_slice(text);
+                continue;
             }
+            let decimals = if at_end { 9 } else { self.decimals + 1 };
+            self.next[slot] = if at_end {
+                piece.end[slot]
+            } else {
+                self.round(piece.end[slot])
+            };
+            let from = if arc.modes.absolute {
+                0.0
+            } else {
+                self.place[slot]
+            };
+            push_number(words, (self.next[slot] - from) / self.unit, decimals);
         }
-        let rest = &line.text[at..];
-        if rest.first().is_some_and(|b| !b.is_ascii_whitespace()) {
-            text.push(b' ');
+    }
+
+    fn height(&mut self, piece: &Piece, words: &mut Vec<u8>) {
+        let Some([from, to]) = self.arc.lift else {
+            return;
+        };
+        let letter = b"XYZ"[self.arc.plane.axes()[2]];
+        if piece.beyond {
+            return;
         }
-        text.extend_from_slice(rest);
-        self.program.extend_from_slice(&text);
+        words.extend_from_slice(&[b' ', letter]);
+        let ends = piece.share >= 1.0;
+        if ends && let Some(text) = self.kept(letter) {
+            words.extend_from_slice(text);
+            return;
+        }
+        let target = if ends {
+            to / self.unit
+        } else {
+            self.round(from + (to - from) * piece.share) / self.unit
+        };
+        let start = if self.arc.modes.absolute {
+            0.0
+        } else {
+            self.height
+        };
+        push_number(words, target - start, self.decimals + 1);
+        self.height = target;
+    }
+
+    /// Extruder and rotary axes, evenly along the arc.
+    fn along(&mut self, piece: &Piece, k: usize, words: &mut Vec<u8>) {
+        for (slot, shared) in self.arc.shared.iter().enumerate() {
+            let Some(Shared {
+                letter,
+                from,
+                to,
+                relative,
+            }) = *shared
+            else {
+                continue;
+            };
+            if piece.beyond {
+                continue;
+            }
+            words.extend_from_slice(&[b' ', letter]);
+            let ends = k == self.arc_ends;
+            if ends
+                && !relative
+                && let Some(word) = self.line.word(letter)
+            {
+                let text = &self.line.text[word.range.start + 1..word.range.end];
+                words.extend_from_slice(text.trim_ascii());
+                continue;
+            }
+            let target = if ends {
+                to
+            } else {
+                ((from + (to - from) * piece.share) * 1e5).round() * 1e-5
+            };
+            let start = match (relative, &mut self.shared[slot]) {
+                (true, Some(start)) => std::mem::replace(start, target),
+                _ => 0.0,
+            };
+            push_number(words, target - start, 7);
+        }
+    }
+
+    fn centre(&self, piece: &Piece, words: &mut Vec<u8>) {
+        let Some(centre) = piece.centre else {
+            return;
+        };
+        let [a, b, _] = self.arc.plane.axes();
+        for (slot, axis) in [a, b].into_iter().enumerate() {
+            let from = if self.arc.modes.absolute_centres {
+                0.0
+            } else {
+                self.place[slot]
+            };
+            words.extend_from_slice(&[b' ', b"IJK"[axis]]);
+            push_number(words, (centre[slot] - from) / self.unit, self.decimals + 1);
+        }
+        if piece.more_turns > 0 {
+            words.extend_from_slice(format!(" P{}", piece.more_turns + 1).as_bytes());
+        }
     }
 }
 
-fn is_motion(word: &Word) -> bool {
-    word.letter == b'G' && matches!(word.tenths(), 0 | 10 | 20 | 30)
-}
-
-/// A decimal of at most so many places, without trailing zeros.
-fn number(value: f64, decimals: i32) -> String {
-    let mut text = format!("{value:.*}", decimals as usize);
-    if text.contains('.') {
-        text.truncate(text.trim_end_matches('0').trim_end_matches('.').len());
+/// The original line with its geometry replaced and the rest in place.
+fn first(
+    line: &Line<'_>,
+    code: &[u8],
+    words: &[u8],
+    plane: Plane,
+    new_feed: bool,
+    out: &mut Vec<u8>,
+) {
+    let [a, b, _] = plane.axes();
+    // A third centre word, which is 0, stays.
+    let geometry = |w: &Word| {
+        b"XYZ".contains(&w.letter)
+            || [b"IJK"[a], b"IJK"[b]].contains(&w.letter)
+            || matches!(w.letter, b'R' | b'P' | b'E' | b'A' | b'B' | b'C')
+            || (w.letter == b'F' && new_feed)
+    };
+    // Without its leading blank.
+    let words = words.trim_ascii_start();
+    let begin = out.len();
+    let mut at = 0;
+    let mut written = false;
+    let has_code = line.words.iter().any(Word::is_motion);
+    for word in &line.words {
+        if word.is_motion() {
+            out.extend_from_slice(&line.text[at..word.range.start]);
+            out.extend_from_slice(code);
+            at = word.range.end;
+        } else if geometry(word) {
+            out.extend_from_slice(&line.text[at..word.range.start]);
+            if !written {
+                if out[begin..]
+                    .last()
+                    .is_some_and(|b| !b.is_ascii_whitespace())
+                {
+                    out.push(b' ');
+                }
+                if !has_code {
+                    out.extend_from_slice(code);
+                    out.push(b' ');
+                }
+                out.extend_from_slice(words);
+                written = true;
+            } else {
+                // One blank between words is enough where a word was taken out.
+                while out[begin..].last().is_some_and(u8::is_ascii_whitespace) {
+                    out.pop();
+                }
+            }
+            at = word.range.end;
+        }
     }
-    if text == "-0" { "0".into() } else { text }
+    let rest = &line.text[at..];
+    if rest.first().is_some_and(|b| !b.is_ascii_whitespace()) {
+        out.push(b' ');
+    }
+    out.extend_from_slice(rest);
 }

@@ -1,17 +1,19 @@
 //! The circle to program so that the machine makes the wanted one.
-use super::transition::Response;
+use super::chain::{Response, cumulants, element};
+use super::steps::{Step, Steps};
 use super::{Keep, Left, Options};
 use giotto::model_file::{ModelFile, Servo};
-use giotto_shared::model::{Cumulants, Element, RadiusModel};
+use giotto_shared::model::RadiusModel;
 
 /// The inverse of a model's radius law and where it may be used.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub(super) struct Inverse {
     servo: Servo,
     keep: Keep,
     /// Largest angular rate that the fit has seen, rad/s.
     omega_max: f64,
     max_offset_mm: f64,
+    steps: Steps,
 }
 
 /// A circle to program.
@@ -35,57 +37,26 @@ impl Inverse {
             keep: options.keep,
             omega_max: OMEGA_MARGIN * model.valid.feed_mm_s[1] / model.valid.radius_mm[0],
             max_offset_mm: options.max_offset_mm,
+            steps: Steps::new(Response::of(&model.servo)),
         }
     }
 
-    fn cumulants(&self) -> Cumulants<f64> {
-        match (self.servo, self.element()) {
-            (
-                Servo::Beta {
-                    beta1_s2, beta2_s4, ..
-                },
-                _,
-            ) => {
-                let kappa2_s2 = -2.0 * beta1_s2;
-                Cumulants {
-                    kappa2_s2,
-                    kappa4_s4: 24.0 * beta2_s4 - 3.0 * kappa2_s2 * kappa2_s2,
-                }
-            }
-            (_, Some(element)) => element.cumulants(),
-            (_, None) => Cumulants::default(),
-        }
-    }
-
-    /// √|κ2|, s: the time over which the machine averages its command.
+    /// Time over which the machine averages its command, s: √|κ2|, or its own time where that is longer.
     pub(super) fn response_s(&self) -> f64 {
-        self.cumulants().kappa2_s2.abs().sqrt()
+        let sigma = cumulants(&self.servo).kappa2_s2.abs().sqrt();
+        sigma.max(self.steps.unit_s())
     }
 
-    /// The response beyond its size, for the steps at joints.
-    pub(super) fn response(&self) -> Response {
-        Response::of(&self.cumulants())
-    }
-
-    fn element(&self) -> Option<Element<f64>> {
-        match self.servo {
-            Servo::Lag { kv_per_s } => Some(Element::Lag { kv_per_s }),
-            Servo::SecondOrder {
-                omega_n_rad_s,
-                zeta,
-            } => Some(Element::SecondOrder {
-                omega_n_rad_s,
-                zeta,
-            }),
-            Servo::Beta { .. } => None,
-        }
+    /// The step of a correction behind a joint; see [`Steps::step`].
+    pub(super) fn step(&self, feed_mm_s: f64, rise_mm: f64, curvature: f64, a: f64) -> Step {
+        self.steps.step(feed_mm_s, rise_mm, curvature, a)
     }
 
     /// Circle to program for a wanted one of radius and feed in mm and mm/s.
     pub(super) fn twin(&self, radius_mm: f64, feed_mm_s: f64) -> Result<Twin, Left> {
         let omega = feed_mm_s / radius_mm;
         let (r, f) = (radius_mm * 1e-3, feed_mm_s * 1e-3);
-        let solved = match (self.servo, self.element()) {
+        let solved = match (self.servo, element(&self.servo)) {
             (
                 Servo::Beta {
                     beta1_s2, beta2_s4, ..

@@ -10,10 +10,19 @@
 //! corrected program has been run on a real machine.
 #![forbid(unsafe_code)]
 
+mod arc;
 mod blend;
+mod chain;
+pub mod check;
+mod codes;
 mod correct;
+mod digits;
 mod emit;
+mod engine;
+mod flow;
 mod inverse;
+mod left;
+mod mark;
 #[cfg(test)]
 mod plan_tests;
 pub mod program;
@@ -21,13 +30,16 @@ pub mod program;
 mod proof;
 pub mod rapid;
 mod state;
+mod steps;
 #[cfg(test)]
 mod tests;
 mod transition;
 mod word;
 
 use giotto::model_file::ModelFile;
-use state::{Action, State};
+pub use left::{Because, Code, Left};
+pub use mark::{Mark, marked};
+use std::io;
 
 /// What to keep when the radius changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -40,7 +52,7 @@ pub enum Keep {
 }
 
 /// How to compensate.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Feed or angular rate kept.
     pub keep: Keep,
@@ -50,6 +62,12 @@ pub struct Options {
     pub max_offset_mm: f64,
     /// Also in the planes G18 and G19, where no circle was measured.
     pub all_planes: bool,
+    /// Centres of arcs count from the origin unless the program says G91.1: a setting of the controller.
+    pub absolute_centres: bool,
+    /// M-codes from M100 are those of a printer and move nothing.
+    pub printer: bool,
+    /// Codes of the machine's own that move nothing.
+    pub harmless: Vec<Code>,
 }
 
 impl Default for Options {
@@ -59,49 +77,11 @@ impl Default for Options {
             acceleration_mm_s2: 2000.0,
             max_offset_mm: 0.5,
             all_planes: false,
+            absolute_centres: false,
+            printer: false,
+            harmless: Vec::new(),
         }
     }
-}
-
-/// Why an arc was left as it was.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, thiserror::Error)]
-#[allow(
-    missing_docs,
-    reason = "the message of each variant is its documentation"
-)]
-pub enum Left {
-    #[error("the correction is below 0.5 µm")]
-    Negligible,
-    #[error("the model was not fitted at so high an angular rate")]
-    BeyondModel,
-    #[error("the correction is larger than allowed")]
-    OffsetTooLarge,
-    #[error("no programmed circle gives the wanted one")]
-    NoInverse,
-    #[error("too short for the transitions at its ends")]
-    TooShort,
-    #[error("not in the XY plane, where the machine was measured")]
-    OtherPlane,
-    #[error("other axes move along")]
-    OtherAxes,
-    #[error("where it starts is not known")]
-    UnknownPosition,
-    #[error("its feed is not known")]
-    UnknownFeed,
-    #[error("centre, radius and ends do not agree")]
-    Geometry,
-    #[error("cutter radius compensation is on")]
-    CutterCompensation,
-    #[error("words in the block that go with an arc's end only once")]
-    Words,
-    #[error("parameters or expressions in the block")]
-    Expression,
-    #[error("in or behind an optional block")]
-    OptionalBlock,
-    #[error("O-words: the order of lines is not that of execution")]
-    ProgramFlow,
-    #[error("behind a code whose meaning is not known")]
-    UnknownCode,
 }
 
 /// What became of one arc.
@@ -144,20 +124,45 @@ pub struct Compensated {
 
 /// Whether any line is a block: words that were understood, or what steers a program.
 pub fn is_program(program: &[u8]) -> bool {
-    let block = |line: &word::Line<'_>| match line.sort {
-        word::Sort::Plain | word::Sort::Optional => !line.words.is_empty(),
-        word::Sort::Flow => true,
+    let block = |line: word::Line<'_>| match line.sort {
+        word::Sort::Plain | word::Sort::Optional => {
+            !line.words.is_empty() && line.words.iter().any(|w| !w.value.is_nan())
+        }
+        word::Sort::Flow(_) | word::Sort::Setting => true,
         word::Sort::Unread => false,
     };
-    word::lines(program).iter().any(block)
+    word::lines(program).any(block)
 }
 
 /// Rewrites the arcs of a program. The text need not be UTF-8; bytes outside rewritten arcs are copied.
 pub fn compensate(program: &[u8], model: &ModelFile, options: &Options) -> Compensated {
-    let lines = word::lines(program);
-    let mut state = State::new();
-    let actions: Vec<Action> = lines.iter().map(|line| state.step(line)).collect();
-    let inverse = inverse::Inverse::new(model, options);
-    let fates = correct::decide(&lines, &actions, &inverse, options, 0.0);
-    emit::emit(&lines, &actions, &fates)
+    let mut text = Vec::with_capacity(program.len());
+    // Writing into memory does not fail.
+    let arcs = compensate_to(program, model, options, None, &mut text).unwrap_or_default();
+    Compensated {
+        program: text,
+        arcs,
+    }
+}
+
+/// Rewrites the arcs of a program into `out`, as it goes, with a mark that says so. A program of which nothing is
+/// corrected is copied to the byte.
+///
+/// # Errors
+/// Those of `out`.
+pub fn compensate_to(
+    program: &[u8],
+    model: &ModelFile,
+    options: &Options,
+    mark: Option<&Mark>,
+    out: &mut dyn io::Write,
+) -> io::Result<Vec<Report>> {
+    let mut arcs = Vec::new();
+    let mut copy = mark::Marking::new(program, mark, "(", ")");
+    engine::run(program, model, options, &mut |line, index, text, fate| {
+        engine::report(&mut arcs, index, fate);
+        copy.line(line.text.len() + line.end.len(), text, out)
+    })?;
+    copy.finish(out)?;
+    Ok(arcs)
 }

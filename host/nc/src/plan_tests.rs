@@ -9,6 +9,7 @@ fn plan() -> Plan {
         radius_mm,
         feed_mm_s,
         direction,
+        plane: giotto_shared::Plane::Xy,
         purpose,
     };
     let runs = vec![

@@ -52,14 +52,14 @@ pub fn blocks(program: &[u8], running: &Running) -> Result<Vec<Block>, NotRunnab
         tolerance_mm: running.tolerance_mm,
     };
     let mut blocks = Vec::new();
-    for (index, line) in word::lines(program).iter().enumerate() {
+    for (index, line) in word::lines(program).enumerate() {
         let number = index + 1;
         let refused = |(column, what)| NotRunnable {
             line: number,
             column,
             what,
         };
-        let segment = reader.segment(line).map_err(refused)?;
+        let segment = reader.segment(number, &line).map_err(refused)?;
         let tolerance_m = reader.tolerance_mm * 1e-3;
         blocks.extend(segment.map(|segment| Block {
             line: number,
@@ -68,7 +68,7 @@ pub fn blocks(program: &[u8], running: &Running) -> Result<Vec<Block>, NotRunnab
                 tolerance_m,
             },
         }));
-        if ends(line) {
+        if ends(&line) {
             break;
         }
     }
@@ -96,7 +96,7 @@ fn at(word: &Word, what: impl Into<String>) -> Trouble {
 }
 
 impl Reader<'_> {
-    fn segment(&mut self, line: &Line<'_>) -> Result<Option<Segment>, Trouble> {
+    fn segment(&mut self, number: usize, line: &Line<'_>) -> Result<Option<Segment>, Trouble> {
         self.check(line)?;
         if line
             .words
@@ -111,7 +111,7 @@ impl Reader<'_> {
         moves
             .words
             .retain(|word| !(word.letter == b'G' && word.tenths() == 540));
-        let action = self.state.step(&moves);
+        let action = self.state.step(number, &moves);
         self.path_control(line)?;
         let first = line
             .words
@@ -119,7 +119,7 @@ impl Reader<'_> {
             .find(|word| b"GXYZIJKR".contains(&word.letter));
         let column = first.map_or(1, |word| word.range.start + 1);
         match action {
-            Action::Nothing => Ok(None),
+            Action::Nothing | Action::Stop => Ok(None),
             Action::Arc(arc) => Ok(Some(self.arc(&arc))),
             Action::LostArc(left) => Err((column, left.to_string())),
             Action::Line(_) => self.line(line, start, false),
@@ -149,16 +149,26 @@ impl Reader<'_> {
                     "an optional block: remove it, or the slash before it".to_owned(),
                 ));
             }
-            Sort::Flow => {
-                return unread("O-words: the order of lines would not be that of execution");
+            Sort::Flow(_) => {
+                return Err((
+                    1,
+                    "O-words: the order of lines would not be that of execution".to_owned(),
+                ));
             }
-            Sort::Unread => {
+            Sort::Unread | Sort::Setting => {
                 return unread(
                     "parameters, expressions or settings; expected words with plain numbers",
                 );
             }
         }
         for word in &line.words {
+            if word.value.is_nan() {
+                return Err((
+                    word.range.start + 1,
+                    "parameters, expressions or settings; expected words with plain numbers"
+                        .to_owned(),
+                ));
+            }
             match word.letter {
                 b'G' => match word.tenths() {
                     0 | 10 | 20 | 30 | 40 | 170 | 180 | 190 | 200 | 210 | 400 | 490 | 540 | 610
@@ -253,8 +263,10 @@ impl Reader<'_> {
         }
         let feed_mm_s = match self.state.feed() {
             _ if rapid => self.running.rapid_mm_s,
-            (Some(feed), FeedMode::PerMinute) if feed > 0.0 => feed * self.state.unit_mm() / 60.0,
-            (Some(feed), FeedMode::InverseTime) if feed > 0.0 => length * feed / 60.0,
+            (Some(feed), Some(FeedMode::PerMinute)) if feed > 0.0 => {
+                feed * self.state.unit_mm() / 60.0
+            }
+            (Some(feed), Some(FeedMode::InverseTime)) if feed > 0.0 => length * feed / 60.0,
             _ => {
                 return Err((
                     column,

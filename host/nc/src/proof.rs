@@ -1,5 +1,5 @@
 //! The corrected program on the simulated machine, and before readers that are not ours.
-use super::state::{Action, State};
+use super::state::{Action, Reading, State};
 use super::{Compensated, Fate, Options, compensate, tests::model, word};
 use giotto::model_file::{ModelFile, Servo};
 use giotto::simulation::machine::{AccDec, PositionLoop};
@@ -18,7 +18,7 @@ fn machines() -> [(&'static str, Machine, ModelFile); 2] {
         [PositionLoop {
             kv_per_s,
             feed_forward: 0.0,
-        }; 2]
+        }; 3]
     };
     let lag = Machine {
         servo: loops(43.3),
@@ -126,8 +126,9 @@ impl Stretch {
 
 /// Chains of feed moves in the plane that are passed without a stop, with the line each starts in.
 fn chains(program: &[u8]) -> Vec<Vec<Stretch>> {
-    let mut state = State::new();
-    chains_of(word::lines(program).iter().map(|line| state.step(line)))
+    let mut state = State::new(Reading::default());
+    let lines = word::lines(program).enumerate();
+    chains_of(lines.map(|(i, line)| state.step(i + 1, &line)))
 }
 
 fn chains_of(actions: impl Iterator<Item = Action>) -> Vec<Vec<Stretch>> {
@@ -148,7 +149,7 @@ fn chains_of(actions: impl Iterator<Item = Action>) -> Vec<Vec<Stretch>> {
                 sweep_rad: a.sweep_rad,
             }),
             Action::LostArc(left) => panic!("{left}"),
-            Action::Other => None,
+            Action::Stop | Action::Other => None,
         };
         let last = list
             .last()
@@ -190,19 +191,23 @@ fn travelled(machine: &Machine, chain: &[Stretch]) -> Vec<[f64; 2]> {
     };
     let n = ((end_s + 0.5) / DT_S) as usize;
     let position_m: Vec<_> = (0..n)
-        .map(|k| place(way(k as f64 * DT_S)).map(|v| v * 1e-3))
+        .map(|k| {
+            let [x, y] = place(way(k as f64 * DT_S)).map(|v| v * 1e-3);
+            [x, y, 0.0]
+        })
         .collect();
     let set_points = SetPoints {
         dt_s: DT_S,
         position_m: &position_m,
-        centre_m: [0.0; 2],
+        centre_m: [0.0; 3],
+        frame: giotto_shared::Frame::default(),
         started_s: 0.0,
         hold: Hold::Cubic,
     };
     drive(machine, &set_points)
         .position_m
         .into_iter()
-        .map(|p| p.map(|v| v * 1e3))
+        .map(|[x, y, _]| [x * 1e3, y * 1e3])
         .collect()
 }
 

@@ -1,10 +1,15 @@
 //! The modal state of a program: what each line makes the machine do.
-use super::Left;
-use super::word::{Line, Sort, Word};
-use std::f64::consts::TAU;
+//!
+//! Whatever is not known is `None`, with the place that is to blame: a line that is not understood, a call, a block that
+//! may be skipped make the reader forget what they may have changed, until the program says it again.
+pub(super) use super::arc::{Arc, FeedMode, Modes, Plane, Shared, sub};
+use super::codes::{self, G, M, Mode};
+use super::left::{Because, Code, Left};
+use super::word::{Keyword, Line, Sort, Word};
+use std::rc::Rc;
 
 /// What a line does.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Action {
     /// No motion of an axis.
     Nothing,
@@ -14,7 +19,9 @@ pub(super) enum Action {
     Arc(Arc),
     /// A circular move that cannot be read.
     LostArc(Left),
-    /// Another motion, or one that is not understood: whatever follows starts from rest.
+    /// The machine stands still: a dwell, a stop, the end.
+    Stop,
+    /// Another motion, or what is not understood.
     Other,
 }
 
@@ -25,113 +32,105 @@ pub(super) struct Straight {
     pub(super) end: [Option<f64>; 3],
     /// Whether its end is given in program coordinates (G90).
     pub(super) absolute: bool,
+    /// Nothing but its number, G1 and its end: a part of the way may be gone before it.
+    pub(super) bare: bool,
+    /// Its own speed, mm/s, where each move has one; `None`: that in force before it.
+    pub(super) feed_mm_s: Option<f64>,
 }
 
-/// A circular move in its plane, mm.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Arc {
-    pub(super) plane: Plane,
-    pub(super) start: [f64; 2],
-    pub(super) end: [f64; 2],
-    pub(super) centre: [f64; 2],
-    pub(super) radius_mm: f64,
-    /// Angle, CCW positive; more than a turn with P.
-    pub(super) sweep_rad: f64,
-    /// Start and end of the axis across the plane, if it moves.
-    pub(super) lift: Option<[f64; 2]>,
-    /// Speed along the circle (without the lift), mm/s.
-    pub(super) feed_mm_s: f64,
-    /// The F word in force, in its own units.
-    pub(super) feed_word: f64,
-    /// What the words mean.
-    pub(super) modes: Modes,
-}
-
-impl Arc {
-    /// Direction of travel at the start or the end, of length 1.
-    pub(super) fn tangent(&self, at_end: bool) -> [f64; 2] {
-        let [x, y] = sub(if at_end { self.end } else { self.start }, self.centre);
-        let side = self.sweep_rad.signum() / x.hypot(y);
-        [-side * y, side * x]
-    }
-
-    pub(super) fn length_mm(&self) -> f64 {
-        self.radius_mm * self.sweep_rad.abs()
-    }
-}
-
-/// Plane of arcs: two axes in right-handed order and the one across.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Plane {
-    Xy,
-    Zx,
-    Yz,
-}
-
-impl Plane {
-    /// Indices of first, second and third axis in XYZ.
-    pub(super) fn axes(self) -> [usize; 3] {
-        match self {
-            Self::Xy => [0, 1, 2],
-            Self::Zx => [2, 0, 1],
-            Self::Yz => [1, 2, 0],
-        }
-    }
-}
-
-/// Modal groups that decide what numbers mean.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Modes {
-    pub(super) inch: bool,
-    pub(super) absolute: bool,
+/// How a program is to be read.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Reading {
+    /// Centres are absolute from the start.
     pub(super) absolute_centres: bool,
-    pub(super) feed_mode: FeedMode,
+    /// M-codes as printers know them.
+    pub(super) printer: bool,
+    /// Codes that move nothing, by the word of the user.
+    pub(super) harmless: Rc<[Code]>,
+    /// Calls are followed by whoever asks: they are no riddle here.
+    pub(super) followed: bool,
 }
 
-/// Feed as distance a minute (G94), turns of the block a minute (G93) or distance a turn (G95).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum FeedMode {
-    PerMinute,
-    InverseTime,
-    PerTurn,
+/// What M70 keeps, and what must be known before numbers mean anything.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Modal {
+    inch: Option<bool>,
+    absolute: Option<bool>,
+    absolute_centres: Option<bool>,
+    feed_mode: Option<FeedMode>,
+    plane: Option<Plane>,
+    cutter_compensation: Option<Because>,
+    exact_stop: Option<Because>,
+    /// The F word in force, in the units and the mode in force.
+    feed: Option<f64>,
+    /// Counts changes of the coordinates.
+    frame: u32,
 }
 
 /// State of the interpreter.
 #[derive(Clone, Debug)]
 pub(super) struct State {
-    pub(super) modes: Modes,
-    plane: Plane,
+    reading: Reading,
+    now: Modal,
+    saved: Option<Modal>,
+    /// M73: restored at the end of the subprogram.
+    saved_here: Option<Modal>,
     motion: Option<i64>,
-    /// The F word of G94 in its own units.
-    feed: Option<f64>,
     position: [Option<f64>; 3],
     /// Axes whose position counts from an origin that is not the program's: moved by increments only.
     floating: [bool; 3],
+    /// E, A, B, C, in program units.
+    along: [Option<f64>; 4],
+    /// M82, M83; `None`: E goes with G90 and G91.
+    absolute_extruder: Option<bool>,
+    /// Modes in which coordinates mean something else.
+    open: [Option<(Mode, Because)>; 4],
     /// Why arcs cannot be trusted from here on.
     blocked: Option<Left>,
-    cutter_compensation: bool,
+    /// What made a modal group, the place or the feed unknown last.
+    lost_modes: Option<Because>,
+    lost_place: Option<Because>,
+    lost_feed: Option<Because>,
+    unit_said: bool,
+    /// In this block, against what was said before.
+    unit_changed: bool,
+    line: usize,
 }
 
-/// Largest difference of start and end radius, mm: LinuxCNC's for centre format.
-const RADIUS_TOLERANCE_MM: f64 = 0.0127;
+/// Letters of [`Shared`] words.
+const ALONG: [u8; 4] = *b"EABC";
 
 impl State {
-    pub(super) fn new() -> Self {
-        let modes = Modes {
-            inch: false,
-            absolute: true,
-            absolute_centres: false,
-            feed_mode: FeedMode::PerMinute,
+    pub(super) fn new(reading: Reading) -> Self {
+        let now = Modal {
+            inch: Some(false),
+            absolute: Some(true),
+            absolute_centres: Some(reading.absolute_centres),
+            feed_mode: Some(FeedMode::PerMinute),
+            plane: Some(Plane::Xy),
+            cutter_compensation: None,
+            exact_stop: None,
+            feed: None,
+            frame: 0,
         };
         Self {
-            modes,
-            plane: Plane::Xy,
+            reading,
+            now,
+            saved: None,
+            saved_here: None,
             motion: None,
-            feed: None,
             position: [None; 3],
             floating: [false; 3],
+            along: [None; 4],
+            absolute_extruder: None,
+            open: [None; 4],
             blocked: None,
-            cutter_compensation: false,
+            lost_modes: None,
+            lost_place: None,
+            lost_feed: None,
+            unit_said: false,
+            unit_changed: false,
+            line: 0,
         }
     }
 
@@ -139,7 +138,7 @@ impl State {
     pub(super) fn at(position_mm: [f64; 3]) -> Self {
         Self {
             position: position_mm.map(Some),
-            ..Self::new()
+            ..Self::new(Reading::default())
         }
     }
 
@@ -149,8 +148,8 @@ impl State {
     }
 
     /// The F word in force and what it means.
-    pub(super) fn feed(&self) -> (Option<f64>, FeedMode) {
-        (self.feed, self.modes.feed_mode)
+    pub(super) fn feed(&self) -> (Option<f64>, Option<FeedMode>) {
+        (self.now.feed, self.now.feed_mode)
     }
 
     /// Whether moves are positioning moves (G0).
@@ -158,76 +157,147 @@ impl State {
         self.motion == Some(0)
     }
 
-    /// Takes one line.
-    pub(super) fn step(&mut self, line: &Line<'_>) -> Action {
+    /// Millimetres of one program unit; those of a millimetre where it is not known.
+    pub(super) fn unit_mm(&self) -> f64 {
+        if self.now.inch == Some(true) {
+            25.4
+        } else {
+            1.0
+        }
+    }
+
+    /// Takes the line of a number, from 1.
+    pub(super) fn step(&mut self, number: usize, line: &Line<'_>) -> Action {
+        self.line = number;
         match line.sort {
-            Sort::Plain => {}
-            Sort::Flow => {
-                self.blocked = Some(Left::ProgramFlow);
-                return Action::Other;
-            }
+            Sort::Plain => self.plain(line),
+            Sort::Setting => Action::Nothing,
+            Sort::Flow(keyword) => self.flow(keyword),
             Sort::Unread => {
-                // Nothing that the line may have changed can be relied on, arcs least of all.
-                self.position = [None; 3];
-                self.feed = None;
-                return if self.moves_on_arc(line) {
-                    Action::LostArc(Left::Expression)
+                let code = Code::Named("what stands there");
+                let arc = self.moves_on_arc(line);
+                self.forget(code);
+                if arc {
+                    Action::LostArc(Left::Unread(self.because(code)))
                 } else {
                     Action::Other
-                };
+                }
             }
             Sort::Optional => {
-                let moves = line.words.iter().any(|w| b"XYZ".contains(&w.letter));
-                let arc = moves && self.moves_on_arc(line);
-                let changes = line
-                    .words
-                    .iter()
-                    .any(|w| w.letter == b'G' && !(0..40).contains(&w.tenths()));
-                if moves {
-                    self.position = [None; 3];
+                let mut skipped = self.clone();
+                let action = self.plain(line);
+                skipped.line = number;
+                self.merge(&skipped);
+                match action {
+                    Action::Arc(_) | Action::LostArc(_) => {
+                        Action::LostArc(Left::OptionalBlock(number))
+                    }
+                    Action::Nothing => Action::Nothing,
+                    _ => Action::Other,
                 }
-                if line.has(b'F') {
-                    self.feed = None;
-                }
-                if changes {
-                    self.blocked = Some(Left::OptionalBlock);
-                }
-                return if arc {
-                    Action::LostArc(Left::OptionalBlock)
-                } else {
-                    Action::Other
-                };
             }
         }
-        let mut special = false;
-        for word in line.words.iter().filter(|w| w.letter == b'G') {
-            special |= self.g(word);
+    }
+
+    fn because(&self, code: Code) -> Because {
+        Because {
+            line: self.line,
+            code,
         }
-        let axes = line.words.iter().any(|w| b"XYZIJKR".contains(&w.letter));
-        self.take_feed(line);
-        if special {
-            self.position = [None; 3];
-            return Action::Other;
+    }
+
+    fn flow(&mut self, keyword: Keyword) -> Action {
+        match keyword {
+            Keyword::Other(name) => {
+                let because = self.because(Code::Named(name));
+                self.blocked.get_or_insert(Left::ProgramFlow(because));
+                Action::Other
+            }
+            Keyword::Sub | Keyword::Call if self.reading.followed => Action::Nothing,
+            Keyword::EndSub if self.reading.followed => {
+                self.leave_subprogram();
+                Action::Nothing
+            }
+            Keyword::Sub | Keyword::EndSub | Keyword::Call => {
+                self.forget(Code::Named("a subprogram"));
+                Action::Other
+            }
         }
-        if !axes {
-            return Action::Nothing;
+    }
+
+    fn leave_subprogram(&mut self) {
+        if let Some(saved) = self.saved_here.take() {
+            self.restore(saved);
         }
-        self.anchor(line);
-        let start = self.position;
-        let end = self.end_of(line);
-        self.position = end;
-        match self.motion {
-            Some(10) if line.words.iter().any(|w| b"ABCUVW".contains(&w.letter)) => Action::Other,
-            Some(10) => Action::Line(Straight {
-                start,
-                end,
-                absolute: self.modes.absolute,
-            }),
-            Some(direction @ (20 | 30)) => match self.arc(line, start, direction == 30) {
-                Ok(arc) => Action::Arc(arc),
-                Err(left) => Action::LostArc(left),
-            },
-            _ => Action::Other,
+    }
+
+    /// Nothing is known any more but what the program says from here on.
+    fn forget(&mut self, code: Code) {
+        let because = self.because(code);
+        self.now = Modal {
+            inch: None,
+            absolute: None,
+            absolute_centres: None,
+            feed_mode: None,
+            plane: None,
+            cutter_compensation: None,
+            exact_stop: None,
+            feed: None,
+            frame: self.now.frame + 1,
+        };
+        self.motion = None;
+        self.absolute_extruder = None;
+        self.along = [None; 4];
+        self.lose_place(because);
+        (self.lost_modes, self.lost_feed) = (Some(because), Some(because));
+    }
+
+    fn lose_place(&mut self, because: Because) {
+        (self.position, self.floating) = ([None; 3], [false; 3]);
+        self.lost_place = Some(because);
+    }
+
+    fn lose_feed(&mut self, code: Code) {
+        (self.now.feed, self.lost_feed) = (None, Some(self.because(code)));
+    }
+
+    /// What holds whether the line was run (`self`) or not.
+    fn merge(&mut self, skipped: &Self) {
+        fn same<T: PartialEq>(a: &mut Option<T>, b: &Option<T>) -> bool {
+            let differs = a.as_ref() != b.as_ref();
+            if differs {
+                *a = None;
+            }
+            differs
+        }
+        let because = self.because(Code::Named("an optional block"));
+        let (now, other) = (&mut self.now, &skipped.now);
+        let modes = same(&mut now.inch, &other.inch)
+            | same(&mut now.absolute, &other.absolute)
+            | same(&mut now.absolute_centres, &other.absolute_centres)
+            | same(&mut now.feed_mode, &other.feed_mode)
+            | same(&mut now.plane, &other.plane);
+        if modes {
+            self.lost_modes = Some(because);
+        }
+        if same(&mut now.feed, &other.feed) {
+            self.lost_feed = Some(because);
+        }
+        now.cutter_compensation = now.cutter_compensation.or(other.cutter_compensation);
+        now.exact_stop = now.exact_stop.or(other.exact_stop);
+        same(&mut self.motion, &skipped.motion);
+        if self.position != skipped.position
+            || self.floating != skipped.floating
+            || now.frame != other.frame
+        {
+            self.lose_place(because);
+        }
+        for axis in 0..4 {
+            same(&mut self.along[axis], &skipped.along[axis]);
+        }
+        same(&mut self.saved, &skipped.saved);
+        if self.open != skipped.open || self.blocked != skipped.blocked {
+            self.blocked.get_or_insert(Left::OptionalBlock(self.line));
         }
     }
 
@@ -239,61 +309,320 @@ impl State {
         matches!(own.map(Word::tenths).or(self.motion), Some(20 | 30))
     }
 
-    /// Takes a G-word; true if it uses the axis words for itself or loses the position.
-    fn g(&mut self, word: &Word) -> bool {
-        match word.tenths() {
-            motion @ (0 | 10 | 20 | 30) => self.motion = Some(motion),
-            170 => self.plane = Plane::Xy,
-            180 => self.plane = Plane::Zx,
-            190 => self.plane = Plane::Yz,
-            200 => self.modes.inch = true,
-            210 => self.modes.inch = false,
-            400 => self.cutter_compensation = false,
-            410 | 411 | 420 | 421 => self.cutter_compensation = true,
-            900 => {
-                self.modes.absolute = true;
-                self.forget_floating();
-            }
-            910 => self.modes.absolute = false,
-            901 => self.modes.absolute_centres = true,
-            911 => self.modes.absolute_centres = false,
-            930 => self.set_feed_mode(FeedMode::InverseTime),
-            940 => self.set_feed_mode(FeedMode::PerMinute),
-            950 => self.set_feed_mode(FeedMode::PerTurn),
-            800 => self.motion = None,
-            // Dwell, tool length, path control, spindle modes, return levels: no motion in the plane.
-            40 | 430 | 431 | 490 | 610 | 611 | 640 | 500 | 690 | 960..=999 => {}
-            // Coordinate systems, homing, probing: the position is another one or unknown.
-            100 | 280 | 281 | 300 | 301 | 520 | 530 | 540..=593 | 920..=923 | 382..=385 => {
-                return true;
-            }
-            330 | 331 | 730 | 760 | 810..=890 => {
+    fn plain(&mut self, line: &Line<'_>) -> Action {
+        let axes = line.has_any(b"XYZ");
+        let mut own = false;
+        let mut stops = false;
+        self.unit_changed = false;
+        for word in line.words.iter().filter(|w| w.letter == b'G') {
+            let used = self.g(word, line, axes);
+            // `G4 X1.5` is a dwell of Fanuc; beside a motion the words are the motion's.
+            own |= used == Use::Own
+                || (used == Use::Stops && axes && !line.words.iter().any(Word::is_motion));
+            stops |= used == Use::Stops;
+        }
+        for word in line.words.iter().filter(|w| w.letter == b'M') {
+            stops |= self.m(word);
+        }
+        let action = self.words_done(line, axes, own, stops);
+        for word in line.words.iter().filter(|w| w.letter == b'M') {
+            self.m_behind(word);
+        }
+        action
+    }
+
+    /// The rest of a block whose G- and M-words are taken.
+    fn words_done(&mut self, line: &Line<'_>, axes: bool, own: bool, stops: bool) -> Action {
+        self.take_feed(line);
+        // Tools of lathes bring their offsets (T0101).
+        if line
+            .word(b'T')
+            .is_some_and(|t| t.value.is_nan() || t.value >= 100.0)
+        {
+            let because = self.because(Code::Named("a tool with its offsets"));
+            self.lose_place(because);
+        }
+        let moves = axes || line.has_any(b"IJKRABCUVW");
+        // E alone turns the extruder.
+        if own || !moves {
+            let extrudes = line.has(b'E') && !own;
+            self.take_along(line);
+            return match (stops, own, extrudes) {
+                (true, ..) => Action::Stop,
+                (_, false, false) => Action::Nothing,
+                _ => Action::Other,
+            };
+        }
+        self.motion_of(line)
+    }
+
+    /// A block with axis words that belong to the motion in force.
+    fn motion_of(&mut self, line: &Line<'_>) -> Action {
+        self.anchor(line);
+        let start = self.position;
+        let along = self.along;
+        let end = self.end_of(line);
+        self.position = end;
+        self.take_along(line);
+        if line.has_any(b"UVW") {
+            // Axes of their own, or increments of X, Y and Z.
+            let because = self.because(Code::Named("U, V or W"));
+            self.lose_place(because);
+        }
+        match self.motion {
+            Some(10) if line.has_any(b"ABCUVW") => Action::Other,
+            Some(10) => Action::Line(Straight {
+                start,
+                end: self.position,
+                absolute: self.now.absolute == Some(true),
+                bare: line.words.iter().all(|w| {
+                    matches!(w.letter, b'N' | b'X' | b'Y' | b'Z')
+                        || (w.letter == b'G' && w.tenths() == 10)
+                }) && self.now.feed_mode == Some(FeedMode::PerMinute)
+                    && self.open_modes().next().is_none()
+                    && self.blocked.is_none()
+                    && self.now.cutter_compensation.is_none(),
+                feed_mm_s: None,
+            }),
+            Some(direction @ (20 | 30)) => match self.arc(line, start, along, direction == 30) {
+                Ok(arc) => Action::Arc(arc),
+                Err(left) => Action::LostArc(left),
+            },
+            _ => Action::Other,
+        }
+    }
+
+    /// Takes a G-word.
+    fn g(&mut self, word: &Word, line: &Line<'_>, axes: bool) -> Use {
+        let code = Code::Word('G', word.tenths());
+        let because = self.because(code);
+        if self.reading.harmless.contains(&code) {
+            return Use::None;
+        }
+        match codes::g(word.tenths(), axes, self.reading.printer) {
+            G::Motion(motion) => self.motion = Some(motion),
+            G::Cycle => {
                 self.motion = Some(word.tenths());
-                return true;
+                self.lose_place(because);
+                return Use::Own;
             }
-            _ => self.blocked = Some(Left::UnknownCode),
+            G::NoMotion => self.motion = None,
+            G::Plane(plane) => self.now.plane = Some(plane),
+            G::Inch(inch) => {
+                if self.now.inch != Some(inch) {
+                    self.along = [None; 4];
+                    if self.unit_said {
+                        self.lose_feed(code);
+                        self.unit_changed = true;
+                    }
+                }
+                (self.now.inch, self.unit_said) = (Some(inch), true);
+            }
+            G::DoubtfulUnit => {
+                (self.now.inch, self.lost_modes) = (None, Some(because));
+                self.lose_feed(code);
+                self.lose_place(because);
+                return Use::Own;
+            }
+            G::Absolute(absolute) => {
+                self.now.absolute = Some(absolute);
+                if absolute {
+                    self.forget_floating();
+                }
+            }
+            G::AbsoluteCentres(absolute) => self.now.absolute_centres = Some(absolute),
+            G::Feed(mode) => {
+                if self.now.feed_mode != Some(mode) {
+                    self.lose_feed(code);
+                }
+                self.now.feed_mode = Some(mode);
+            }
+            G::CutterCompensation(on) => self.now.cutter_compensation = on.then_some(because),
+            G::ExactStop(on) => self.now.exact_stop = on.then_some(because),
+            G::StopsHere | G::Nothing => {}
+            G::Dwell => return Use::Stops,
+            G::ToolLength => {
+                (self.position[2], self.floating[2]) = (None, false);
+                self.lost_place = Some(because);
+            }
+            G::ToolOffset => self.lose_place(because),
+            G::Frame => {
+                self.move_frame(because);
+                return Use::Own;
+            }
+            G::WorkOffset => self.move_frame(because),
+            G::SetPosition => {
+                self.set_position(line, because);
+                return Use::Own;
+            }
+            G::Away => {
+                self.lose_place(because);
+                self.along = [None; 4];
+                return Use::Own;
+            }
+            G::Opens(mode) => {
+                self.open_mode(mode, because);
+                return if mode == Mode::Polar {
+                    Use::None
+                } else {
+                    Use::Own
+                };
+            }
+            G::Closes(mode) => {
+                let was_open = self.open_modes().any(|(m, _)| m == mode);
+                self.open.iter_mut().for_each(|slot| {
+                    if slot.is_some_and(|(m, _)| m == mode) {
+                        *slot = None;
+                    }
+                });
+                if was_open {
+                    self.lose_place(because);
+                }
+                // `G50 S2000` of lathes is a largest spindle speed, `G50 X0` a place.
+                if mode == Mode::Scaling && axes {
+                    self.move_frame(because);
+                    return Use::Own;
+                }
+            }
+            G::Macro => {
+                self.forget(code);
+                return Use::Own;
+            }
+            G::Unknown => {
+                self.blocked.get_or_insert(Left::UnknownCode(because));
+            }
+        }
+        Use::None
+    }
+
+    fn move_frame(&mut self, because: Because) {
+        self.now.frame += 1;
+        self.lose_place(because);
+    }
+
+    /// G92: `G92 E0` is a printer's everyday and moves no axis of an arc.
+    fn set_position(&mut self, line: &Line<'_>, because: Because) {
+        for (axis, letter) in b"XYZ".iter().enumerate() {
+            if line.has(*letter) {
+                self.now.frame += 1;
+                (self.position[axis], self.floating[axis]) = (None, false);
+                self.lost_place = Some(because);
+            }
+        }
+        if !line.has_any(b"XYZEABCUVW") {
+            self.move_frame(because);
+        }
+        for (slot, letter) in self.along.iter_mut().zip(ALONG) {
+            if let Some(word) = line.word(letter) {
+                *slot = Some(word.value).filter(|v| v.is_finite());
+            }
+        }
+    }
+
+    fn open_modes(&self) -> impl Iterator<Item = (Mode, Because)> {
+        self.open.iter().copied().flatten()
+    }
+
+    fn open_mode(&mut self, mode: Mode, because: Because) {
+        self.lose_place(because);
+        let slot = self
+            .open
+            .iter()
+            .position(|s| s.is_some_and(|(m, _)| m == mode))
+            .or_else(|| self.open.iter().position(Option::is_none));
+        match slot {
+            Some(slot) => self.open[slot] = Some((mode, because)),
+            None => _ = self.blocked.get_or_insert(Left::Coordinates(because)),
+        }
+    }
+
+    /// Takes an M-word; true if the machine stands still behind it.
+    fn m(&mut self, word: &Word) -> bool {
+        let code = Code::Word('M', word.tenths());
+        let because = self.because(code);
+        if self.reading.harmless.contains(&code) {
+            return false;
+        }
+        match codes::m(word.tenths(), self.reading.printer) {
+            M::AtStart | M::Nothing => {}
+            M::Stops => return true,
+            M::Ends => return true,
+            M::Call | M::Return => {}
+            M::ToolChange => self.lose_place(because),
+            M::SaveModes => {
+                self.saved = Some(self.now);
+                if word.tenths() == 730 {
+                    if self.reading.followed {
+                        self.saved_here = Some(self.now);
+                    } else {
+                        self.forget(code);
+                    }
+                }
+            }
+            M::DropModes => self.saved = None,
+            M::RestoreModes => match self.saved {
+                Some(saved) => self.restore(saved),
+                None => self.forget(code),
+            },
+            M::AbsoluteExtruder(absolute) => self.absolute_extruder = Some(absolute),
+            M::Unknown => {
+                self.blocked.get_or_insert(Left::UnknownCode(because));
+            }
         }
         false
     }
 
-    fn set_feed_mode(&mut self, mode: FeedMode) {
-        if mode != self.modes.feed_mode {
-            self.feed = None;
+    /// What an M-word does behind the motion of its block.
+    fn m_behind(&mut self, word: &Word) {
+        let code = Code::Word('M', word.tenths());
+        if self.reading.harmless.contains(&code) {
+            return;
         }
-        self.modes.feed_mode = mode;
+        match codes::m(word.tenths(), self.reading.printer) {
+            M::Ends => self.forget(code),
+            M::Call if self.reading.followed => {}
+            M::Return if self.reading.followed => self.leave_subprogram(),
+            M::Call | M::Return => self.forget(code),
+            _ => {}
+        }
+    }
+
+    /// What M70 kept is in force again; the machine stands where it stood.
+    fn restore(&mut self, saved: Modal) {
+        if saved.inch != self.now.inch {
+            self.along = [None; 4];
+        }
+        if saved.frame != self.now.frame {
+            let because = self.because(Code::Word('M', 720));
+            self.lose_place(because);
+        }
+        self.now = Modal {
+            frame: self.now.frame,
+            ..saved
+        };
+        if self.now.absolute == Some(true) {
+            self.forget_floating();
+        }
     }
 
     fn take_feed(&mut self, line: &Line<'_>) {
-        if let Some(f) = line.word(b'F') {
-            self.feed = Some(f.value);
-        } else if self.modes.feed_mode == FeedMode::InverseTime {
-            self.feed = None;
+        if line.has(b'F') {
+            // Where the unit changes in the same block, controllers differ in which unit F has.
+            let value = line.word(b'F').map(|f| f.value);
+            self.now.feed = value.filter(|v| v.is_finite() && !self.unit_changed);
+            if self.now.feed.is_none() && !self.unit_changed {
+                self.lose_feed(Code::Named(
+                    "F with a number that only the controller knows",
+                ));
+            }
+        } else if self.now.feed_mode == Some(FeedMode::InverseTime) {
+            self.now.feed = None;
         }
     }
 
     /// Increments need no origin: an axis whose place is not known counts from where it is.
     fn anchor(&mut self, line: &Line<'_>) {
-        if self.modes.absolute {
+        if self.now.absolute != Some(false) {
             for axis in 0..3 {
                 self.floating[axis] &= !line.has(b"XYZ"[axis]);
             }
@@ -314,140 +643,201 @@ impl State {
         }
     }
 
-    /// Millimetres of one program unit.
-    pub(super) fn unit_mm(&self) -> f64 {
-        if self.modes.inch { 25.4 } else { 1.0 }
-    }
-
     fn end_of(&self, line: &Line<'_>) -> [Option<f64>; 3] {
-        std::array::from_fn(|axis| match line.word(b"XYZ"[axis]) {
-            None => self.position[axis],
-            Some(w) if self.modes.absolute => Some(w.value * self.unit_mm()),
-            Some(w) => self.position[axis].map(|p| p + w.value * self.unit_mm()),
+        let unit = self.now.inch.map(|inch| if inch { 25.4 } else { 1.0 });
+        std::array::from_fn(|axis| {
+            let letter = b"XYZ"[axis];
+            if !line.has(letter) {
+                return self.position[axis];
+            }
+            let value = line.word(letter)?.value * unit?;
+            let end = if self.now.absolute? {
+                value
+            } else {
+                self.position[axis]? + value
+            };
+            end.is_finite().then_some(end)
         })
     }
 
-    fn arc(&self, line: &Line<'_>, start: [Option<f64>; 3], ccw: bool) -> Result<Arc, Left> {
+    /// Whether a shared word counts from where the axis is.
+    fn relative(&self, letter: u8) -> Option<bool> {
+        match (letter, self.absolute_extruder) {
+            (b'E', Some(absolute)) => Some(!absolute),
+            // Marlin's E goes with G90 and G91, others' does not.
+            (b'E', None) => self
+                .now
+                .absolute
+                .filter(|absolute| *absolute)
+                .map(|_| false),
+            _ => self.now.absolute.map(|absolute| !absolute),
+        }
+    }
+
+    fn take_along(&mut self, line: &Line<'_>) {
+        for (slot, letter) in ALONG.into_iter().enumerate() {
+            if !line.has(letter)
+                || line
+                    .words
+                    .iter()
+                    .any(|w| w.letter == b'G' && w.tenths() == 920)
+            {
+                continue;
+            }
+            let value = line.word(letter).map(|w| w.value);
+            self.along[slot] = match (value, self.relative(letter)) {
+                (Some(v), Some(false)) => Some(v),
+                (Some(v), Some(true)) => self.along[slot].map(|a| a + v),
+                _ => None,
+            }
+            .filter(|v| v.is_finite());
+        }
+    }
+
+    /// Everything that numbers mean, or why that is not known.
+    fn modes(&self) -> Result<(Modes, Plane), Left> {
         if let Some(left) = self.blocked {
             return Err(left);
         }
-        if self.cutter_compensation {
-            return Err(Left::CutterCompensation);
+        if let Some((_, because)) = self.open_modes().next() {
+            return Err(Left::Coordinates(because));
         }
-        let once = |l: u8| line.words.iter().filter(|w| w.letter == l).count() <= 1;
-        if !b"XYZIJKRPF".iter().all(|l| once(*l)) {
-            return Err(Left::Words);
+        let now = &self.now;
+        let known = (|| {
+            let modes = Modes {
+                inch: now.inch?,
+                absolute: now.absolute?,
+                absolute_centres: now.absolute_centres?,
+                feed_mode: now.feed_mode?,
+            };
+            Some((modes, now.plane?))
+        })();
+        let nothing = Code::Named("the start");
+        known.ok_or_else(|| {
+            Left::UnknownModes(self.lost_modes.unwrap_or_else(|| self.because(nothing)))
+        })
+    }
+
+    fn arc(
+        &self,
+        line: &Line<'_>,
+        start: [Option<f64>; 3],
+        along: [Option<f64>; 4],
+        ccw: bool,
+    ) -> Result<Arc, Left> {
+        let (modes, plane) = self.modes()?;
+        if let Some(because) = self.now.cutter_compensation {
+            return Err(Left::CutterCompensation(because));
         }
-        let allowed = |w: &Word| match w.letter {
-            b'A' | b'B' | b'C' | b'U' | b'V' | b'W' => Err(Left::OtherAxes),
-            b'M' if matches!(w.tenths(), 0 | 10 | 20 | 300 | 600 | 980 | 990) => Err(Left::Words),
-            b'M' if line.has(b'P') => Err(Left::Words),
-            b'G' if !matches!(w.tenths(), 20 | 30 | 170..=190 | 200 | 210 | 900..=940 | 610 | 611 | 640) => {
-                Err(Left::Words)
-            }
-            _ => Ok(()),
-        };
-        line.words.iter().try_for_each(allowed)?;
-        let unit = self.unit_mm();
-        let [a, b, c] = self.plane.axes();
-        let offset = |axis: usize| line.word(b"IJK"[axis]).map(|w| w.value * unit);
+        words_of_an_arc(line)?;
+        let unit = modes.unit_mm();
+        let [a, b, c] = plane.axes();
         // Centres in program coordinates need a place in program coordinates.
-        let anchored = |axis: usize| !(self.modes.absolute_centres && self.floating[axis]);
         let from = |axis: usize| {
             start[axis]
-                .filter(|_| anchored(axis))
-                .ok_or(Left::UnknownPosition)
+                .filter(|_| !(modes.absolute_centres && self.floating[axis]))
+                .ok_or(Left::UnknownPosition(self.lost_place))
         };
         let start_2 = [from(a)?, from(b)?];
         let to = |axis: usize, from: f64| match line.word(b"XYZ"[axis]) {
             None => from,
-            Some(w) if self.modes.absolute => w.value * unit,
+            Some(w) if modes.absolute => w.value * unit,
             Some(w) => from + w.value * unit,
         };
         let end_2 = [to(a, start_2[0]), to(b, start_2[1])];
-        let turns = match line.word(b'P') {
-            None => 1.0,
-            Some(p) if p.value >= 1.0 && p.value.fract() == 0.0 && p.value < 1e4 => p.value,
-            Some(_) => return Err(Left::Words),
-        };
-        let same = (end_2[0] - start_2[0]).hypot(end_2[1] - start_2[1]) < 1e-9;
-        let centre = match line.word(b'R') {
-            Some(r) if !same && offset(a).is_none() && offset(b).is_none() => {
-                radius_centre(start_2, end_2, r.value * unit, ccw).ok_or(Left::Geometry)?
-            }
-            Some(_) => return Err(Left::Geometry),
-            None if offset(a).is_none() && offset(b).is_none() => return Err(Left::Geometry),
-            None if self.modes.absolute_centres => [
-                offset(a).ok_or(Left::Geometry)?,
-                offset(b).ok_or(Left::Geometry)?,
-            ],
-            None => [
-                start_2[0] + offset(a).unwrap_or(0.0),
-                start_2[1] + offset(b).unwrap_or(0.0),
-            ],
-        };
-        let (from_centre, to_centre) = (sub(start_2, centre), sub(end_2, centre));
-        let radius_mm = from_centre[0].hypot(from_centre[1]);
-        let miss = (to_centre[0].hypot(to_centre[1]) - radius_mm).abs();
-        if radius_mm < 1e-6 || miss > RADIUS_TOLERANCE_MM {
-            return Err(Left::Geometry);
-        }
-        let raw = to_centre[1].atan2(to_centre[0]) - from_centre[1].atan2(from_centre[0]);
-        let mut sweep = if ccw {
-            raw.rem_euclid(TAU)
-        } else {
-            (-raw).rem_euclid(TAU)
-        };
-        if same || sweep < 1e-12 {
-            sweep = TAU;
-        }
-        sweep += TAU * (turns - 1.0);
+        let circle = super::arc::circle(line, plane, modes, [start_2, end_2], ccw)?;
         let lift = match (line.word(b"XYZ"[c]), start[c]) {
             (None, _) => None,
-            (Some(_), None) => return Err(Left::UnknownPosition),
+            (Some(_), None) => return Err(Left::UnknownPosition(self.lost_place)),
             (Some(_), Some(from)) => Some([from, to(c, from)]).filter(|[from, to]| from != to),
         };
-        let length = radius_mm * sweep;
+        let length = circle.radius_mm * circle.sweep_rad.abs();
         let climb = lift.map_or(0.0, |[from, to]| to - from);
-        let feed = self.feed.filter(|f| *f > 0.0).ok_or(Left::UnknownFeed)?;
-        let feed_mm_s = match self.modes.feed_mode {
+        let lost = Left::UnknownFeed(self.lost_feed);
+        let feed = self.now.feed.filter(|f| *f > 0.0).ok_or(lost)?;
+        let feed_mm_s = match modes.feed_mode {
             FeedMode::PerMinute => feed * unit / 60.0 * length / length.hypot(climb),
             FeedMode::InverseTime => length * feed / 60.0,
-            FeedMode::PerTurn => return Err(Left::UnknownFeed),
+            FeedMode::PerTurn => return Err(lost),
         };
-        let sweep_rad = if ccw { sweep } else { -sweep };
         Ok(Arc {
-            plane: self.plane,
+            plane,
             start: start_2,
             end: end_2,
-            centre,
-            radius_mm,
-            sweep_rad,
+            centre: circle.centre,
+            radius_mm: circle.radius_mm,
+            sweep_rad: circle.sweep_rad,
             lift,
+            shared: self.shared(line, along)?,
             feed_mm_s,
             feed_word: feed,
-            modes: self.modes,
+            modes,
+            exact_stop: self.now.exact_stop,
         })
     }
-}
 
-/// Centre from the radius format: R > 0 takes the arc of less than half a turn.
-fn radius_centre(start: [f64; 2], end: [f64; 2], r: f64, ccw: bool) -> Option<[f64; 2]> {
-    let [dx, dy] = sub(end, start);
-    let chord = dx.hypot(dy);
-    let square = r * r - chord * chord / 4.0;
-    // Half a turn may miss its chord by the rounding of the program.
-    if square < -RADIUS_TOLERANCE_MM * r.abs() {
-        return None;
+    fn shared(
+        &self,
+        line: &Line<'_>,
+        along: [Option<f64>; 4],
+    ) -> Result<[Option<Shared>; 4], Left> {
+        let mut shared = [None; 4];
+        for (slot, letter) in ALONG.into_iter().enumerate() {
+            let Some(word) = line.word(letter) else {
+                continue;
+            };
+            let lost = Left::OtherAxes(char::from(letter));
+            let relative = self.relative(letter).ok_or(lost)?;
+            let from = if relative {
+                0.0
+            } else {
+                along[slot].ok_or(lost)?
+            };
+            shared[slot] = Some(Shared {
+                letter,
+                from,
+                to: word.value,
+                relative,
+            });
+        }
+        Ok(shared)
     }
-    let height = square.max(0.0).sqrt() / chord;
-    let side = if ccw == (r > 0.0) { height } else { -height };
-    Some([
-        0.5 * (start[0] + end[0]) - side * dy,
-        0.5 * (start[1] + end[1]) + side * dx,
-    ])
 }
 
-pub(super) fn sub(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
-    [a[0] - b[0], a[1] - b[1]]
+/// What a code makes of the axis words beside it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Use {
+    /// Nothing.
+    None,
+    /// They are its own.
+    Own,
+    /// The machine stands still.
+    Stops,
+}
+
+/// Every word of the block is one that may stand in the first of several blocks.
+fn words_of_an_arc(line: &Line<'_>) -> Result<(), Left> {
+    let code = |w: &Word| Code::Word(char::from(w.letter), w.tenths());
+    for w in &line.words {
+        let twice = w.letter != b'G' && w.letter != b'M' && line.word(w.letter).is_none();
+        let allowed = match w.letter {
+            b'U' | b'V' | b'W' => return Err(Left::SecondaryAxes),
+            b'M' => codes::m(w.tenths(), false) == M::AtStart && !line.has(b'P'),
+            b'G' => match w.tenths() {
+                20 | 30 | 170..=190 | 200 | 210 | 900..=940 if w.tenths() != 920 => true,
+                640 => !line.has(b'P') && !line.has(b'Q'),
+                _ => false,
+            },
+            b'N' | b'X' | b'Y' | b'Z' | b'I' | b'J' | b'K' | b'R' | b'P' | b'F' | b'S' | b'E'
+            | b'A' | b'B' | b'C' => true,
+            _ => false,
+        };
+        if !allowed || twice {
+            return Err(Left::Words(code(w)));
+        }
+        if w.value.is_nan() {
+            return Err(Left::Expression);
+        }
+    }
+    Ok(())
 }

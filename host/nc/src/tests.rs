@@ -1,4 +1,5 @@
 //! What is rewritten, what is not, and that the rest is copied to the letter.
+use super::state::{Action, State};
 use super::*;
 use giotto::model_file::{FORMAT, Servo, Valid};
 use proptest::prelude::*;
@@ -50,6 +51,14 @@ fn left(program: &str) -> Left {
 
 const HEAD: &str = "G21 G17 G90 G94 F1500\nG0 X20 Y0\n";
 
+/// A code in a line.
+fn because(line: usize, letter: char, tenths: i64) -> Because {
+    Because {
+        line,
+        code: Code::Word(letter, tenths),
+    }
+}
+
 #[test]
 fn reasons_to_leave_an_arc() {
     let arc = "G3 X-20 Y0 I-20 J0\n";
@@ -58,22 +67,50 @@ fn reasons_to_leave_an_arc() {
         run(&format!("{HEAD}{arc}"), &Options::default()).1[..],
         [Fate::Corrected { .. }]
     ));
-    assert_eq!(left(&format!("F1500\n{arc}")), Left::UnknownPosition);
-    assert_eq!(left("G0 X20 Y0\nG3 X-20 Y0 I-20 J0\n"), Left::UnknownFeed);
-    assert_eq!(left(&format!("{HEAD}G3 X-20 Y1 I-20 J0\n")), Left::Geometry);
-    assert_eq!(left(&format!("{HEAD}G3 X-20 Y0\n")), Left::Geometry);
-    assert_eq!(left(&format!("{HEAD}G3 X-20 Y0 R10\n")), Left::Geometry);
+    assert_eq!(left(&format!("F1500\n{arc}")), Left::UnknownPosition(None));
     assert_eq!(
-        left(&format!("{HEAD}G3 X-20 Y0 A9 I-20 J0\n")),
-        Left::OtherAxes
+        left("G0 X20 Y0\nG3 X-20 Y0 I-20 J0\n"),
+        Left::UnknownFeed(None)
     );
-    assert_eq!(left(&format!("{HEAD}G3 X-20 Y0 I-20 J0 M0\n")), Left::Words);
-    assert_eq!(left(&format!("{HEAD}G3 X-20 X3 Y0 I-20 J0\n")), Left::Words);
+    for geometry in [
+        "X-20 Y1 I-20 J0",
+        "X-20 Y0",
+        "X-20 Y0 R10",
+        "X-20 I-20 P0.5",
+    ] {
+        assert_eq!(left(&format!("{HEAD}G3 {geometry}\n")), Left::Geometry);
+    }
+    let block = |words: &str| left(&format!("{HEAD}G3 X-20 Y0 I-20 J0 {words}\n"));
+    assert_eq!(block("A9"), Left::OtherAxes('A'));
+    assert_eq!(block("E9"), Left::OtherAxes('E'));
+    assert_eq!(block("U9"), Left::SecondaryAxes);
+    assert_eq!(block("K1"), Left::ThirdCentre);
+    for (words, letter, tenths) in [
+        ("M0", 'M', 0),
+        ("M5", 'M', 50),
+        ("M98 P5", 'M', 980),
+        ("G54", 'G', 540),
+        ("D1", 'D', 10),
+    ] {
+        let found = block(words);
+        assert!(
+            found == Left::Words(Code::Word(letter, tenths))
+                || matches!(
+                    found,
+                    Left::UnknownPosition(Some(_)) | Left::UnknownModes(_)
+                ),
+            "{words}: {found:?}"
+        );
+    }
+    assert_eq!(
+        left(&format!("{HEAD}G3 X-20 X3 Y0 I-20 J0\n")),
+        Left::Words(Code::Word('X', -200))
+    );
     assert_eq!(
         left(&format!("{HEAD}G3 X[1-21] Y0 I-20 J0\n")),
         Left::Expression
     );
-    assert_eq!(left(&format!("{HEAD}/{arc}")), Left::OptionalBlock);
+    assert_eq!(left(&format!("{HEAD}/{arc}")), Left::OptionalBlock(3));
     assert_eq!(
         left(&format!("{HEAD}G3 X20.1 Y0 I0.05 J0\n")),
         Left::BeyondModel
@@ -83,15 +120,43 @@ fn reasons_to_leave_an_arc() {
         left(&format!("{HEAD}G3 X19.99 Y0.632 I-20 J0\n")),
         Left::TooShort
     );
-    assert_eq!(behind("G41 D1"), Left::CutterCompensation);
-    assert_eq!(behind("G68 X0 Y0 R30"), Left::UnknownCode);
-    assert_eq!(behind("G95 F0.1"), Left::UnknownFeed);
-    assert_eq!(behind("G28"), Left::UnknownPosition);
-    assert_eq!(behind("G55"), Left::UnknownPosition);
-    assert_eq!(behind("G92 X3"), Left::UnknownPosition);
-    assert_eq!(behind("#1 = 5\nF1500"), Left::UnknownPosition);
-    assert_eq!(behind("o100 sub"), Left::ProgramFlow);
-    assert_eq!(behind("/G91"), Left::OptionalBlock);
+    let g = |tenths| because(3, 'G', tenths);
+    assert_eq!(behind("G41 D1"), Left::CutterCompensation(g(410)));
+    assert_eq!(behind("G95 F0.1"), Left::UnknownFeed(Some(g(950))));
+    for (line, tenths) in [("G28", 280), ("G55", 550), ("G92 X3", 920), ("G53 X1", 530)] {
+        assert_eq!(
+            behind(line),
+            Left::UnknownPosition(Some(g(tenths))),
+            "{line}"
+        );
+    }
+    for (line, tenths) in [
+        ("G68 X0 Y0 R30", 680),
+        ("G51 X0 Y0 P2", 510),
+        ("G51.1 X0", 511),
+        ("G16", 160),
+        ("G66 P9000", 660),
+    ] {
+        assert_eq!(behind(line), Left::Coordinates(g(tenths)), "{line}");
+    }
+    assert_eq!(behind("G77"), Left::UnknownCode(g(770)));
+    assert_eq!(behind("M150"), Left::UnknownCode(because(3, 'M', 1500)));
+    assert_eq!(behind("G61"), Left::ExactStop(g(610)));
+    assert_eq!(behind("M99"), Left::NotReached);
+    for line in ["M98 P5", "M72", "G65 P9000 A1"] {
+        assert!(
+            matches!(behind(line), Left::UnknownModes(b) if b.line == 3),
+            "{line}"
+        );
+    }
+    assert!(matches!(behind("$H"), Left::UnknownModes(_)));
+    assert!(matches!(behind("o100 if [1]"), Left::ProgramFlow(b) if b.line == 3));
+    assert!(matches!(
+        behind("IF [#1 EQ 1] GOTO 5"),
+        Left::ProgramFlow(_)
+    ));
+    assert!(matches!(behind("/G91"), Left::UnknownModes(b) if b.line == 3));
+    assert!(matches!(behind("/G1 X5"), Left::UnknownPosition(Some(b)) if b.line == 3));
     assert_eq!(
         left("G18 F1500\nG0 Z20 X0\nG3 Z-20 X0 K-20\n"),
         Left::OtherPlane
@@ -106,11 +171,54 @@ fn reasons_to_leave_an_arc() {
     );
 }
 
+/// Comments, harmless codes and modes that have ended keep nothing from being corrected.
+#[test]
+fn nothing_is_left_without_need() {
+    let arc = "G3 X-20 Y0 I-20 J0\n";
+    for line in [
+        "O1001 (IF WHILE)",
+        "#1 = 5",
+        "G15",
+        "G8 P1",
+        "G5.1 Q1",
+        "G05 P10000",
+        "G187 P1 E0.01",
+        "G43.4 H1",
+        "G68 X0 Y0 R30\nG69\nG0 X20 Y0",
+        "G16\nG15\nG0 X20 Y0",
+        "G51 X0 Y0 P2\nG50\nG0 X20 Y0",
+        "G154 P1\nG0 X20 Y0",
+        "G54 G0 X20 Y0",
+        "G41 D1\nG40\nG0 X20 Y0",
+        "G61\nG64 P0.01",
+        "M6 T1\nG0 X20 Y0",
+        "M98 P5\nG21 G17 G90 G94 G91.1\nF1500 G0 X20 Y0",
+        "M70\nG20 G91\nM72",
+        "G92 E0",
+        "G4 P1",
+        "/G4 P1",
+        "G28 Z0\nG0 X20 Y0",
+        "G81 Z-1 R1 F100\nG80\nF1500\nG0 X20 Y0",
+    ] {
+        let (_, fates) = run(&format!("{HEAD}{line}\n{arc}"), &Options::default());
+        assert!(
+            matches!(fates[..], [Fate::Corrected { .. }]),
+            "{line}: {fates:?}"
+        );
+    }
+    let harmless = Options {
+        harmless: vec!["M150".parse().unwrap(), "G77".parse().unwrap()],
+        ..Options::default()
+    };
+    let (_, fates) = run(&format!("{HEAD}M150\nG77\n{arc}"), &harmless);
+    assert!(matches!(fates[..], [Fate::Corrected { .. }]), "{fates:?}");
+}
+
 /// Reads the program back with the same interpreter: every arc consistent, the path unbroken.
 fn path(program: &str) -> Vec<Action> {
-    let mut state = State::new();
-    let lines = word::lines(program.as_bytes());
-    let actions: Vec<Action> = lines.iter().map(|l| state.step(l)).collect();
+    let mut state = State::new(state::Reading::default());
+    let lines = word::lines(program.as_bytes()).enumerate();
+    let actions: Vec<Action> = lines.map(|(i, l)| state.step(i + 1, &l)).collect();
     for action in &actions {
         assert!(
             !matches!(action, Action::LostArc(_)),
@@ -279,7 +387,7 @@ fn halves_of_a_circle_share_their_offset() {
             blocks: 5,
             ..
         },
-        Fate::Corrected { blocks: 9, .. },
+        Fate::Corrected { blocks: 10, .. },
     ] = fates[..]
     else {
         panic!("{fates:?}")

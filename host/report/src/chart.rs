@@ -19,7 +19,7 @@ pub struct Point {
 #[derive(Clone, Debug, Default)]
 pub struct Chart {
     /// Identifies it on the page.
-    pub id: &'static str,
+    pub id: String,
     /// What it shows, for who cannot see it.
     pub description: String,
     /// Axis titles.
@@ -199,7 +199,7 @@ mod tests {
         };
         for points in [vec![], vec![point]] {
             let svg = Chart {
-                id: "c",
+                id: "c".into(),
                 points,
                 ..Chart::default()
             }

@@ -1,4 +1,5 @@
-//! The paper's Figures 8–11 for any campaign, as SVG.
+//! The paper's Figures 8–11 for any campaign, as SVG with the numbers that they draw; 2–7 are in `forms`.
+use giotto::campaign::Direction;
 use giotto::fit::{Part, Point};
 use giotto_shared::model::RadiusModel;
 use plotters::coord::types::RangedCoordf64;
@@ -8,9 +9,11 @@ use plotters::prelude::*;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
     /// File name.
-    pub file: &'static str,
+    pub file: String,
     /// The SVG document.
     pub svg: String,
+    /// What it draws, one row a point: the file of the same name with `.csv`.
+    pub csv: String,
 }
 
 /// Why a drawing failed; in memory it does not.
@@ -37,19 +40,36 @@ const KEY_HEIGHT: u32 = 28;
 /// Steps of a drawn curve.
 const CURVE_STEPS: usize = 100;
 
-/// Points of one radius: (acceleration, m/s²; value, µm), filled when the run was fitted.
+/// A run in a figure.
+struct Mark {
+    /// Acceleration, m/s², and value, µm.
+    at: (f64, f64),
+    /// Whether the run was fitted: filled; predicted ones are hollow.
+    fitted: bool,
+    /// CCW is a circle, CW a triangle.
+    direction: Direction,
+    feed_m_s: f64,
+}
+
+/// Points of one radius.
 struct Series {
     radius_m: f64,
-    points: Vec<(f64, f64, bool)>,
+    points: Vec<Mark>,
     curve: Vec<(f64, f64)>,
 }
 
 /// Figures 8 (radius error), 9 (out-of-roundness, where known), 10 (measured and predicted, offsets removed) and 11
-/// (residuals), each against the centripetal acceleration f²/R.
+/// (residuals), each against the centripetal acceleration f²/R. `directions` are those of the points, in their order.
 ///
 /// # Errors
 /// [`FigureError`] if the drawing library fails.
-pub fn figures(points: &[Point], model: &RadiusModel<f64>) -> Result<Vec<Figure>, FigureError> {
+pub fn figures(
+    points: &[Point],
+    directions: &[Direction],
+    model: &RadiusModel<f64>,
+) -> Result<Vec<Figure>, FigureError> {
+    let points: Vec<(&Point, Direction)> = points.iter().zip(directions.iter().copied()).collect();
+    let points = points.as_slice();
     let mut figures = vec![draw(
         "figure08.svg",
         "Radius size error",
@@ -58,7 +78,7 @@ pub fn figures(points: &[Point], model: &RadiusModel<f64>) -> Result<Vec<Figure>
     )?];
     if points
         .iter()
-        .any(|p| p.observation.out_of_roundness_m.is_some())
+        .any(|(p, _)| p.observation.out_of_roundness_m.is_some())
     {
         let roundness = series(points, None, |p| p.observation.out_of_roundness_m);
         figures.push(draw(
@@ -84,15 +104,20 @@ pub fn figures(points: &[Point], model: &RadiusModel<f64>) -> Result<Vec<Figure>
 }
 
 fn series(
-    points: &[Point],
+    points: &[(&Point, Direction)],
     model: Option<&RadiusModel<f64>>,
     value: impl Fn(&Point) -> Option<f64>,
 ) -> Vec<Series> {
     let mut all: Vec<Series> = Vec::new();
-    for p in points {
+    for (p, direction) in points {
         let radius_m = p.observation.radius_m;
         let Some(value) = value(p) else { continue };
-        let mark = (p.observation.f2_r(), value * 1e6, p.part == Part::Train);
+        let mark = Mark {
+            at: (p.observation.f2_r(), value * 1e6),
+            fitted: p.part == Part::Train,
+            direction: *direction,
+            feed_m_s: p.observation.feed_m_s,
+        };
         match all
             .iter_mut()
             .find(|s| (s.radius_m - radius_m).abs() < 1e-9)
@@ -108,7 +133,7 @@ fn series(
     all.sort_by(|a, b| a.radius_m.total_cmp(&b.radius_m));
     if let Some(model) = model {
         for s in &mut all {
-            let top = s.points.iter().map(|p| p.0).fold(0.0, f64::max);
+            let top = s.points.iter().map(|p| p.at.0).fold(0.0, f64::max);
             let at = |i: usize| {
                 let acceleration = top * i as f64 / CURVE_STEPS as f64;
                 (
@@ -139,7 +164,33 @@ fn draw(
 ) -> Result<Figure, FigureError> {
     let mut svg = String::new();
     render(&mut svg, title, value, series).map_err(|why| FigureError { file, why })?;
-    Ok(Figure { file, svg })
+    Ok(Figure {
+        file: file.to_owned(),
+        svg,
+        csv: csv(series),
+    })
+}
+
+/// The numbers of a figure: one row a run.
+fn csv(series: &[Series]) -> String {
+    let mut out = String::from("radius_mm,feed_mm_s,direction,part,acceleration_m_s2,value_um\n");
+    for s in series {
+        for p in &s.points {
+            let way = if p.direction == Direction::Ccw {
+                "ccw"
+            } else {
+                "cw"
+            };
+            let part = if p.fitted { "fitted" } else { "predicted" };
+            let (x, y) = p.at;
+            let feed = trimmed_mm(p.feed_m_s);
+            out += &format!(
+                "{},{feed},{way},{part},{x:.6},{y:.6}\n",
+                trimmed_mm(s.radius_m)
+            );
+        }
+    }
+    out
 }
 
 type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
@@ -150,10 +201,10 @@ fn render(svg: &mut String, title: &str, value: &str, series: &[Series]) -> Resu
     root.fill(&WHITE).map_err(|e| words(&e))?;
     let marks = || series.iter().flat_map(|s| s.points.iter());
     let lines = || series.iter().flat_map(|s| s.curve.iter());
-    let x = room(marks().map(|p| p.0));
-    let y = room(marks().map(|p| p.1).chain(lines().map(|p| p.1)));
+    let x = room(marks().map(|p| p.at.0));
+    let y = room(marks().map(|p| p.at.1).chain(lines().map(|p| p.1)));
     let mut chart: Chart<'_, '_> = ChartBuilder::on(&root)
-        .caption(title, (FONT, 17))
+        .caption(format!("{title} (circles: CCW, triangles: CW)"), (FONT, 16))
         .margin(14)
         .margin_bottom(14 + KEY_HEIGHT)
         .x_label_area_size(44)
@@ -178,43 +229,45 @@ fn render(svg: &mut String, title: &str, value: &str, series: &[Series]) -> Resu
                 colour.stroke_width(1),
             ))
             .map_err(|e| words(&e))?;
-        let mark = |p: &(f64, f64, bool)| {
-            Circle::new(
-                (p.0, p.1),
-                4,
-                if p.2 {
-                    colour.filled()
-                } else {
-                    colour.stroke_width(2)
-                },
-            )
-        };
-        chart
-            .draw_series(s.points.iter().map(mark))
-            .map_err(|e| words(&e))?;
+        let style = |p: &Mark| fill(colour, p.fitted);
+        let of = |direction| s.points.iter().filter(move |p| p.direction == direction);
+        let round = of(Direction::Ccw).map(|p| Circle::new(p.at, 4, style(p)));
+        chart.draw_series(round).map_err(|e| words(&e))?;
+        let filled = of(Direction::Cw).filter(|p| p.fitted);
+        let filled = filled.map(|p| EmptyElement::at(p.at) + Polygon::new(TRIANGLE, style(p)));
+        chart.draw_series(filled).map_err(|e| words(&e))?;
+        let hollow = of(Direction::Cw).filter(|p| !p.fitted);
+        let hollow = hollow.map(|p| EmptyElement::at(p.at) + PathElement::new(TRIANGLE, style(p)));
+        chart.draw_series(hollow).map_err(|e| words(&e))?;
     }
     drop(chart);
     // The key has a line of its own: nothing lies under it.
     let y = (SIZE.1 - KEY_HEIGHT / 2 - 8) as i32;
     for (i, (s, colour)) in series.iter().zip(COLOURS.iter().cycle()).enumerate() {
         let x = 80 + 200 * i as i32;
-        let fitted = s.points.iter().any(|p| p.2);
+        let fitted = s.points.iter().any(|p| p.fitted);
         let text = format!(
             "R {} mm, {}",
             trimmed_mm(s.radius_m),
             if fitted { "fitted" } else { "predicted" }
         );
-        let style = if fitted {
-            colour.filled()
-        } else {
-            colour.stroke_width(2)
-        };
-        root.draw(&Circle::new((x, y), 4, style))
+        root.draw(&Circle::new((x, y), 4, fill(*colour, fitted)))
             .map_err(|e| words(&e))?;
         root.draw(&Text::new(text, (x + 12, y - 6), (FONT, 13)))
             .map_err(|e| words(&e))?;
     }
     root.present().map_err(|e| words(&e))
+}
+
+/// A triangle about a point, pixels; closed.
+const TRIANGLE: [(i32, i32); 4] = [(-4, 3), (4, 3), (0, -5), (-4, 3)];
+
+fn fill(colour: RGBColor, fitted: bool) -> ShapeStyle {
+    if fitted {
+        colour.filled()
+    } else {
+        colour.stroke_width(2)
+    }
 }
 
 /// A radius in mm, without digits that rounding made.
@@ -252,16 +305,23 @@ mod tests {
             ..Options::default()
         };
         let fit = RadiusFit::new(&runs, options).unwrap();
-        let figures = figures(&fit.points(&runs), &fit.model).unwrap();
+        let directions: Vec<Direction> = (0..runs.len())
+            .map(|i| {
+                if i % 2 == 0 {
+                    Direction::Ccw
+                } else {
+                    Direction::Cw
+                }
+            })
+            .collect();
+        let figures = figures(&fit.points(&runs), &directions, &fit.model).unwrap();
         assert_eq!(figures.len(), 4);
         for figure in figures {
-            // A mark for each run and one for each radius in the key.
-            assert_eq!(
-                figure.svg.matches("<circle").count(),
-                78 + 3,
-                "{}",
-                figure.file
-            );
+            // A circle for each CCW run and one for each radius in the key; triangles for the others.
+            let circles = figure.svg.matches("<circle").count();
+            assert_eq!(circles, 39 + 3, "{}", figure.file);
+            assert_eq!(figure.csv.lines().count(), 1 + 78);
+            assert_eq!(figure.csv.matches(",ccw,").count(), 39);
             assert!(figure.svg.contains("R 300 mm, predicted"));
         }
     }

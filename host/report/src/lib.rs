@@ -2,26 +2,39 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | `figures` | the paper's Figures 8–11 of a fit, as SVG |
+//! | `figures`, `forms` | the paper's Figures 8–11 and 2–7 of a campaign, as SVG |
 //! | `view` | what the page says, ready for the template |
+//! | `cause_view`, `iso`, `plots` | its parts: causes, ISO 230-4, plots of all runs |
 //! | `verdict` | the three sentences |
 //! | `chart` | scatter plots as SVG |
 //! | `map` | misfit over feed and radius |
-//! | `polar`, `polar.js` | profiles, and the plot that draws them |
+//! | `polar`, `polar.js` | profiles, the plot that draws them, and what-if |
+//! | `alone` | what each cause does to each circle by itself |
+//! | `portrait` | one profile as a small picture |
+//! | `pages`, `page.html` | comparison and history |
 //! | `hash` | identity of the data |
 //! | `template.html`, `style.css` | the page |
 #![forbid(unsafe_code)]
 
+mod alone;
+mod cause_view;
 mod chart;
 pub mod figures;
+pub mod forms;
 mod hash;
+mod iso;
 mod map;
 mod number;
+mod pages;
+mod plots;
 mod polar;
+mod portrait;
 #[cfg(test)]
 mod tests;
 mod verdict;
 mod view;
+
+pub use pages::{comparison_page, history_page};
 
 use giotto::campaign::Campaign;
 use giotto::diagnosis::Diagnosis;

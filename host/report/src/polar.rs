@@ -1,6 +1,8 @@
 //! What the polar plot draws: profiles of each circle as JSON inside the page.
+use super::alone::Alone;
 use super::number::{fixed, plain};
 use giotto::campaign::{Campaign, Direction};
+use giotto::diagnosis::Diagnosis;
 use giotto::diagnosis::picture::RunPicture;
 use serde::Serialize;
 
@@ -24,20 +26,38 @@ struct Profiles {
     measured: Vec<Option<f64>>,
     before: Vec<Option<f64>>,
     after: Vec<Option<f64>>,
+    /// What each cause with a box does to it.
+    causes: Vec<Vec<Option<f64>>>,
+}
+
+/// The data of the page.
+#[derive(Debug, Serialize)]
+struct Data {
+    /// Names of the causes that have a box.
+    causes: Vec<String>,
+    circles: Vec<Circle>,
+    /// Index of the circle whose form is worst.
+    worst: usize,
+}
+
+/// Tenths of a micrometre: the resolution of the best ballbars.
+fn tenths(profile: &[Option<f64>]) -> Vec<Option<f64>> {
+    profile
+        .iter()
+        .map(|v| v.map(|v| (v * 1e7).round() / 10.0))
+        .collect()
 }
 
 /// The JSON, safe inside a `<script>` element.
-pub fn json(campaign: &Campaign, picture: &[RunPicture]) -> String {
+pub fn json(campaign: &Campaign, d: &Diagnosis, alone: &Alone) -> String {
+    let picture: &[RunPicture] = &d.picture;
+    let boxes = || d.findings.iter().zip(&alone.profiles);
     let mut circles: Vec<(f64, f64, Circle)> = Vec::new();
     for p in picture {
         let run = &campaign.runs[p.index];
-        let [measured, before, after] = p.profile_m.each_ref().map(|profile| {
-            // Tenths of a micrometre: the resolution of the best ballbars.
-            profile
-                .iter()
-                .map(|v| v.map(|v| (v * 1e7).round() / 10.0))
-                .collect()
-        });
+        let [measured, before, after] = p.profile_m.each_ref().map(|profile| tenths(profile));
+        let own = boxes().filter_map(|(_, runs)| runs.as_ref()?.get(p.index));
+        let causes = own.map(|profile| tenths(profile)).collect();
         let direction = match run.direction {
             Direction::Ccw => "CCW",
             Direction::Cw => "CW",
@@ -48,6 +68,7 @@ pub fn json(campaign: &Campaign, picture: &[RunPicture]) -> String {
             measured,
             before,
             after,
+            causes,
         };
         match circles
             .iter_mut()
@@ -72,8 +93,35 @@ pub fn json(campaign: &Campaign, picture: &[RunPicture]) -> String {
     }
     circles.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let circles: Vec<Circle> = circles.into_iter().map(|c| c.2).collect();
+    let form = |circle: &Circle| {
+        circle
+            .runs
+            .iter()
+            .map(|run| range(&run.measured))
+            .fold(0.0, f64::max)
+    };
+    let worst = (0..circles.len())
+        .max_by(|a, b| form(&circles[*a]).total_cmp(&form(&circles[*b])))
+        .unwrap_or(0);
+    let named = boxes().filter(|(_, runs)| runs.is_some());
+    let data = Data {
+        causes: named.map(|(f, _)| super::verdict::title(f)).collect(),
+        circles,
+        worst,
+    };
     // Numbers and strings always serialise; `<` would let a name end the script.
-    serde_json::to_string(&circles)
-        .unwrap_or_else(|_| "[]".into())
+    serde_json::to_string(&data)
+        .unwrap_or_else(|_| "null".into())
         .replace('<', "\\u003c")
+}
+
+/// Largest less smallest value of a profile.
+fn range(profile: &[Option<f64>]) -> f64 {
+    let [low, high] = profile
+        .iter()
+        .flatten()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| {
+            [l.min(*v), h.max(*v)]
+        });
+    (high - low).max(0.0)
 }

@@ -31,8 +31,8 @@ fn measured(radii_m: &[f64], feeds_m_s: &[f64], samples: usize) -> (Campaign, Di
         name: HOSTILE.into(),
         machine_name: HOSTILE.into(),
         machine: Machine {
-            servo: [servo; 2],
-            squareness_rad: 60e-6,
+            servo: [servo; 3],
+            squareness_rad: [60e-6, 0.0, 0.0],
             ..Machine::default()
         },
         instrument: Instrument::ballbar(),
@@ -162,7 +162,7 @@ fn the_page_says_what_the_diagnosis_says() {
     for said in [words.what, words.usual, words.adjust] {
         assert!(page.contains(&super::number::escape(said)), "{said}");
     }
-    assert!(page.contains(&super::number::number(first.estimate.value)));
+    assert!(page.contains(&super::verdict::shown(&first.estimate).value));
     assert!(page.contains(&super::data_hash(&campaign)));
     let mut other = campaign.clone();
     other.runs[3].samples.deviation_m[7] += 1e-12;

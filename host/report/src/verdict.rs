@@ -1,31 +1,56 @@
-//! The verdict: what the simulation gets wrong, why, and what to do, in three sentences.
-use super::number::{fixed, number};
+//! The verdict in three sentences: how the worst circle looks, why, and what to do.
+use super::number::{fixed, plain};
+use giotto::analysis::Report;
 use giotto::causes::Cause;
-use giotto::diagnosis::{Diagnosis, Finding};
-use giotto_shared::Axis;
+use giotto::diagnosis::{Diagnosis, Estimate, Finding};
+use giotto::units::{self, Shown};
+use giotto_shared::Direction;
 
 /// The three sentences.
-pub fn sentences(d: &Diagnosis, runs: usize) -> [String; 3] {
-    [misfit(d, runs), cause(d), action(d)]
+pub fn sentences(d: &Diagnosis, report: Option<&Report>) -> [String; 3] {
+    [misfit(report), cause(d), action(d)]
 }
 
-/// Name of the axis in words, with a leading space; nothing for the machine as a whole.
-pub fn axis(finding: &Finding) -> &'static str {
-    match finding.axis {
-        Some(Axis::X) => " of X",
-        Some(Axis::Y) => " of Y",
-        None => "",
+/// Names of the actuators in words, with a leading space; nothing for the machine as a whole.
+pub fn axis(finding: &Finding) -> String {
+    let names: Vec<String> = finding
+        .actuators
+        .iter()
+        .map(|actuator| actuator.name().to_uppercase().replace("JOINT", "joint "))
+        .collect();
+    if names.is_empty() {
+        String::new()
+    } else {
+        format!(" of {}", names.join(" and "))
     }
 }
 
-fn misfit(d: &Diagnosis, runs: usize) -> String {
-    let s = if runs == 1 { "" } else { "s" };
+/// Name of a finding with its place.
+pub fn title(finding: &Finding) -> String {
+    format!("{}{}", finding.cause.model().words().name, axis(finding))
+}
+
+/// The circle whose form is worst, and how far off all circles are in size.
+fn misfit(report: Option<&Report>) -> String {
+    let worst = report.and_then(|report| {
+        let runs = report.runs.iter();
+        runs.max_by(|a, b| a.out_of_roundness_m.total_cmp(&b.out_of_roundness_m))
+    });
+    let Some(worst) = worst else {
+        return "No circle goes through these samples.".to_string();
+    };
+    let way = match worst.direction {
+        Direction::Ccw => "counter-clockwise",
+        Direction::Cw => "clockwise",
+    };
+    let size = worst.radius_error_m * 1e6;
+    let too = if size < 0.0 { "small" } else { "large" };
     format!(
-        "The simulation ({}) misses {runs} run{s} by {} µm rms, where a sample has {} µm of noise and the size {} µm of scatter between runs.",
-        d.baseline.name,
-        fixed(d.misfit.total_um, 2),
-        fixed(d.noise_um, 2),
-        fixed(d.spread_um, 2)
+        "The circle with the worst form, radius {} mm at {} mm/s {way}, is out of round by {} µm and {} µm too {too}.",
+        plain(worst.radius_m * 1e3),
+        plain(worst.feed_m_s * 1e3),
+        fixed(worst.out_of_roundness_m * 1e6, 1),
+        fixed(size.abs(), 1),
     )
 }
 
@@ -50,68 +75,72 @@ fn cause(d: &Diagnosis) -> String {
     let others: Vec<String> = d.findings[1..]
         .iter()
         .take(3)
-        .map(|f| {
-            format!(
-                "{}{} ({} %)",
-                f.cause.model().words().name,
-                axis(f),
-                fixed(f.share_percent, 0)
-            )
-        })
+        .map(|f| format!("{} ({} %)", title(f), fixed(f.share_percent, 0)))
         .collect();
     let more = match others.len() {
         0 => String::new(),
         _ => format!(", then {}", others.join(", ")),
     };
-    let e = &first.estimate;
+    let shown = shown(&first.estimate);
     format!(
-        "{} % of what can be explained is {}{}, {} {} (95 %: {} to {}){more}{rest}.",
+        "{} % of what a lag does not explain is {}, {} {} (95 %: {} to {}){more}{rest}.",
         fixed(first.share_percent, 0),
-        first.cause.model().words().name,
-        axis(first),
-        number(e.value),
-        unit(e.unit),
-        number(e.ci95[0]),
-        number(e.ci95[1]),
+        title(first),
+        shown.value,
+        shown.unit,
+        shown.low,
+        shown.high,
     )
 }
 
 fn action(d: &Diagnosis) -> String {
-    let gain = match &d.gain {
-        Some(g) if !d.findings.is_empty() => format!(
-            "On runs it has not seen the extended simulation misses by {} instead of {} µm rms (gain {} %, 95 %: {} to {}); ",
-            fixed(g.extended_rms_um, 2),
-            fixed(g.baseline_rms_um, 2),
-            fixed(g.percent, 1),
-            fixed(g.ci95_percent[0], 1),
-            fixed(g.ci95_percent[1], 1),
-        ),
-        _ => String::new(),
-    };
     let correctable = d.findings.iter().any(|f| f.compensable);
     let what = match d.findings.first() {
-        Some(_) if correctable => "write the extended model with `giotto diagnose CAMPAIGN -o EXTENDED.toml` and flash it".to_string(),
-        Some(first) => format!("no controller can correct this: {}", first.cause.model().words().adjust),
-        None if d.gain.is_none() => {
-            "measure what is missing first: `giotto plan CAMPAIGN` lists the runs".to_string()
-        }
+        Some(_) if correctable => "Write the extended model into the controller".to_string(),
+        Some(first) => format!(
+            "No controller corrects this: {}",
+            first.cause.model().words().adjust
+        ),
+        None if d.gain.is_none() => "Measure what is missing first".to_string(),
         None if d.unexplained.present => {
-            "look at the place and the law of what is unexplained; `giotto plan CAMPAIGN` lists runs that narrow it down".to_string()
+            "Look at the place and the law of what has no name, further down".to_string()
         }
-        None => "fit the radius model and flash it: `giotto fit CAMPAIGN -o MODEL.toml`".to_string(),
+        None => "Write the fitted radius model into the controller".to_string(),
     };
-    let text = format!("{gain}{what}.");
-    let mut letters = text.chars();
-    letters.next().map_or(String::new(), |first| {
-        first.to_uppercase().chain(letters).collect()
-    })
+    match &d.gain {
+        Some(g) if correctable => {
+            // What no controller corrects stays.
+            let stays = d.findings.iter().filter(|f| !f.compensable);
+            let stays: f64 = stays.map(|f| f.rms_um.powi(2)).sum();
+            let then = (g.extended_rms_um.powi(2) + stays).sqrt();
+            if then >= g.no_model_rms_um {
+                return format!("{what}.");
+            }
+            format!(
+                "{what}: circles that it has not seen are off by {} µm rms now, by {} µm with it.",
+                fixed(g.no_model_rms_um, 1),
+                fixed(then, 1),
+            )
+        }
+        _ => format!("{what}."),
+    }
 }
 
-/// Units with their proper letters.
-pub fn unit(unit: &str) -> String {
-    unit.replace("um", "µm")
-        .replace("^2", "²")
-        .replace("^4", "⁴")
+/// An estimate in the units that a person reads, with a true minus sign.
+pub fn shown(e: &Estimate) -> Shown {
+    let Shown {
+        value,
+        low,
+        high,
+        unit,
+    } = units::shown(e.value, e.ci95, e.unit);
+    let [value, low, high] = [value, low, high].map(|text| text.replace('-', "−"));
+    Shown {
+        value,
+        low,
+        high,
+        unit,
+    }
 }
 
 /// Names of look-alikes for a person; what is no cause of the list stays as it is written.

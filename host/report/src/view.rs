@@ -1,12 +1,15 @@
 //! What the template is given: words and numbers, ready.
-use super::chart::{Chart, Point, shape};
+use super::alone::Alone;
+use super::cause_view::{CauseView, cause, unexplained};
+use super::chart::shape;
+use super::iso::{BudgetView, budget, iso_groups};
 use super::map::{Map, map};
-use super::number::{fixed, number, plain};
-use super::verdict::{self, axis, look_alike, unit};
+use super::number::{fixed, plain};
+use super::plots::{collapse, over_acceleration, residuals};
+use super::verdict;
 use giotto::analysis;
 use giotto::campaign::{Campaign, Direction};
-use giotto::diagnosis::survey::Response;
-use giotto::diagnosis::{Diagnosis, Finding};
+use giotto::diagnosis::Diagnosis;
 use serde::Serialize;
 
 /// The whole page.
@@ -17,6 +20,8 @@ pub struct View {
     grid: String,
     verdict: [String; 3],
     causes: Vec<CauseView>,
+    /// Causes that can be ticked off.
+    whatif: Vec<String>,
     unexplained: Option<UnexplainedView>,
     cannot_tell: Vec<String>,
     kinds: Vec<Kind>,
@@ -25,7 +30,11 @@ pub struct View {
     radii: Vec<Legend>,
     collapse: String,
     residuals: String,
-    iso: Vec<[String; 8]>,
+    sizes: String,
+    forms: String,
+    /// Rows of ISO 230-4, one group a radius.
+    iso: Vec<Vec<[String; 8]>>,
+    budget: Option<Vec<BudgetView>>,
     runs: Vec<[String; 9]>,
     version: &'static str,
     seed: u64,
@@ -36,30 +45,10 @@ pub struct View {
 }
 
 #[derive(Debug, Serialize)]
-struct CauseView {
-    name: String,
-    value: String,
-    low: String,
-    high: String,
-    unit: String,
-    share: String,
-    share_number: f64,
-    probability: String,
-    rms: String,
-    params: Vec<[String; 2]>,
-    what: &'static str,
-    usual: &'static str,
-    adjust: &'static str,
-    look_alikes: Vec<String>,
-    next: String,
-    compensable: bool,
-    why_not: Option<&'static str>,
-}
-
-#[derive(Debug, Serialize)]
 struct UnexplainedView {
     rms: String,
     words: Vec<String>,
+    picture: Option<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -89,18 +78,30 @@ impl View {
     /// Of a campaign and its diagnosis.
     pub fn of(campaign: &Campaign, d: &Diagnosis) -> Self {
         let radii = radii(campaign);
-        let iso = analysis::of_campaign(campaign)
-            .map(|report| report.iso230_4)
-            .unwrap_or_default();
+        let report = analysis::of_campaign(campaign).ok();
+        let alone = Alone::of(campaign, d);
         Self {
             name: campaign.name.clone(),
             machine: campaign.machine.clone(),
             grid: grid(campaign, &radii),
-            verdict: verdict::sentences(d, campaign.runs.len()),
-            causes: d.findings.iter().map(cause).collect(),
+            verdict: verdict::sentences(d, report.as_ref()),
+            causes: d
+                .findings
+                .iter()
+                .enumerate()
+                .map(|(at, f)| cause(campaign, &alone, at, f))
+                .collect(),
+            whatif: d
+                .findings
+                .iter()
+                .zip(&alone.profiles)
+                .filter(|(_, profiles)| profiles.is_some())
+                .map(|(f, _)| verdict::title(f))
+                .collect(),
             unexplained: d.unexplained.present.then(|| UnexplainedView {
                 rms: fixed(d.unexplained.rms_um, 2),
                 words: d.unexplained.signature.words.clone(),
+                picture: unexplained(campaign, d),
             }),
             cannot_tell: d.cannot_tell.clone(),
             kinds: kinds(d),
@@ -108,6 +109,8 @@ impl View {
             map: map(campaign, &d.picture),
             collapse: collapse(campaign, d, &radii),
             residuals: residuals(campaign, d, &radii),
+            sizes: over_acceleration(report.as_ref(), &radii, "sizes"),
+            forms: over_acceleration(report.as_ref(), &radii, "forms"),
             radii: radii
                 .iter()
                 .enumerate()
@@ -116,13 +119,14 @@ impl View {
                     radius: plain(r * 1e3),
                 })
                 .collect(),
-            iso: iso.iter().map(iso_row).collect(),
+            iso: report.as_ref().map(iso_groups).unwrap_or_default(),
+            budget: report.as_ref().and_then(budget),
             runs: runs(campaign, d),
             version: env!("CARGO_PKG_VERSION"),
             seed: d.seed,
             hash: super::hash::of(campaign),
             baseline: d.baseline.name.clone(),
-            polar: super::polar::json(campaign, &d.picture),
+            polar: super::polar::json(campaign, d, &alone),
         }
     }
 }
@@ -132,13 +136,6 @@ fn radii(campaign: &Campaign) -> Vec<f64> {
     radii.sort_by(f64::total_cmp);
     radii.dedup();
     radii
-}
-
-fn ways(direction: Direction) -> &'static str {
-    match direction {
-        Direction::Ccw => "CCW",
-        Direction::Cw => "CW",
-    }
 }
 
 fn grid(campaign: &Campaign, radii: &[f64]) -> String {
@@ -165,37 +162,6 @@ fn grid(campaign: &Campaign, radii: &[f64]) -> String {
     )
 }
 
-fn cause(f: &Finding) -> CauseView {
-    let words = f.cause.model().words();
-    CauseView {
-        name: format!("{}{}", words.name, axis(f)),
-        value: number(f.estimate.value),
-        low: number(f.estimate.ci95[0]),
-        high: number(f.estimate.ci95[1]),
-        unit: unit(f.estimate.unit),
-        share: fixed(f.share_percent, 0),
-        share_number: f.share_percent,
-        probability: fixed(f.probability, 3),
-        rms: fixed(f.rms_um, 2),
-        params: f
-            .params
-            .iter()
-            .map(|(k, v)| [k.replace('_', " "), number(*v)])
-            .collect(),
-        what: words.what,
-        usual: words.usual,
-        adjust: words.adjust,
-        look_alikes: f
-            .indistinguishable_from
-            .iter()
-            .map(|id| look_alike(id))
-            .collect(),
-        next: f.next_measurement.clone(),
-        compensable: f.compensable,
-        why_not: words.not_compensable,
-    }
-}
-
 fn kinds(d: &Diagnosis) -> Vec<Kind> {
     let m = &d.misfit;
     [
@@ -216,7 +182,7 @@ fn kinds(d: &Diagnosis) -> Vec<Kind> {
 }
 
 fn gain(d: &Diagnosis) -> Option<GainView> {
-    let g = d.gain.as_ref()?;
+    let g = d.gain.as_ref().filter(|_| !d.findings.is_empty())?;
     let rows = [
         ("no model", g.no_model_rms_um),
         ("β1 and β2 of the paper", g.beta_rms_um),
@@ -236,21 +202,6 @@ fn gain(d: &Diagnosis) -> Option<GainView> {
         of_perfect: fixed(g.of_perfect_percent, 1),
         folds: g.folds,
     })
-}
-
-fn iso_row(pair: &analysis::Iso230) -> [String; 8] {
-    let um = |v: f64| fixed(v * 1e6, 1);
-    let maybe = |v: Option<f64>| v.map_or("–".to_string(), um);
-    [
-        plain(pair.radius_m * 1e3),
-        plain(pair.feed_m_s * 1e3),
-        maybe(pair.g_cw_m),
-        maybe(pair.g_ccw_m),
-        maybe(pair.g_b_m),
-        um(pair.f_max_m),
-        um(pair.f_min_m),
-        maybe(pair.d_m),
-    ]
 }
 
 fn runs(campaign: &Campaign, d: &Diagnosis) -> Vec<[String; 9]> {
@@ -274,105 +225,9 @@ fn runs(campaign: &Campaign, d: &Diagnosis) -> Vec<[String; 9]> {
         .collect()
 }
 
-fn shape_of(radii: &[f64], radius_m: f64) -> usize {
-    radii.iter().position(|r| *r == radius_m).unwrap_or(0)
-}
-
-fn collapse(campaign: &Campaign, d: &Diagnosis, radii: &[f64]) -> String {
-    let ratio = |size_m: f64, radius_m: f64| 1e3 * (size_m / radius_m).ln_1p();
-    let points = d
-        .picture
-        .iter()
-        .map(|p| {
-            let run = &campaign.runs[p.index];
-            let at = [p.omega_rad_s.powi(2), ratio(p.size_m[0], run.radius_m)];
-            Point {
-                at,
-                shape: shape_of(radii, run.radius_m),
-                class: if run.direction == Direction::Ccw {
-                    "ccw"
-                } else {
-                    "cw"
-                },
-                label: format!(
-                    "{}: R {} mm, {} mm/s, {}: ω² {} rad²/s², ln(Rm/R) {} · 10⁻³",
-                    run.file,
-                    plain(run.radius_m * 1e3),
-                    plain(run.feed_m_s * 1e3),
-                    ways(run.direction),
-                    fixed(at[0], 2),
-                    fixed(at[1], 4)
-                ),
-            }
-        })
-        .collect();
-    // One curve each: both models shrink a circle by its ω alone, but for the named causes.
-    let mut before: Vec<[f64; 2]> = d
-        .picture
-        .iter()
-        .map(|p| {
-            let radius = campaign.runs[p.index].radius_m;
-            [
-                p.omega_rad_s.powi(2),
-                ratio(p.size_m[0] - p.size_m[1], radius),
-            ]
-        })
-        .collect();
-    before.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    let fastest = d.picture.iter().map(|p| p.omega_rad_s).fold(0.0, f64::max);
-    let response = Response::of(&d.model.servo);
-    let after = (0..=60)
-        .map(|i| fastest * f64::from(i) / 60.0)
-        .map(|omega| [omega * omega, 1e3 * response.gain(omega).ln()])
-        .collect();
-    Chart {
-        id: "collapse",
-        description: format!(
-            "ln(Rm/R) against ω² for {} runs. Values of each run are in the table of runs.",
-            d.picture.len()
-        ),
-        titles: ["ω², rad²/s²".into(), "ln(Rm/R), 10⁻³".into()],
-        points,
-        curves: vec![("before", before), ("after", after)],
+pub(super) fn ways(direction: Direction) -> &'static str {
+    match direction {
+        Direction::Ccw => "CCW",
+        Direction::Cw => "CW",
     }
-    .svg()
-}
-
-fn residuals(campaign: &Campaign, d: &Diagnosis, radii: &[f64]) -> String {
-    let mut points = Vec::new();
-    for (k, class, words) in [
-        (0, "measured", "measured"),
-        (1, "before", "left before"),
-        (2, "after", "left after"),
-    ] {
-        points.extend(d.picture.iter().map(|p| {
-            let run = &campaign.runs[p.index];
-            let at = [run.feed_m_s.powi(2) / run.radius_m, p.size_m[k] * 1e6];
-            Point {
-                at,
-                shape: shape_of(radii, run.radius_m),
-                class,
-                label: format!(
-                    "{}: R {} mm, {} mm/s, {}: {} m/s², {words} {} µm",
-                    run.file,
-                    plain(run.radius_m * 1e3),
-                    plain(run.feed_m_s * 1e3),
-                    ways(run.direction),
-                    fixed(at[0], 3),
-                    fixed(at[1], 2)
-                ),
-            }
-        }));
-    }
-    Chart {
-        id: "residuals",
-        description: format!(
-            "Radius error of {} runs over the programmed centripetal acceleration: as measured, and what the simulation leaves before and after. Values of each run are in the table of runs.",
-            d.picture.len()
-        ),
-        titles: ["centripetal acceleration f²/R, m/s²".into(), "radius error, µm".into()],
-        points,
-        curves: Vec::new(),
-    }
-    .svg()
 }

@@ -1,4 +1,6 @@
 //! The contract's JSON of `analyze`. Units end the names; what a run does not have is `null`.
+use super::tolerance::{self, Held, LargestFeed};
+use super::uncertainty::{self, Budget, Iso230Budget, Known, Source, Verdict};
 use super::{Iso230, Report, RunAnalysis, counterparts};
 use crate::campaign::import::ballbar20::{Ballbar20, Feature};
 use crate::campaign::{Direction, Location};
@@ -13,6 +15,31 @@ pub struct Document {
     /// Only with `--ballbar`.
     #[serde(skip_serializing_if = "Option::is_none")]
     ballbar20: Option<BallbarEntry>,
+    /// Only with `--tolerance`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tolerance: Option<ToleranceEntry>,
+}
+
+/// What the figures of ISO 230-4 are worth, and what they are held against.
+#[derive(Clone, Debug)]
+pub struct Assessment {
+    /// Budget of each pair, in their order.
+    pub budgets: Vec<Iso230Budget>,
+    /// The tolerance, m, if one was asked for.
+    pub tolerance_m: Option<f64>,
+}
+
+#[derive(Debug, Serialize)]
+struct ToleranceEntry {
+    tolerance_um: f64,
+    pass: bool,
+    largest_feed: Vec<LargestFeed>,
+}
+
+#[derive(Debug, Serialize)]
+struct BudgetEntry {
+    standard_um: f64,
+    known: Known,
 }
 
 #[derive(Debug, Serialize)]
@@ -78,6 +105,13 @@ struct IsoEntry {
     f_max_um: f64,
     f_min_um: f64,
     d_um: Option<f64>,
+    /// Expanded uncertainty (k = 2) by figure.
+    uncertainty_um: BTreeMap<&'static str, f64>,
+    /// Its budget by figure and source.
+    budget_um: BTreeMap<&'static str, BTreeMap<Source, BudgetEntry>>,
+    /// Only with `--tolerance`: by figure.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    verdict: Option<BTreeMap<&'static str, Verdict>>,
 }
 
 /// Radii and feeds were written in mm; 0.1 m × 1e3 must not become 100.00000000000001.
@@ -91,7 +125,10 @@ fn um(si: f64) -> f64 {
 
 impl Document {
     /// The document of a report, with the results of Ballbar 20 if there are any.
-    pub fn of(report: &Report, ballbar: Option<&Ballbar20>) -> Self {
+    pub fn of(report: &Report, ballbar: Option<&Ballbar20>, assessment: &Assessment) -> Self {
+        let held = assessment
+            .tolerance_m
+            .map(|tolerance| tolerance::hold(report, &assessment.budgets, tolerance));
         let pairs = counterparts(report);
         let result = |f: &Feature| ResultEntry {
             name: f.name.clone(),
@@ -106,7 +143,23 @@ impl Document {
                 .zip(&report.frames)
                 .map(|(r, f)| run(r, f.as_ref()))
                 .collect(),
-            iso230_4: report.iso230_4.iter().map(iso).collect(),
+            iso230_4: report
+                .iso230_4
+                .iter()
+                .zip(&assessment.budgets)
+                .enumerate()
+                .map(|(at, (pair, budget))| {
+                    iso(pair, budget, held.as_ref().and_then(|h| h.get(at)))
+                })
+                .collect(),
+            tolerance: assessment
+                .tolerance_m
+                .zip(held.as_ref())
+                .map(|(limit, held)| ToleranceEntry {
+                    tolerance_um: um(limit),
+                    pass: held.iter().all(|h| h.worst() == Verdict::Pass),
+                    largest_feed: tolerance::largest_feeds(report, limit),
+                }),
             ballbar20: ballbar.map(|b| BallbarEntry {
                 machine: b.machine.clone(),
                 plane: b.plane.clone(),
@@ -156,7 +209,19 @@ fn run(run: &RunAnalysis, frame: Option<&Location>) -> RunEntry {
     }
 }
 
-fn iso(iso: &Iso230) -> IsoEntry {
+fn iso(iso: &Iso230, budget: &Iso230Budget, held: Option<&Held>) -> IsoEntry {
+    let figures = tolerance::figures(iso, budget);
+    let named = || tolerance::FIGURES.into_iter().zip(&figures);
+    let parts = |budget: &Budget| {
+        let part = |p: &uncertainty::Part| {
+            let entry = BudgetEntry {
+                standard_um: um(p.standard_m),
+                known: p.known,
+            };
+            (p.source, entry)
+        };
+        budget.parts.iter().map(part).collect()
+    };
     IsoEntry {
         radius_mm: mm(iso.radius_m),
         feed_mm_s: mm(iso.feed_m_s),
@@ -166,5 +231,15 @@ fn iso(iso: &Iso230) -> IsoEntry {
         f_max_um: um(iso.f_max_m),
         f_min_um: um(iso.f_min_m),
         d_um: iso.d_m.map(um),
+        uncertainty_um: named()
+            .filter_map(|(name, f)| f.map(|(_, budget)| (name, um(budget.expanded_m()))))
+            .collect(),
+        budget_um: named()
+            .filter_map(|(name, f)| f.map(|(_, budget)| (name, parts(&budget))))
+            .collect(),
+        verdict: held.map(|held| {
+            let named = tolerance::FIGURES.into_iter().zip(held.verdicts);
+            named.filter_map(|(name, v)| v.map(|v| (name, v))).collect()
+        }),
     }
 }

@@ -9,6 +9,8 @@
 //! | `parity` | even and odd part of a pair |
 //! | `report` | whole campaigns, in memory or from files |
 //! | `counterparts` | figures in the terms of ballbar software |
+//! | `uncertainty` | expanded uncertainty of the figures, with its budget |
+//! | `tolerance` | pass or fail of each figure, the largest feed that holds |
 //! | `json` | the contract's document |
 mod counterparts;
 mod harmonics;
@@ -20,11 +22,13 @@ mod report;
 mod run;
 #[cfg(test)]
 mod tests;
+pub mod tolerance;
+pub mod uncertainty;
 
 pub use counterparts::{Counterparts, counterparts};
 pub use harmonics::{HIGHEST_ORDER, Harmonic};
 pub use iso230::{Iso230, pairs};
-pub use json::Document;
+pub use json::{Assessment, Document};
 pub use parity::{EvenOdd, even_odd, profile};
 pub use points::Polar;
 pub use report::{Report, of_campaign, of_files};

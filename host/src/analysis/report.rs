@@ -20,6 +20,10 @@ pub struct Report {
     pub iso230_4: Vec<Iso230>,
     /// Where the circles of files with positions lie, by run.
     pub frames: Vec<Option<Location>>,
+    /// Half the range of the temperatures that the runs state, K.
+    pub temperature_half_range_k: Option<f64>,
+    /// Known scatter of a circle's size between runs, m, if the campaign states it.
+    pub repeatability_m: Option<f64>,
     /// What the reader should know.
     pub notes: Vec<Note>,
 }
@@ -64,12 +68,22 @@ pub fn of_campaign(campaign: &Campaign) -> Result<Report, (usize, CircleError)> 
         runs,
         iso230_4: iso.concat(),
         frames,
+        temperature_half_range_k: half_range(campaign.runs.iter().map(|r| r.temperature_c)),
+        repeatability_m: campaign.repeatability_m,
         notes: Vec::new(),
     })
 }
 
 fn of(run: &Run) -> (f64, f64, crate::campaign::Direction) {
     (run.radius_m, run.feed_m_s, run.direction)
+}
+
+/// Half the range of what is stated; `None` if nothing is.
+fn half_range(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
+    let stated: Vec<f64> = values.flatten().collect();
+    let low = stated.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = stated.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    (high >= low).then(|| 0.5 * (high - low))
 }
 
 /// What is left of a run when its samples are gone.
@@ -170,6 +184,8 @@ pub fn of_files(manifest: &Manifest, progress: impl Fn() + Sync) -> Result<Repor
         runs: Vec::with_capacity(runs.len()),
         iso230_4: iso,
         frames: Vec::with_capacity(runs.len()),
+        temperature_half_range_k: half_range(runs.iter().map(|d| d.loaded.run.temperature_c)),
+        repeatability_m: manifest.repeatability_m,
         notes: manifest.notes.clone(),
     };
     for done in runs {

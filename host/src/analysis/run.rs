@@ -24,6 +24,8 @@ pub struct RunAnalysis {
     /// Centre of the least-squares circle, m: about the programmed centre, or in the coordinates of the file
     /// where it holds positions.
     pub centre_m: [f64; 2],
+    /// The same about the centre that the instrument measured from, m.
+    pub set_up_m: [f64; 2],
     /// Radius of the least-squares circle minus programmed radius, m.
     pub radius_error_m: f64,
     /// Standard error of `radius_error_m` within this run, m, for samples as correlated as these are. It says
@@ -41,6 +43,14 @@ pub struct RunAnalysis {
     pub arc_rad: Option<f64>,
     /// Number of samples.
     pub samples: usize,
+}
+
+impl RunAnalysis {
+    /// Distance of the circle's centre from where the instrument was centred, m. It shows in the first wave of the
+    /// deviation: where a file holds positions its coordinates are no offset.
+    pub fn centre_offset_m(&self) -> f64 {
+        self.set_up_m[0].hypot(self.set_up_m[1])
+    }
 }
 
 /// Extremes and lagged products of residuals.
@@ -133,6 +143,7 @@ pub fn of_run(run: &Run, turn_s: Option<f64>) -> Result<RunAnalysis, CircleError
         direction: run.direction,
         measured_feed_m_s: turn_s.map(|t| TAU * run.radius_m / t),
         centre_m: centre,
+        set_up_m: centre,
         radius_error_m: radius - run.radius_m,
         radius_error_se_m: radius_se(&fit, &seen, form.len(), samples.deviation_m.len() as f64),
         out_of_roundness_m: seen.distance[1] - seen.distance[0],

@@ -1,9 +1,11 @@
 //! Writing campaigns in the contract's files.
 use super::error::{CampaignError, Place, Problem};
 use super::{Campaign, Direction, Frame, Plane, Run};
+use crate::whole_file;
+pub(crate) use crate::whole_file::make_public;
 use std::collections::HashSet;
 use std::fmt::Write as _;
-use std::io::{BufWriter, Write};
+use std::io::Write;
 use std::path::{Component, Path};
 use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, value};
 
@@ -69,28 +71,8 @@ fn make_dir(dir: &Path) -> Result<(), CampaignError> {
 
 /// Writes a file whole or not at all.
 pub fn replace(path: &Path, text: &str) -> Result<(), CampaignError> {
-    let io = |e: std::io::Error| CampaignError::io(path, "written", "a place for a file", &e);
-    let dir = path
-        .parent()
-        .filter(|p| !p.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(dir).map_err(io)?;
-    file.write_all(text.as_bytes()).map_err(io)?;
-    make_public(file.as_file()).map_err(io)?;
-    file.persist(path).map_err(|e| io(e.error))?;
-    Ok(())
-}
-
-/// A temporary file is private by default; a campaign is to be shared like any other file.
-pub(crate) fn make_public(file: &std::fs::File) -> std::io::Result<()> {
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt as _;
-        file.set_permissions(std::fs::Permissions::from_mode(0o644))?;
-    }
-    #[cfg(not(unix))]
-    let _ = file;
-    Ok(())
+    whole_file::write(path, text.as_bytes())
+        .map_err(|e| CampaignError::io(path, "written", "a place for a file", &e))
 }
 
 /// The `[[run]]` table of a run.
@@ -136,8 +118,11 @@ fn plain(v: f64) -> f64 {
 }
 
 fn write_samples(run: &Run, path: &Path) -> Result<(), CampaignError> {
-    let io = |e: std::io::Error| CampaignError::io(path, "written", "a place for a file", &e);
-    let mut out = BufWriter::new(std::fs::File::create(path).map_err(io)?);
+    whole_file::with(path, |out| fill(run, out))
+        .map_err(|e| CampaignError::io(path, "written", "a place for a file", &e))
+}
+
+fn fill(run: &Run, out: &mut dyn Write) -> std::io::Result<()> {
     let samples = &run.samples;
     let rows = samples.deviation_m.len();
     let mut line = String::with_capacity(64);
@@ -155,8 +140,7 @@ fn write_samples(run: &Run, path: &Path) -> Result<(), CampaignError> {
         (false, _, true) => &["deviation_um"],
         (false, _, false) => &["angle_deg", "deviation_um"],
     });
-    out.write_all((header.join(",") + "\n").as_bytes())
-        .map_err(io)?;
+    out.write_all((header.join(",") + "\n").as_bytes())?;
     for k in 0..rows {
         line.clear();
         let (angle, deviation) = (samples.angle_rad[k], samples.deviation_m[k]);
@@ -178,9 +162,9 @@ fn write_samples(run: &Run, path: &Path) -> Result<(), CampaignError> {
         } else {
             number(&mut line, deviation * 1e6, 6, b'\n');
         }
-        out.write_all(line.as_bytes()).map_err(io)?;
+        out.write_all(line.as_bytes())?;
     }
-    out.flush().map_err(io)
+    Ok(())
 }
 
 /// A decimal without trailing zeros (one is kept), and what follows it.

@@ -1,11 +1,10 @@
-//! Lost motion at a reversal: `r = d(B/2)·sgn(sinψ)·cosψ` for X, `−d(B/2)·sgn(cosψ)·sinψ` for Y.
+//! Lost motion at a reversal: `r = d(B/2)·sgn(sinψ)·cosψ` for X in an XY circle,
+//! `−d(B/2)·sgn(cosψ)·sinψ` for Y.
 //!
 //! The play is crossed while the axis turns round, in an angle √(2B/R); the shape parameter `play_m` (|B|) gives
 //! the signature that ramp: after the reversal the output stands still until the input has come back by B.
-use super::view::axes_of;
-use super::{Cause, CauseModel, EACH_AXIS, Effect, RunView, Stroke, Words};
+use super::{Cause, CauseModel, Effect, Parameter, RunView, Seat, Site, Stroke, Words};
 use crate::simulation::machine::Machine;
-use giotto_shared::Axis;
 use giotto_shared::term::Term;
 
 /// See the module.
@@ -26,6 +25,9 @@ const WORDS: Words = Words {
 /// Largest play, m: a millimetre is crossed in a few degrees of any circle worth measuring. A longer crossing is no
 /// reversal any more but an oval, and belongs to another cause.
 const LARGEST_PLAY_M: f64 = 1e-3;
+/// In the contract's unit.
+const SIZE: Parameter =
+    Parameter::needed("value", [-5.0, 5.0], "mm: as much as a table may correct");
 
 impl CauseModel for Backlash {
     fn cause(&self) -> Cause {
@@ -36,8 +38,12 @@ impl CauseModel for Backlash {
         &WORDS
     }
 
-    fn axes(&self) -> &'static [Option<Axis>] {
-        EACH_AXIS
+    fn size(&self) -> &'static Parameter {
+        &SIZE
+    }
+
+    fn seat(&self) -> Seat {
+        Seat::One
     }
 
     fn shape_names(&self) -> &'static [&'static str] {
@@ -58,15 +64,17 @@ impl CauseModel for Backlash {
 
     fn signature(
         &self,
-        axis: Option<Axis>,
+        site: Site,
         shape: &[f64],
         _column: usize,
         view: &RunView,
         out: &mut [f64],
     ) {
+        let Site::One(axis) = site else { return };
         let play_m = shape.first().copied().unwrap_or(0.0);
+        let swing = view.swing(axis);
         for (out, Stroke { facing, .. }) in out.iter_mut().zip(view.strokes_of(axis)) {
-            let back_m = view.radius_m * (1.0 - facing);
+            let back_m = view.radius_m * (swing - facing);
             let crossed = if play_m > 0.0 {
                 (back_m / play_m).min(1.0)
             } else {
@@ -82,15 +90,18 @@ impl CauseModel for Backlash {
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
-        for axis in axes_of(effect) {
-            machine.backlash_m[axis.index()] += effect.value * 1e-3;
+        if let Site::One(axis) = effect.site() {
+            machine.backlash_m[axis.index()] += effect.value() * 1e-3;
         }
     }
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
+        let Site::One(actuator) = effect.site() else {
+            return None;
+        };
         Some(Term::Backlash {
-            axis: effect.axis?,
-            step_m: effect.value * 1e-3,
+            actuator,
+            step_m: effect.value() * 1e-3,
         })
     }
 }

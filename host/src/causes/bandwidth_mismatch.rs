@@ -1,7 +1,6 @@
 //! Unequal second cumulants: `r = −(Δκ2/4)(f²/R)·|G|·cos2ψ`, the same both ways: a filter before or behind the servo.
-use super::{Cause, CauseModel, Effect, Harmonics, RunView, Words};
+use super::{Cause, CauseModel, Effect, Harmonics, Parameter, RunView, Seat, Site, Words};
 use crate::simulation::machine::Machine;
-use giotto_shared::Axis;
 use giotto_shared::term::Term;
 
 /// See the module.
@@ -19,6 +18,13 @@ const WORDS: Words = Words {
     not_compensable: None,
 };
 
+/// In the contract's unit.
+const SIZE: Parameter = Parameter::needed(
+    "value",
+    [-1e-2, 1e-2],
+    "s²: a lag of 100 ms on one axis alone",
+);
+
 impl CauseModel for BandwidthMismatch {
     fn cause(&self) -> Cause {
         Cause::BandwidthMismatch
@@ -28,18 +34,34 @@ impl CauseModel for BandwidthMismatch {
         &WORDS
     }
 
-    fn harmonics(&self, _axis: Option<Axis>, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
+    fn size(&self) -> &'static Parameter {
+        &SIZE
+    }
+
+    fn seat(&self) -> Seat {
+        Seat::Pair
+    }
+
+    fn harmonics(&self, site: Site, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
+        let Site::Pair(plane) = site else { return None };
         let size = -0.25 * view.radius_m * view.omega_rad_s.powi(2) * view.gain;
-        Some(Harmonics::wave(2, [size, 0.0]))
+        let [first, second] = plane.axes().map(|axis| view.cosine(axis).squared());
+        Some(first.minus(&second).times(size))
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
-        machine.split_bandwidth(effect.value);
+        if let Site::Pair(plane) = effect.site() {
+            machine.split_bandwidth(plane, effect.value());
+        }
     }
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
+        let Site::Pair(plane) = effect.site() else {
+            return None;
+        };
         Some(Term::BandwidthMismatch {
-            delta_kappa2_s2: effect.value,
+            plane,
+            delta_kappa2_s2: effect.value(),
         })
     }
 }

@@ -1,9 +1,7 @@
 //! Periodic error of screw or gear: `r = A·cosψ·sin(2πR·cosψ/P + φ)` for X, with sin for Y: a chirp over the circle.
-use super::view::axes_of;
-use super::{Bend, Cause, CauseModel, EACH_AXIS, Effect, RunView, Words};
+use super::{Bend, Cause, CauseModel, Effect, Fitted, Parameter, RunView, Seat, Site, Words};
 use crate::simulation::machine::Cyclic;
 use crate::simulation::machine::Machine;
-use giotto_shared::Axis;
 use giotto_shared::term::Term;
 use wide::f64x4;
 
@@ -21,6 +19,26 @@ const WORDS: Words = Words {
     next: "a slow line along the axis over a few pitches",
     not_compensable: None,
 };
+
+/// In the contract's unit.
+const SIZE: Parameter = Parameter::needed(
+    "value",
+    [0.0, 1e3],
+    "µm of amplitude: beyond a millimetre it is no error of a pitch",
+);
+
+/// Period of the error.
+const PITCH_MM: Parameter = Parameter::needed(
+    "pitch_mm",
+    [0.1, 1e4],
+    "period along the axis; a table takes 0.1 mm to 10 m",
+);
+/// Phase at machine position 0.
+const PHASE_RAD: Parameter = Parameter::needed(
+    "phase_rad",
+    [-6.3, 6.3],
+    "phase at machine position 0, one turn to either side",
+);
 
 /// Waves a metre of the shortest pitch that is looked for: 300 to the diameter of the largest circle, 1 mm at least.
 pub fn finest_wave_per_m(views: &[RunView]) -> f64 {
@@ -40,8 +58,25 @@ impl CauseModel for CyclicError {
         &WORDS
     }
 
-    fn axes(&self) -> &'static [Option<Axis>] {
-        EACH_AXIS
+    fn size(&self) -> &'static Parameter {
+        &SIZE
+    }
+
+    fn seat(&self) -> Seat {
+        Seat::One
+    }
+
+    fn parameters(&self) -> &'static [&'static Parameter] {
+        &[&PITCH_MM, &PHASE_RAD]
+    }
+
+    fn stated(&self, fit: &Fitted<'_>) -> Vec<(&'static Parameter, f64)> {
+        let pitch_m = fit.shape.first().copied().unwrap_or(f64::NAN);
+        let phase_rad = match fit.amounts {
+            [sine, cosine] => cosine.atan2(*sine),
+            _ => f64::NAN,
+        };
+        vec![(&PITCH_MM, pitch_m * 1e3), (&PHASE_RAD, phase_rad)]
     }
 
     fn shape_names(&self) -> &'static [&'static str] {
@@ -73,48 +108,33 @@ impl CauseModel for CyclicError {
         2
     }
 
-    fn signature(
-        &self,
-        axis: Option<Axis>,
-        shape: &[f64],
-        column: usize,
-        view: &RunView,
-        out: &mut [f64],
-    ) {
-        let Some(pitch_m) = shape.first() else { return };
+    fn signature(&self, site: Site, shape: &[f64], column: usize, view: &RunView, out: &mut [f64]) {
+        let (Some(pitch_m), Site::One(axis)) = (shape.first(), site) else {
+            return;
+        };
         let wave = std::f64::consts::TAU * view.radius_m / pitch_m;
-        let at = usize::from(axis == Some(Axis::Y));
+        let from = std::f64::consts::TAU * view.centre_m[axis.index()] / pitch_m;
         for (out, direction) in out.iter_mut().zip(view.direction.iter()) {
-            let along = direction[at];
-            *out = 1e-6
-                * along
-                * if column == 0 {
-                    (wave * along).sin()
-                } else {
-                    (wave * along).cos()
-                };
+            let along = direction[axis.index()];
+            let (sin, cos) = (from + wave * along).sin_cos();
+            *out = 1e-6 * along * if column == 0 { sin } else { cos };
         }
     }
 
     /// Sine and cosine together, four samples at a time.
-    fn signatures(
-        &self,
-        axis: Option<Axis>,
-        shape: &[f64],
-        view: &RunView,
-        out: &mut [&mut [f64]],
-    ) {
-        let (Some(pitch_m), [sines, cosines]) = (shape.first(), out) else {
+    fn signatures(&self, site: Site, shape: &[f64], view: &RunView, out: &mut [&mut [f64]]) {
+        let (Some(pitch_m), Site::One(axis), [sines, cosines]) = (shape.first(), site, out) else {
             return;
         };
+        let at = axis.index();
         let wave = std::f64::consts::TAU * view.radius_m / pitch_m;
-        let at = usize::from(axis == Some(Axis::Y));
+        let from = f64x4::splat(std::f64::consts::TAU * view.centre_m[at] / pitch_m);
         let outs = sines.chunks_mut(4).zip(cosines.chunks_mut(4));
         for ((sines, cosines), part) in outs.zip(view.direction.chunks(4)) {
             let along = f64x4::from(std::array::from_fn(|k| {
                 part.get(k).map_or(0.0, |direction| direction[at])
             }));
-            let (sin, cos) = (along * wave).sin_cos();
+            let (sin, cos) = (along * wave + from).sin_cos();
             let scaled = along * 1e-6;
             for (k, (sine, cosine)) in sines.iter_mut().zip(cosines).enumerate() {
                 (*sine, *cosine) = ((scaled * sin).as_array()[k], (scaled * cos).as_array()[k]);
@@ -123,21 +143,24 @@ impl CauseModel for CyclicError {
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
-        for axis in axes_of(effect) {
+        if let Site::One(axis) = effect.site() {
             machine.cyclic[axis.index()] = Some(Cyclic {
-                amplitude_m: effect.value * 1e-6,
-                pitch_m: effect.param("pitch_mm", 10.0) * 1e-3,
-                phase_rad: effect.param("phase_rad", 0.0),
+                amplitude_m: effect.value() * 1e-6,
+                pitch_m: effect.get(&PITCH_MM) * 1e-3,
+                phase_rad: effect.get(&PHASE_RAD),
             });
         }
     }
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
+        let Site::One(actuator) = effect.site() else {
+            return None;
+        };
         Some(Term::Cyclic {
-            axis: effect.axis?,
-            amplitude_m: effect.value * 1e-6,
-            pitch_m: effect.param("pitch_mm", 10.0) * 1e-3,
-            phase_rad: effect.param("phase_rad", 0.0),
+            actuator,
+            amplitude_m: effect.value() * 1e-6,
+            pitch_m: effect.get(&PITCH_MM) * 1e-3,
+            phase_rad: effect.get(&PHASE_RAD),
         })
     }
 }

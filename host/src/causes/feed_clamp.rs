@@ -1,5 +1,5 @@
 //! The controller slows arcs to a centripetal acceleration: f = min(f, √(a·R)); the turn lasts longer.
-use super::{Cause, CauseModel, Effect, Evidence, Words};
+use super::{Cause, CauseModel, Effect, Evidence, Parameter, Words};
 use crate::simulation::machine::Machine;
 
 /// See the module.
@@ -19,6 +19,13 @@ const WORDS: Words = Words {
     ),
 };
 
+/// In the contract's unit.
+const SIZE: Parameter = Parameter::needed(
+    "value",
+    [1.0, 1e6],
+    "mm/s²: from a crawl to a hundred times gravity",
+);
+
 impl CauseModel for FeedClamp {
     fn cause(&self) -> Cause {
         Cause::FeedClamp
@@ -28,11 +35,15 @@ impl CauseModel for FeedClamp {
         &WORDS
     }
 
+    fn size(&self) -> &'static Parameter {
+        &SIZE
+    }
+
     fn evidence(&self) -> Evidence {
         Evidence::Duration
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
-        machine.centripetal_limit_m_s2 = Some(effect.value * 1e-3);
+        machine.centripetal_limit_m_s2 = Some(effect.value() * 1e-3);
     }
 }

@@ -24,6 +24,51 @@ impl Harmonics {
         self
     }
 
+    /// So many times.
+    pub fn times(&self, factor: f64) -> Self {
+        Self(self.0.map(|pair| pair.map(|v| v * factor)))
+    }
+
+    /// Less another.
+    pub fn minus(&self, other: &Self) -> Self {
+        Self(std::array::from_fn(|order| {
+            let ([a, b], [c, d]) = (self.0[order], other.0[order]);
+            [a - c, b - d]
+        }))
+    }
+
+    /// Both multiplied; orders above [`ORDERS`] are left out.
+    pub fn product(&self, other: &Self) -> Self {
+        let mut out = Self::default();
+        let is = |h: &Self, order: usize| h.0[order] != [0.0; 2];
+        for i in (0..=ORDERS).filter(|&i| is(self, i)) {
+            for j in (0..=ORDERS).filter(|&j| is(other, j)) {
+                // (a cos iθ + b sin iθ)(c cos jθ + e sin jθ): half of the sum and of the difference of the orders.
+                let ([a, b], [c, e]) = (self.0[i], other.0[j]);
+                let half = if i == 0 || j == 0 { 1.0 } else { 0.5 };
+                if i + j <= ORDERS {
+                    let sum = &mut out.0[i + j];
+                    sum[0] += half * (a * c - b * e);
+                    sum[1] += half * (a * e + b * c);
+                }
+                if i != 0 && j != 0 {
+                    let sign = if i >= j { 1.0 } else { -1.0 };
+                    let difference = &mut out.0[i.abs_diff(j)];
+                    difference[0] += half * (a * c + b * e);
+                    if i != j {
+                        difference[1] += half * sign * (b * c - a * e);
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    /// Multiplied by itself.
+    pub fn squared(&self) -> Self {
+        self.product(self)
+    }
+
     /// The same pattern as waves of an angle that is larger by `ahead_rad`.
     pub fn seen_from(&self, ahead_rad: f64) -> Self {
         let mut out = *self;
@@ -55,6 +100,21 @@ impl Harmonics {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn products_are_those_of_the_values() {
+        let one = Harmonics::mean(0.3)
+            .with(1, [1.0, -0.4])
+            .with(3, [0.2, 2.0]);
+        let other = Harmonics::mean(-1.1)
+            .with(1, [0.5, 0.7])
+            .with(4, [0.1, -0.6]);
+        for angle in [0.0_f64, 0.7, 3.9, -2.0] {
+            let expected = one.at(angle) * other.at(angle);
+            assert!((one.product(&other).at(angle) - expected).abs() < 1e-14);
+            assert!((one.squared().at(angle) - one.at(angle).powi(2)).abs() < 1e-14);
+        }
+    }
 
     #[test]
     fn a_pattern_is_the_same_seen_from_another_angle() {

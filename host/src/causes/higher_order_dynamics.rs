@@ -2,9 +2,8 @@
 //!
 //! (R/Rm)² = 1 + κ2 ω² + b ω⁴ is exact for a lag (b = 0) and for a second-order response (b = 1/ωn⁴), so the
 //! signature is taken there; the value is β2 beyond the lag's own 3κ2²/8: −b/2.
-use super::{Cause, CauseModel, Effect, Harmonics, RunView, Words};
+use super::{Cause, CauseModel, Effect, Harmonics, Parameter, RunView, Site, Words};
 use crate::simulation::machine::Machine;
-use giotto_shared::Axis;
 
 /// See the module.
 pub struct HigherOrderDynamics;
@@ -21,6 +20,9 @@ const WORDS: Words = Words {
     not_compensable: None,
 };
 
+/// In the contract's unit.
+const SIZE: Parameter = Parameter::needed("value", [-1e-3, 1e-3], "s⁴: a resonance at 5 rad/s");
+
 impl CauseModel for HigherOrderDynamics {
     fn cause(&self) -> Cause {
         Cause::HigherOrderDynamics
@@ -30,12 +32,16 @@ impl CauseModel for HigherOrderDynamics {
         &WORDS
     }
 
-    fn harmonics(&self, _axis: Option<Axis>, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
+    fn size(&self) -> &'static Parameter {
+        &SIZE
+    }
+
+    fn harmonics(&self, _site: Site, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
         let (r, w) = (view.radius_m, view.omega_rad_s);
         Some(Harmonics::mean(r * w.powi(4) * view.gain.powi(3)))
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
-        machine.add_beta2(effect.value);
+        machine.add_beta2(effect.value());
     }
 }

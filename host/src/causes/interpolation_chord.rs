@@ -1,5 +1,5 @@
 //! Set-points every Δt joined by chords: scallops of period Δt, as deep as f²Δt²/(8R) before the servo smooths them.
-use super::{Cause, CauseModel, Effect, Evidence, Words};
+use super::{Cause, CauseModel, Effect, Evidence, Parameter, Words};
 use crate::simulation::machine::Machine;
 
 /// See the module.
@@ -20,6 +20,23 @@ const WORDS: Words = Words {
 /// Longest set-point period, s: the slowest controllers and stream protocols give 20 to 30 set-points a second. A longer
 /// ripple is not made by set-points.
 const LONGEST_S: f64 = 0.05;
+/// In the contract's unit.
+const SIZE: Parameter = Parameter::needed(
+    "value",
+    [1e-5, 1.0],
+    "s: from 100 kHz to one set-point a second",
+);
+
+/// Amplitude of the tone, µm: what the circles show; the controller does not use it.
+const AMPLITUDE_UM: Parameter = Parameter::optional(
+    "amplitude_um",
+    [0.0, 1e4],
+    0.0,
+    "amplitude along the radius",
+);
+/// Frequency of the scallops, Hz: 1/Δt.
+const FREQUENCY_HZ: Parameter =
+    Parameter::optional("frequency_hz", [0.0, 1e5], 0.0, "set-points a second");
 
 impl CauseModel for InterpolationChord {
     fn cause(&self) -> Cause {
@@ -30,6 +47,10 @@ impl CauseModel for InterpolationChord {
         &WORDS
     }
 
+    fn size(&self) -> &'static Parameter {
+        &SIZE
+    }
+
     fn evidence(&self) -> Evidence {
         Evidence::Tone
     }
@@ -38,7 +59,11 @@ impl CauseModel for InterpolationChord {
         period_s > 0.0 && period_s <= LONGEST_S
     }
 
+    fn parameters(&self) -> &'static [&'static Parameter] {
+        &[&AMPLITUDE_UM, &FREQUENCY_HZ]
+    }
+
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
-        machine.interpolation_s = Some(effect.value);
+        machine.interpolation_s = Some(effect.value());
     }
 }

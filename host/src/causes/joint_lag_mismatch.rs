@@ -1,7 +1,6 @@
 //! Serial arm whose joints lag unequally: mean `r = −½·f·d·(A12 − A21)`, A = J·diag(τ)·J⁻¹.
-use super::{Cause, CauseModel, Effect, Harmonics, RunView, Words};
+use super::{Cause, CauseModel, Effect, Harmonics, Parameter, RunView, Site, Words};
 use crate::simulation::machine::Machine;
-use giotto_shared::Axis;
 
 /// See the module.
 pub struct JointLagMismatch;
@@ -18,6 +17,9 @@ const WORDS: Words = Words {
     not_compensable: Some("the table has no model of the arm: its size changes with the place"),
 };
 
+/// In the contract's unit.
+const SIZE: Parameter = Parameter::needed("value", [-1.0, 1.0], "s: a lag of a second");
+
 impl CauseModel for JointLagMismatch {
     fn cause(&self) -> Cause {
         Cause::JointLagMismatch
@@ -27,11 +29,15 @@ impl CauseModel for JointLagMismatch {
         &WORDS
     }
 
-    fn harmonics(&self, _axis: Option<Axis>, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
+    fn size(&self) -> &'static Parameter {
+        &SIZE
+    }
+
+    fn harmonics(&self, _site: Site, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
         Some(Harmonics::mean(-0.5 * view.feed_m_s * view.sign))
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
-        machine.cross_lag_s += effect.value;
+        machine.cross_lag_s += effect.value();
     }
 }

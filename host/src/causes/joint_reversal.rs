@@ -1,5 +1,5 @@
 //! Serial arm: reversal spikes where a joint, not an axis, stands still. Not looked for in two-axis data: such spikes come out as unexplained, with their place.
-use super::{Cause, CauseModel, Effect, Evidence, Words};
+use super::{Cause, CauseModel, Effect, Evidence, Parameter, Words};
 use crate::simulation::machine::Machine;
 
 /// See the module.
@@ -17,6 +17,9 @@ const WORDS: Words = Words {
     not_compensable: Some("the table has no model of the arm"),
 };
 
+/// In the contract's unit.
+const SIZE: Parameter = Parameter::needed("value", [-1e4, 1e4], "µm at the tool");
+
 impl CauseModel for JointReversal {
     fn cause(&self) -> Cause {
         Cause::JointReversal
@@ -26,10 +29,14 @@ impl CauseModel for JointReversal {
         &WORDS
     }
 
+    fn size(&self) -> &'static Parameter {
+        &SIZE
+    }
+
     fn evidence(&self) -> Evidence {
         Evidence::NotLooked
     }
 
-    /// Without a model of the arm there is nothing to move: the simulation has two straight axes.
+    /// Without a model of the arm there is nothing to move: the simulation has straight axes.
     fn apply(&self, _effect: &Effect, _machine: &mut Machine) {}
 }

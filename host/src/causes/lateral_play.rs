@@ -1,10 +1,9 @@
 //! A carriage that shifts sideways with its direction of travel: `r = −d(L/2)|sinψ|` (X moves, Y shifts),
 //! `−d(L/2)|cosψ|` (Y moves, X shifts). It moves the mean radius by −dL/π.
-use super::view::axes_of;
-use super::{Cause, CauseModel, EACH_AXIS, Effect, RunView, Words};
+use super::{Cause, CauseModel, Effect, Parameter, RunView, Seat, Site, Words};
 use crate::simulation::machine::Machine;
-use giotto_shared::Axis;
 use giotto_shared::term::Term;
+use giotto_shared::{Actuator, Plane};
 
 /// See the module.
 pub struct LateralPlay;
@@ -21,6 +20,10 @@ const WORDS: Words = Words {
     not_compensable: None,
 };
 
+/// In the contract's unit.
+const SIZE: Parameter =
+    Parameter::needed("value", [-5.0, 5.0], "mm: as much as a table may correct");
+
 impl CauseModel for LateralPlay {
     fn cause(&self) -> Cause {
         Cause::LateralPlay
@@ -30,34 +33,60 @@ impl CauseModel for LateralPlay {
         &WORDS
     }
 
-    fn axes(&self) -> &'static [Option<Axis>] {
-        EACH_AXIS
+    fn size(&self) -> &'static Parameter {
+        &SIZE
+    }
+
+    fn seat(&self) -> Seat {
+        Seat::Across
     }
 
     fn signature(
         &self,
-        axis: Option<Axis>,
+        site: Site,
         _shape: &[f64],
         _column: usize,
         view: &RunView,
         out: &mut [f64],
     ) {
-        let side = usize::from(axis != Some(Axis::Y));
-        for (out, direction) in out.iter_mut().zip(view.direction.iter()) {
-            *out = -0.5e-3 * view.sign * direction[side].abs();
+        let Site::Across(moving, shifted) = site else {
+            return;
+        };
+        let sense = sense_of(moving, shifted);
+        let strokes = view.strokes_of(moving).iter().zip(view.direction.iter());
+        for (out, (stroke, direction)) in out.iter_mut().zip(strokes) {
+            // After a reversal the slide faces one way and travels the other.
+            let travel = -(stroke.facing * direction[moving.index()]).signum();
+            *out = 0.5e-3 * sense * travel * direction[shifted.index()];
         }
     }
 
+    fn flexible(&self) -> bool {
+        true
+    }
+
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
-        for axis in axes_of(effect) {
-            machine.lateral_play_m[axis.index()] += effect.value * 1e-3;
+        if let Site::Across(moving, shifted) = effect.site() {
+            machine.lateral_play_m[moving.index()][shifted.index()] += effect.value() * 1e-3;
         }
     }
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
+        let Site::Across(actuator, across) = effect.site() else {
+            return None;
+        };
         Some(Term::LateralPlay {
-            axis: effect.axis?,
-            shift_m: effect.value * 1e-3,
+            actuator,
+            across,
+            shift_m: effect.value() * 1e-3,
         })
+    }
+}
+
+/// The shift is positive from the first axis of a plane to its second, negative the other way round.
+fn sense_of(moving: Actuator, shifted: Actuator) -> f64 {
+    match Plane::of(moving, shifted) {
+        Some(plane) if plane.axes() == [moving, shifted] => 1.0,
+        _ => -1.0,
     }
 }

@@ -1,7 +1,7 @@
 //! Causes: one file each. A cause knows its signature in measured circles, its element in the
 //! simulation, its inverse if it has one, and the words for a person. Causes know nothing of each other.
 //!
-//! To add a cause: write its file, add it to [`Cause`] and to [`ALL`].
+//! To add a cause: write its file, name its module and add one line to the list of [`register`].
 mod backlash;
 mod bandwidth_mismatch;
 pub mod cyclic_error;
@@ -12,82 +12,75 @@ mod interpolation_chord;
 mod joint_lag_mismatch;
 mod joint_reversal;
 mod lateral_play;
+mod motion;
+mod parameter;
 mod radius_offset;
+pub mod remedy;
 mod reversal_spike;
 mod scale_error;
 mod scale_mismatch;
 mod servo_mismatch;
+mod site;
 mod squareness;
 mod stick_slip;
 mod straightness;
 mod thermal_drift;
 mod vibration;
-mod view;
 mod words;
+mod written;
 
 pub use harmonics::{Harmonics, ORDERS};
-pub use view::{RunView, Stroke};
+pub use motion::{RunView, Stroke};
+pub use parameter::{Effect, EffectError, Parameter, Parameters};
+pub use site::{Seat, Site};
 pub use words::Words;
+pub(crate) use written::WrittenEffect;
 
 use crate::simulation::machine::Machine;
-use giotto_shared::Axis;
 use giotto_shared::term::Term;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 
-/// The closed list of the contract.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-#[allow(missing_docs, reason = "each cause is documented in its own file")]
-pub enum Cause {
-    HigherOrderDynamics,
-    RadiusOffset,
-    ScaleError,
-    ScaleMismatch,
-    Squareness,
-    ServoMismatch,
-    BandwidthMismatch,
-    Backlash,
-    LateralPlay,
-    ReversalSpike,
-    CyclicError,
-    Straightness,
-    Vibration,
-    InterpolationChord,
-    FeedClamp,
-    ThermalDrift,
-    StickSlip,
-    JointLagMismatch,
-    JointReversal,
+/// Makes [`Cause`] and [`ALL`] from one list, in the order of the contract.
+macro_rules! register {
+    ($($file:ident::$name:ident),* $(,)?) => {
+        /// The closed list of the contract.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+        #[serde(rename_all = "snake_case")]
+        #[allow(missing_docs, reason = "each cause is documented in its own file")]
+        #[non_exhaustive]
+        pub enum Cause { $($name),* }
+
+        /// Every cause with what is known of it, in the order of the contract.
+        pub const ALL: &[&dyn CauseModel] = &[$(&$file::$name),*];
+    };
 }
 
-/// Every cause with what is known of it, in the order of the contract.
-pub const ALL: [&dyn CauseModel; 19] = [
-    &higher_order_dynamics::HigherOrderDynamics,
-    &radius_offset::RadiusOffset,
-    &scale_error::ScaleError,
-    &scale_mismatch::ScaleMismatch,
-    &squareness::Squareness,
-    &servo_mismatch::ServoMismatch,
-    &bandwidth_mismatch::BandwidthMismatch,
-    &backlash::Backlash,
-    &lateral_play::LateralPlay,
-    &reversal_spike::ReversalSpike,
-    &cyclic_error::CyclicError,
-    &straightness::Straightness,
-    &vibration::Vibration,
-    &interpolation_chord::InterpolationChord,
-    &feed_clamp::FeedClamp,
-    &thermal_drift::ThermalDrift,
-    &stick_slip::StickSlip,
-    &joint_lag_mismatch::JointLagMismatch,
-    &joint_reversal::JointReversal,
-];
+register! {
+    higher_order_dynamics::HigherOrderDynamics,
+    radius_offset::RadiusOffset,
+    scale_error::ScaleError,
+    scale_mismatch::ScaleMismatch,
+    squareness::Squareness,
+    servo_mismatch::ServoMismatch,
+    bandwidth_mismatch::BandwidthMismatch,
+    backlash::Backlash,
+    lateral_play::LateralPlay,
+    reversal_spike::ReversalSpike,
+    cyclic_error::CyclicError,
+    straightness::Straightness,
+    vibration::Vibration,
+    interpolation_chord::InterpolationChord,
+    feed_clamp::FeedClamp,
+    thermal_drift::ThermalDrift,
+    stick_slip::StickSlip,
+    joint_lag_mismatch::JointLagMismatch,
+    joint_reversal::JointReversal,
+}
 
 impl Cause {
     /// What is known of this cause.
     pub fn model(self) -> &'static dyn CauseModel {
-        // ALL is in the order of the enum (asserted by a test), so the index is in range.
+        // Both come of one list, so the index is in range.
         ALL[self as usize]
     }
 
@@ -101,31 +94,6 @@ impl Cause {
         ALL.iter()
             .find(|model| model.words().id == id)
             .map(|model| model.cause())
-    }
-}
-
-/// A cause with its fitted size: an entry of an extended model.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Effect {
-    /// Which cause.
-    pub cause: Cause,
-    /// Where, if it belongs to one axis.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub axis: Option<Axis>,
-    /// Size in the contract's unit for this cause.
-    pub value: f64,
-    /// 95 % interval of `value`.
-    #[serde(default)]
-    pub ci95: [f64; 2],
-    /// Further parameters by name, unit in the name (`pitch_mm`, `decay_s`, `phase_rad`, …).
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub params: BTreeMap<String, f64>,
-}
-
-impl Effect {
-    /// A further parameter, or what the cause assumes without it.
-    pub fn param(&self, name: &str, otherwise: f64) -> f64 {
-        self.params.get(name).copied().unwrap_or(otherwise)
     }
 }
 
@@ -168,9 +136,27 @@ pub trait CauseModel: Sync {
         Evidence::Signature
     }
 
-    /// Where it can sit: `[None]` for the machine as a whole, or each axis.
-    fn axes(&self) -> &'static [Option<Axis>] {
-        &[None]
+    /// What kind of place it sits at.
+    fn seat(&self) -> Seat {
+        Seat::Machine
+    }
+
+    /// The sites that these runs can tell of.
+    fn sites(&self, views: &[RunView]) -> Vec<Site> {
+        self.seat().sites(views)
+    }
+
+    /// Its size in the contract's unit: what a real machine can have.
+    fn size(&self) -> &'static Parameter;
+
+    /// Its further numbers in a model file.
+    fn parameters(&self) -> &'static [&'static Parameter] {
+        &[]
+    }
+
+    /// Its further numbers from what was fitted.
+    fn stated(&self, _fit: &Fitted<'_>) -> Vec<(&'static Parameter, f64)> {
+        Vec::new()
     }
 
     /// Names of the parameters that bend the signature (time constants, pitch, …).
@@ -196,41 +182,40 @@ pub trait CauseModel: Sync {
         value.is_finite()
     }
 
+    /// Whether it can take on the form of other things: beside much that is unexplained it needs to be larger.
+    fn flexible(&self) -> bool {
+        !self.shape_names().is_empty()
+    }
+
     /// Number of linear columns: 2 where the phase of the signature is free.
     fn columns(&self) -> usize {
         1
     }
 
     /// A signature that is nothing but a mean and a few waves of ψ, m per unit of the contract's value.
-    fn harmonics(&self, _axis: Option<Axis>, _shape: &[f64], _view: &RunView) -> Option<Harmonics> {
+    fn harmonics(&self, _site: Site, _shape: &[f64], _view: &RunView) -> Option<Harmonics> {
         None
     }
 
     /// Radial deviation in m per unit of the contract's value, at each sample of the run.
     fn signature(
         &self,
-        axis: Option<Axis>,
+        site: Site,
         shape: &[f64],
         _column: usize,
         view: &RunView,
         out: &mut [f64],
     ) {
-        let waves = self.harmonics(axis, shape, view).unwrap_or_default();
+        let waves = self.harmonics(site, shape, view).unwrap_or_default();
         for (out, psi) in out.iter_mut().zip(view.psi_rad.iter()) {
             *out = waves.at(*psi);
         }
     }
 
     /// All its columns in one go.
-    fn signatures(
-        &self,
-        axis: Option<Axis>,
-        shape: &[f64],
-        view: &RunView,
-        out: &mut [&mut [f64]],
-    ) {
+    fn signatures(&self, site: Site, shape: &[f64], view: &RunView, out: &mut [&mut [f64]]) {
         for (column, out) in out.iter_mut().enumerate() {
-            self.signature(axis, shape, column, view, out);
+            self.signature(site, shape, column, view, out);
         }
     }
 
@@ -249,8 +234,16 @@ pub trait CauseModel: Sync {
     }
 }
 
-/// Both axes, for causes that sit on one.
-pub(crate) const EACH_AXIS: &[Option<Axis>] = &[Some(Axis::X), Some(Axis::Y)];
+/// What a fit says of a cause beside its size.
+#[derive(Clone, Copy, Debug)]
+pub struct Fitted<'a> {
+    /// Shape parameters, in the order of the cause's names.
+    pub shape: &'a [f64],
+    /// Amount of each of its columns.
+    pub amounts: &'a [f64],
+    /// The runs.
+    pub first_view: &'a RunView,
+}
 
 #[cfg(test)]
 mod tests {

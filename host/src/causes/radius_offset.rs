@@ -1,7 +1,6 @@
 //! A constant error of the radius: `r = offset`.
-use super::{Cause, CauseModel, Effect, Harmonics, RunView, Words};
+use super::{Cause, CauseModel, Effect, Harmonics, Parameter, RunView, Site, Words};
 use crate::simulation::machine::Machine;
-use giotto_shared::Axis;
 use giotto_shared::term::Term;
 
 /// See the module.
@@ -19,6 +18,10 @@ const WORDS: Words = Words {
     not_compensable: None,
 };
 
+/// In the contract's unit.
+const SIZE: Parameter =
+    Parameter::needed("value", [-5.0, 5.0], "mm: as much as a table may correct");
+
 impl CauseModel for RadiusOffset {
     fn cause(&self) -> Cause {
         Cause::RadiusOffset
@@ -28,17 +31,21 @@ impl CauseModel for RadiusOffset {
         &WORDS
     }
 
-    fn harmonics(&self, _axis: Option<Axis>, _shape: &[f64], _view: &RunView) -> Option<Harmonics> {
+    fn size(&self) -> &'static Parameter {
+        &SIZE
+    }
+
+    fn harmonics(&self, _site: Site, _shape: &[f64], _view: &RunView) -> Option<Harmonics> {
         Some(Harmonics::mean(1e-3))
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
-        machine.radius_offset_m += effect.value * 1e-3;
+        machine.radius_offset_m += effect.value() * 1e-3;
     }
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
         Some(Term::RadiusOffset {
-            offset_m: effect.value * 1e-3,
+            offset_m: effect.value() * 1e-3,
         })
     }
 }

@@ -4,10 +4,8 @@
 //! The friction does not jump: over a presliding travel x0 it goes as 1 − 2e^{−x/x0} (Dahl; LuGre without a
 //! Stribeck dip, doi 10.1109/9.376053). The loop answers a step of it with e^{−t/decay} − e^{−t/rise}, scaled
 //! to peak 1. At high acceleration the pulse keeps its height and duration; at very low speed it is smeared.
-use super::view::axes_of;
-use super::{Bend, Cause, CauseModel, EACH_AXIS, Effect, RunView, Words};
+use super::{Bend, Cause, CauseModel, Effect, Fitted, Parameter, RunView, Seat, Site, Words};
 use crate::simulation::machine::Machine;
-use giotto_shared::Axis;
 use giotto_shared::term::Term;
 
 /// See the module.
@@ -26,11 +24,35 @@ const WORDS: Words = Words {
 };
 
 /// Decay of the loop's answer, s: from the fastest current-bound drives to an integral time that no one would keep.
-const DECAY_S: [f64; 2] = [5e-4, 0.4];
+const DECAYS_S: [f64; 2] = [5e-4, 0.4];
 /// Shortest rise, s: the cycle of a fast position loop.
 const SHORTEST_RISE_S: f64 = 5e-5;
 /// Presliding travel of guides and gears, m: ball tracks to wound-up drives.
-const PRESLIDING_M: [f64; 2] = [1e-8, 5e-4];
+const PRESLIDINGS_M: [f64; 2] = [1e-8, 5e-4];
+/// In the contract's unit.
+const SIZE: Parameter =
+    Parameter::needed("value", [-1e4, 1e4], "µm: a table corrects 5 mm at most");
+
+/// Time constant of the decay.
+const DECAY_S: Parameter = Parameter::needed(
+    "decay_s",
+    [1e-3, 1.0],
+    "time constant with which the loop takes the pulse away; a table takes 1 ms to 1 s",
+);
+/// Time constant of the rise.
+const RISE_S: Parameter = Parameter::optional(
+    "rise_s",
+    [0.0, 1.0],
+    0.002,
+    "time constant of the rise, shorter than the decay; the controller does not use it",
+);
+/// Travel over which friction turns its sign.
+const PRESLIDING_M: Parameter = Parameter::optional(
+    "presliding_m",
+    [0.0, 0.01],
+    0.0,
+    "travel over which friction turns its sign; the controller does not use it",
+);
 
 impl CauseModel for ReversalSpike {
     fn cause(&self) -> Cause {
@@ -41,8 +63,27 @@ impl CauseModel for ReversalSpike {
         &WORDS
     }
 
-    fn axes(&self) -> &'static [Option<Axis>] {
-        EACH_AXIS
+    fn size(&self) -> &'static Parameter {
+        &SIZE
+    }
+
+    fn seat(&self) -> Seat {
+        Seat::One
+    }
+
+    fn parameters(&self) -> &'static [&'static Parameter] {
+        &[&DECAY_S, &RISE_S, &PRESLIDING_M]
+    }
+
+    fn stated(&self, fit: &Fitted<'_>) -> Vec<(&'static Parameter, f64)> {
+        match fit.shape {
+            &[decay_s, rise_s, presliding_m] => vec![
+                (&DECAY_S, decay_s),
+                (&RISE_S, rise_s),
+                (&PRESLIDING_M, presliding_m),
+            ],
+            _ => Vec::new(),
+        }
     }
 
     fn shape_names(&self) -> &'static [&'static str] {
@@ -69,9 +110,9 @@ impl CauseModel for ReversalSpike {
         let [decay_s, rise_s, presliding_m] = shape else {
             return;
         };
-        *decay_s = decay_s.abs().clamp(DECAY_S[0], DECAY_S[1]);
+        *decay_s = decay_s.abs().clamp(DECAYS_S[0], DECAYS_S[1]);
         *rise_s = rise_s.abs().clamp(SHORTEST_RISE_S, *decay_s);
-        *presliding_m = presliding_m.abs().clamp(PRESLIDING_M[0], PRESLIDING_M[1]);
+        *presliding_m = presliding_m.abs().clamp(PRESLIDINGS_M[0], PRESLIDINGS_M[1]);
     }
 
     // Friction opposes the new direction: the spike is outward. An inward one is another thing, the shoulder of a step
@@ -82,16 +123,17 @@ impl CauseModel for ReversalSpike {
 
     fn signature(
         &self,
-        axis: Option<Axis>,
+        site: Site,
         shape: &[f64],
         _column: usize,
         view: &RunView,
         out: &mut [f64],
     ) {
-        let &[decay_s, rise_s, presliding_m] = shape else {
+        let (&[decay_s, rise_s, presliding_m], Site::One(axis)) = (shape, site) else {
             return;
         };
-        let pulse = Pulse::new(decay_s, rise_s, presliding_m, view);
+        let reach_m = view.radius_m * view.swing(axis);
+        let pulse = Pulse::new(decay_s, rise_s, presliding_m, reach_m, view);
         let steps_a_half_turn = view.half_turn_s() / pulse.step_s;
         for (out, stroke) in out.iter_mut().zip(view.strokes_of(axis)) {
             // Against the new direction of travel, seen along the radius.
@@ -105,21 +147,25 @@ impl CauseModel for ReversalSpike {
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
-        for axis in axes_of(effect) {
-            let mut friction = machine.friction[axis.index()].unwrap_or_default();
-            friction.peak_m += effect.value * 1e-6;
-            friction.decay_s = effect.param("decay_s", 0.03);
-            friction.rise_s = effect.param("rise_s", 0.002);
-            friction.presliding_m = effect.param("presliding_m", 0.0);
-            machine.friction[axis.index()] = Some(friction);
-        }
+        let Site::One(axis) = effect.site() else {
+            return;
+        };
+        let mut friction = machine.friction[axis.index()].unwrap_or_default();
+        friction.peak_m += effect.value() * 1e-6;
+        friction.decay_s = effect.get(&DECAY_S);
+        friction.rise_s = effect.get(&RISE_S);
+        friction.presliding_m = effect.get(&PRESLIDING_M);
+        machine.friction[axis.index()] = Some(friction);
     }
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
+        let Site::One(actuator) = effect.site() else {
+            return None;
+        };
         Some(Term::ReversalSpike {
-            axis: effect.axis?,
-            peak_m: effect.value * 1e-6,
-            decay_s: effect.param("decay_s", 0.03),
+            actuator,
+            peak_m: effect.value() * 1e-6,
+            decay_s: effect.get(&DECAY_S),
         })
     }
 }
@@ -136,13 +182,13 @@ struct Pulse {
 }
 
 impl Pulse {
-    fn new(decay_s: f64, rise_s: f64, presliding_m: f64, view: &RunView) -> Self {
+    fn new(decay_s: f64, rise_s: f64, presliding_m: f64, reach_m: f64, view: &RunView) -> Self {
         let decay_s = decay_s.abs().max(1e-4);
         let rise_s = rise_s.abs().clamp(1e-5, 0.95 * decay_s);
         let presliding_m = presliding_m.abs().max(1e-8);
         let half_turn_s = view.half_turn_s();
         // Time to slide five presliding lengths: x = ½(f²/R)t².
-        let slide_s = (10.0 * presliding_m * view.radius_m).sqrt() / view.feed_m_s;
+        let slide_s = (10.0 * presliding_m / reach_m).sqrt() / view.omega_rad_s;
         let end_s = (14.0 * decay_s + slide_s).min(half_turn_s);
         let step_s = end_s / STEPS as f64;
         let peak_s = (decay_s / rise_s).ln() * decay_s * rise_s / (decay_s - rise_s);
@@ -159,7 +205,7 @@ impl Pulse {
                 cos * turn_cos - sin * turn_sin,
                 sin * turn_cos + cos * turn_sin,
             );
-            let travel = view.radius_m * (1.0 - cos);
+            let travel = reach_m * (1.0 - cos);
             if travel > SLID * presliding_m {
                 *slot = 1.0 - before;
                 break;

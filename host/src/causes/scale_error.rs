@@ -1,7 +1,7 @@
 //! Both axes long by the same share: `r = R·s`.
-use super::{Cause, CauseModel, Effect, Harmonics, RunView, Words};
+use super::{Cause, CauseModel, Effect, Harmonics, Parameter, RunView, Seat, Site, Words};
 use crate::simulation::machine::Machine;
-use giotto_shared::Axis;
+use giotto_shared::Actuator;
 use giotto_shared::term::Term;
 
 /// See the module.
@@ -19,6 +19,13 @@ const WORDS: Words = Words {
     not_compensable: None,
 };
 
+/// In the contract's unit.
+const SIZE: Parameter = Parameter::needed(
+    "value",
+    [-1e4, 1e4],
+    "µm/m: 1 %, as much as a table may correct",
+);
+
 impl CauseModel for ScaleError {
     fn cause(&self) -> Cause {
         Cause::ScaleError
@@ -28,18 +35,36 @@ impl CauseModel for ScaleError {
         &WORDS
     }
 
-    fn harmonics(&self, _axis: Option<Axis>, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
-        Some(Harmonics::mean(1e-6 * view.radius_m))
+    fn size(&self) -> &'static Parameter {
+        &SIZE
+    }
+
+    fn seat(&self) -> Seat {
+        Seat::MachineOrOne
+    }
+
+    fn harmonics(&self, site: Site, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
+        let size = 1e-6 * view.radius_m;
+        Some(match site {
+            Site::One(axis) => view.cosine(axis).squared().times(size),
+            _ => Harmonics::mean(size),
+        })
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
-        machine.scale[0] += effect.value * 1e-6;
-        machine.scale[1] += effect.value * 1e-6;
+        for (slide, scale) in Actuator::SLIDES.into_iter().zip(&mut machine.scale) {
+            if matches!(effect.site(), Site::Machine) || effect.site() == Site::One(slide) {
+                *scale += effect.value() * 1e-6;
+            }
+        }
     }
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
-        Some(Term::ScaleError {
-            relative: effect.value * 1e-6,
-        })
+        let relative = effect.value() * 1e-6;
+        match effect.site() {
+            Site::Machine => Some(Term::ScaleError { relative }),
+            Site::One(actuator) => Some(Term::AxisScale { actuator, relative }),
+            _ => None,
+        }
     }
 }

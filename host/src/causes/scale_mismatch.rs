@@ -1,7 +1,7 @@
 //! X longer than Y: `r = ½R(sx − sy)cos2ψ`, the same both ways.
-use super::{Cause, CauseModel, Effect, Harmonics, RunView, Words};
+use super::site::in_one_plane;
+use super::{Cause, CauseModel, Effect, Harmonics, Parameter, RunView, Seat, Site, Words};
 use crate::simulation::machine::Machine;
-use giotto_shared::Axis;
 use giotto_shared::term::Term;
 
 /// See the module.
@@ -19,6 +19,13 @@ const WORDS: Words = Words {
     not_compensable: None,
 };
 
+/// In the contract's unit.
+const SIZE: Parameter = Parameter::needed(
+    "value",
+    [-1e4, 1e4],
+    "µm/m: 1 %, as much as a table may correct",
+);
+
 impl CauseModel for ScaleMismatch {
     fn cause(&self) -> Cause {
         Cause::ScaleMismatch
@@ -28,18 +35,44 @@ impl CauseModel for ScaleMismatch {
         &WORDS
     }
 
-    fn harmonics(&self, _axis: Option<Axis>, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
-        Some(Harmonics::wave(2, [0.5e-6 * view.radius_m, 0.0]))
+    fn size(&self) -> &'static Parameter {
+        &SIZE
+    }
+
+    fn seat(&self) -> Seat {
+        Seat::Pair
+    }
+
+    /// Circles in several planes show the scale of each slide: what differs then follows.
+    fn sites(&self, views: &[RunView]) -> Vec<Site> {
+        if in_one_plane(views) {
+            self.seat().sites(views)
+        } else {
+            Vec::new()
+        }
+    }
+
+    fn harmonics(&self, site: Site, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
+        let Site::Pair(plane) = site else { return None };
+        let [first, second] = plane.axes().map(|axis| view.cosine(axis).squared());
+        Some(first.minus(&second).times(0.5e-6 * view.radius_m))
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
-        machine.scale[0] += 0.5e-6 * effect.value;
-        machine.scale[1] -= 0.5e-6 * effect.value;
+        if let Site::Pair(plane) = effect.site() {
+            let [first, second] = plane.axes().map(|axis| axis.index());
+            machine.scale[first] += 0.5e-6 * effect.value();
+            machine.scale[second] -= 0.5e-6 * effect.value();
+        }
     }
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
+        let Site::Pair(plane) = effect.site() else {
+            return None;
+        };
         Some(Term::ScaleMismatch {
-            relative: effect.value * 1e-6,
+            plane,
+            relative: effect.value() * 1e-6,
         })
     }
 }

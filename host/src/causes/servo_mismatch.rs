@@ -3,9 +3,10 @@
 //! With loops of unequal gain the response differs by −jωΔτ·G², so that the oval is turned by the lag φ once
 //! more and shrunk by |G|²: `d·½fΔτ|G|²·sin(2ψ − dφ)`. With unequal dead times it is not. The shape parameter
 //! `turned` (1 or 0) is that choice.
-use super::{Bend, Cause, CauseModel, Effect, Harmonics, RunView, Words};
+use super::{
+    Bend, Cause, CauseModel, Effect, Fitted, Harmonics, Parameter, RunView, Seat, Site, Words,
+};
 use crate::simulation::machine::Machine;
-use giotto_shared::Axis;
 use giotto_shared::term::Term;
 
 /// See the module.
@@ -23,6 +24,18 @@ const WORDS: Words = Words {
     not_compensable: None,
 };
 
+/// In the contract's unit.
+const SIZE: Parameter =
+    Parameter::needed("value", [-0.02, 0.02], "s: as much as a table may correct");
+
+/// Whether the loops' gains differ (1) or their dead times (0).
+const TURNED: Parameter = Parameter::optional(
+    "turned",
+    [0.0, 1.0],
+    1.0,
+    "1: unequal gains of the loops, 0: unequal dead times",
+);
+
 impl CauseModel for ServoMismatch {
     fn cause(&self) -> Cause {
         Cause::ServoMismatch
@@ -30,6 +43,23 @@ impl CauseModel for ServoMismatch {
 
     fn words(&self) -> &'static Words {
         &WORDS
+    }
+
+    fn size(&self) -> &'static Parameter {
+        &SIZE
+    }
+
+    fn seat(&self) -> Seat {
+        Seat::Pair
+    }
+
+    fn parameters(&self) -> &'static [&'static Parameter] {
+        &[&TURNED]
+    }
+
+    fn stated(&self, fit: &Fitted<'_>) -> Vec<(&'static Parameter, f64)> {
+        let turned = fit.shape.first().copied();
+        turned.map(|turned| (&TURNED, turned)).into_iter().collect()
     }
 
     fn shape_names(&self) -> &'static [&'static str] {
@@ -44,25 +74,36 @@ impl CauseModel for ServoMismatch {
         Bend::Choice(1.0 - turned)
     }
 
-    fn harmonics(&self, _axis: Option<Axis>, shape: &[f64], view: &RunView) -> Option<Harmonics> {
+    fn harmonics(&self, site: Site, shape: &[f64], view: &RunView) -> Option<Harmonics> {
+        let Site::Pair(plane) = site else { return None };
         let turned = shape.first().copied().unwrap_or(1.0);
-        let size = 0.5 * view.sign * view.feed_m_s * (1.0 + turned * (view.gain * view.gain - 1.0));
-        // sin(2ψ − turn)
-        let (sin, cos) = (turned * view.sign * view.lag_rad).sin_cos();
-        Some(Harmonics::wave(2, [-size * sin, size * cos]))
+        let shrunk = 1.0 + turned * (view.gain * view.gain - 1.0);
+        let late_rad = turned * view.sign * view.lag_rad;
+        let [first, second] = plane.axes().map(|axis| {
+            view.cosine(axis)
+                .product(&view.velocity(axis).seen_from(late_rad))
+        });
+        Some(first.minus(&second).times(-0.5 * view.feed_m_s * shrunk))
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
-        if effect.param("turned", 1.0) > 0.5 {
-            machine.split_lag(effect.value);
+        let Site::Pair(plane) = effect.site() else {
+            return;
+        };
+        if effect.get(&TURNED) > 0.5 {
+            machine.split_lag(plane, effect.value());
         } else {
-            machine.split_dead_time(effect.value);
+            machine.split_dead_time(plane, effect.value());
         }
     }
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
+        let Site::Pair(plane) = effect.site() else {
+            return None;
+        };
         Some(Term::ServoMismatch {
-            delta_tau_s: effect.value,
+            plane,
+            delta_tau_s: effect.value(),
         })
     }
 }

@@ -1,7 +1,6 @@
 //! Axes not square: `r = ½εR·sin2ψ`, the same both ways.
-use super::{Cause, CauseModel, Effect, Harmonics, RunView, Words};
+use super::{Cause, CauseModel, Effect, Harmonics, Parameter, RunView, Seat, Site, Words};
 use crate::simulation::machine::Machine;
-use giotto_shared::Axis;
 use giotto_shared::term::Term;
 
 /// See the module.
@@ -19,6 +18,13 @@ const WORDS: Words = Words {
     not_compensable: None,
 };
 
+/// In the contract's unit.
+const SIZE: Parameter = Parameter::needed(
+    "value",
+    [-1e4, 1e4],
+    "µm/m: 1 %, as much as a table may correct",
+);
+
 impl CauseModel for Squareness {
     fn cause(&self) -> Cause {
         Cause::Squareness
@@ -28,17 +34,33 @@ impl CauseModel for Squareness {
         &WORDS
     }
 
-    fn harmonics(&self, _axis: Option<Axis>, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
-        Some(Harmonics::wave(2, [0.0, 0.5e-6 * view.radius_m]))
+    fn size(&self) -> &'static Parameter {
+        &SIZE
+    }
+
+    fn seat(&self) -> Seat {
+        Seat::Pair
+    }
+
+    fn harmonics(&self, site: Site, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
+        let Site::Pair(plane) = site else { return None };
+        let [first, second] = plane.axes().map(|axis| view.cosine(axis));
+        Some(first.product(&second).times(1e-6 * view.radius_m))
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
-        machine.squareness_rad += effect.value * 1e-6;
+        if let Site::Pair(plane) = effect.site() {
+            machine.squareness_rad[plane as usize] += effect.value() * 1e-6;
+        }
     }
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
+        let Site::Pair(plane) = effect.site() else {
+            return None;
+        };
         Some(Term::Squareness {
-            shear_rad: effect.value * 1e-6,
+            plane,
+            shear_rad: effect.value() * 1e-6,
         })
     }
 }

@@ -1,8 +1,6 @@
 //! Teeth near the reversals while an axis is slow: the axis sticks and jumps.
-use super::view::axes_of;
-use super::{Cause, CauseModel, EACH_AXIS, Effect, Evidence, Words};
+use super::{Cause, CauseModel, Effect, Evidence, Parameter, Seat, Site, Words};
 use crate::simulation::machine::Machine;
-use giotto_shared::Axis;
 
 /// See the module.
 pub struct StickSlip;
@@ -19,6 +17,16 @@ const WORDS: Words = Words {
     not_compensable: Some("its teeth have no fixed place"),
 };
 
+/// In the contract's unit.
+const SIZE: Parameter = Parameter::needed("value", [0.0, 1e4], "µm");
+
+/// Speed of the axis below which it sticks.
+const BELOW_MM_S: Parameter = Parameter::needed(
+    "below_mm_s",
+    [1e-3, 1e4],
+    "speed of the axis below which it sticks",
+);
+
 impl CauseModel for StickSlip {
     fn cause(&self) -> Cause {
         Cause::StickSlip
@@ -28,22 +36,31 @@ impl CauseModel for StickSlip {
         &WORDS
     }
 
-    fn axes(&self) -> &'static [Option<Axis>] {
-        EACH_AXIS
+    fn size(&self) -> &'static Parameter {
+        &SIZE
+    }
+
+    fn seat(&self) -> Seat {
+        Seat::One
     }
 
     fn evidence(&self) -> Evidence {
         Evidence::Roughness
     }
 
+    fn parameters(&self) -> &'static [&'static Parameter] {
+        &[&BELOW_MM_S]
+    }
+
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
-        for axis in axes_of(effect) {
-            let mut friction = machine.friction[axis.index()].unwrap_or_default();
-            friction.stick_slip_m += effect.value * 1e-6;
-            // It stands still between slips.
-            friction.stick_travel_m = friction.stick_slip_m.abs().max(1e-7);
-            friction.stick_speed_m_s = effect.param("below_mm_s", 5.0) * 1e-3;
-            machine.friction[axis.index()] = Some(friction);
-        }
+        let Site::One(axis) = effect.site() else {
+            return;
+        };
+        let mut friction = machine.friction[axis.index()].unwrap_or_default();
+        friction.stick_slip_m += effect.value() * 1e-6;
+        // It stands still between slips.
+        friction.stick_travel_m = friction.stick_slip_m.abs().max(1e-7);
+        friction.stick_speed_m_s = effect.get(&BELOW_MM_S) * 1e-3;
+        machine.friction[axis.index()] = Some(friction);
     }
 }

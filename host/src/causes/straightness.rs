@@ -1,9 +1,7 @@
 //! A bowed guide: moving along the axis shifts the other one by c·u². For X `r = (S/4)(sinψ + sin3ψ)`, for Y
 //! `r = (S/4)(cosψ − cos3ψ)`, S = cR². The value is the bow S over the largest circle measured.
-use super::view::axes_of;
-use super::{Cause, CauseModel, EACH_AXIS, Effect, Harmonics, RunView, Words};
+use super::{Cause, CauseModel, Effect, Fitted, Harmonics, Parameter, RunView, Seat, Site, Words};
 use crate::simulation::machine::Machine;
-use giotto_shared::Axis;
 use giotto_shared::term::Term;
 
 /// See the module.
@@ -21,6 +19,16 @@ const WORDS: Words = Words {
     not_compensable: None,
 };
 
+/// In the contract's unit.
+const SIZE: Parameter = Parameter::needed("value", [-1e4, 1e4], "µm of bow");
+
+/// Radius over which the bow was measured.
+const OVER_RADIUS_MM: Parameter = Parameter::needed(
+    "over_radius_mm",
+    [1.0, 1e4],
+    "radius of the circle over which the bow is so large",
+);
+
 impl CauseModel for Straightness {
     fn cause(&self) -> Cause {
         Cause::Straightness
@@ -30,33 +38,49 @@ impl CauseModel for Straightness {
         &WORDS
     }
 
-    fn axes(&self) -> &'static [Option<Axis>] {
-        EACH_AXIS
+    fn size(&self) -> &'static Parameter {
+        &SIZE
     }
 
-    fn harmonics(&self, axis: Option<Axis>, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
-        // cos²ψ·sinψ and sin²ψ·cosψ.
-        let bow = 0.25e-6 * (view.radius_m / view.largest_radius_m).powi(2);
-        Some(match axis {
-            Some(Axis::Y) => Harmonics::wave(1, [bow, 0.0]).with(3, [-bow, 0.0]),
-            _ => Harmonics::wave(1, [0.0, bow]).with(3, [0.0, bow]),
-        })
+    fn seat(&self) -> Seat {
+        Seat::Across
+    }
+
+    fn parameters(&self) -> &'static [&'static Parameter] {
+        &[&OVER_RADIUS_MM]
+    }
+
+    fn stated(&self, fit: &Fitted<'_>) -> Vec<(&'static Parameter, f64)> {
+        vec![(&OVER_RADIUS_MM, fit.first_view.largest_radius_m * 1e3)]
+    }
+
+    fn harmonics(&self, site: Site, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
+        let Site::Across(moving, shifted) = site else {
+            return None;
+        };
+        let bow = 1e-6 * (view.radius_m / view.largest_radius_m).powi(2);
+        let along = view.cosine(moving).squared();
+        Some(along.product(&view.cosine(shifted)).times(bow))
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
-        for axis in axes_of(effect) {
-            machine.straightness_per_m[axis.index()] += curvature_per_m(effect);
+        if let Site::Across(moving, shifted) = effect.site() {
+            machine.straightness_per_m[moving.index()][shifted.index()] += curvature_per_m(effect);
         }
     }
 
     fn term(&self, effect: &Effect) -> Option<Term<f64>> {
+        let Site::Across(actuator, across) = effect.site() else {
+            return None;
+        };
         Some(Term::Straightness {
-            axis: effect.axis?,
+            actuator,
+            across,
             curvature_per_m: curvature_per_m(effect),
         })
     }
 }
 
 fn curvature_per_m(effect: &Effect) -> f64 {
-    effect.value * 1e-6 / (effect.param("over_radius_mm", 300.0) * 1e-3).powi(2)
+    effect.value() * 1e-6 / (effect.get(&OVER_RADIUS_MM) * 1e-3).powi(2)
 }

@@ -1,8 +1,7 @@
 //! Growth with campaign time: `r = R·α·ΔT(t)`, `ΔT` linear in time (shape `curvature` 0) or
 //! settling: `(1 − e^{−ct})/(1 − e^{−c})`, `c` the campaign in time constants.
-use super::{Bend, Cause, CauseModel, Effect, Harmonics, RunView, Words};
+use super::{Bend, Cause, CauseModel, Effect, Fitted, Harmonics, Parameter, RunView, Site, Words};
 use crate::simulation::machine::Machine;
-use giotto_shared::Axis;
 
 /// See the module.
 pub struct ThermalDrift;
@@ -19,6 +18,24 @@ const WORDS: Words = Words {
     not_compensable: Some("it changes with time, and the controller does not know the temperature"),
 };
 
+/// In the contract's unit.
+const SIZE: Parameter = Parameter::needed("value", [-1e5, 1e5], "µm/m over the campaign");
+
+/// Time constant as a share of the campaign.
+const SETTLING: Parameter = Parameter::optional(
+    "settling",
+    [0.0, 1e3],
+    0.0,
+    "time constant as a share of the campaign; 0: it grows evenly",
+);
+/// Length of the campaign.
+const CAMPAIGN_S: Parameter = Parameter::optional(
+    "campaign_s",
+    [1.0, 1e9],
+    3600.0,
+    "time from the first run to the last",
+);
+
 impl CauseModel for ThermalDrift {
     fn cause(&self) -> Cause {
         Cause::ThermalDrift
@@ -26,6 +43,25 @@ impl CauseModel for ThermalDrift {
 
     fn words(&self) -> &'static Words {
         &WORDS
+    }
+
+    fn size(&self) -> &'static Parameter {
+        &SIZE
+    }
+
+    fn parameters(&self) -> &'static [&'static Parameter] {
+        &[&SETTLING, &CAMPAIGN_S]
+    }
+
+    fn stated(&self, fit: &Fitted<'_>) -> Vec<(&'static Parameter, f64)> {
+        let curvature = fit.shape.first().filter(|curvature| **curvature > 1e-3);
+        vec![
+            (
+                &SETTLING,
+                curvature.map_or(0.0, |curvature| curvature.recip()),
+            ),
+            (&CAMPAIGN_S, fit.first_view.campaign_s),
+        ]
     }
 
     fn shape_names(&self) -> &'static [&'static str] {
@@ -54,21 +90,20 @@ impl CauseModel for ThermalDrift {
             .for_each(|value| *value = value.clamp(0.0, SETTLED));
     }
 
-    fn harmonics(&self, _axis: Option<Axis>, shape: &[f64], view: &RunView) -> Option<Harmonics> {
+    fn harmonics(&self, _site: Site, shape: &[f64], view: &RunView) -> Option<Harmonics> {
         let growth = growth(shape.first().copied().unwrap_or(0.0), view.elapsed);
         Some(Harmonics::mean(1e-6 * view.radius_m * growth))
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
-        let campaign_s = effect.param("campaign_s", 3600.0);
-        let settling = effect.param("settling", 0.0);
+        let (campaign_s, settling) = (effect.get(&CAMPAIGN_S), effect.get(&SETTLING));
         // Slope at the start of what reaches `value` at the end of the campaign.
         let steeper = if settling > 0.0 {
             1.0 / (settling * (1.0 - (-1.0 / settling).exp()))
         } else {
             1.0
         };
-        machine.thermal_per_s = effect.value * 1e-6 * steeper / campaign_s;
+        machine.thermal_per_s = effect.value() * 1e-6 * steeper / campaign_s;
         machine.thermal_settling_s = settling * campaign_s;
     }
 }

@@ -1,5 +1,5 @@
 //! A tone of fixed frequency: order 2πR·f0/f, which moves over the circle with speed and radius.
-use super::{Cause, CauseModel, Effect, Evidence, Words};
+use super::{Cause, CauseModel, Effect, Evidence, Parameter, Seat, Words};
 use crate::simulation::machine::Machine;
 use crate::simulation::machine::Vibration as Tone;
 
@@ -18,6 +18,27 @@ const WORDS: Words = Words {
     not_compensable: Some("it is faster than the position loop and its phase is not known"),
 };
 
+/// In the contract's unit.
+const SIZE: Parameter = Parameter::needed("value", [1e-3, 1e5], "Hz");
+
+/// Amplitude of the tone, µm: what the circles show; the controller does not use it.
+const AMPLITUDE_UM: Parameter = Parameter::optional(
+    "amplitude_um",
+    [0.0, 1e4],
+    0.0,
+    "amplitude along the radius",
+);
+/// The same number once more, as the tone was found.
+const FREQUENCY_HZ: Parameter =
+    Parameter::optional("frequency_hz", [0.0, 1e5], 0.0, "frequency of the tone");
+/// Phase at the start of the campaign: new in each run of a real machine.
+const PHASE_RAD: Parameter = Parameter::optional(
+    "phase_rad",
+    [-6.3, 6.3],
+    0.0,
+    "phase at the start of the campaign",
+);
+
 impl CauseModel for Vibration {
     fn cause(&self) -> Cause {
         Cause::Vibration
@@ -27,15 +48,27 @@ impl CauseModel for Vibration {
         &WORDS
     }
 
+    fn size(&self) -> &'static Parameter {
+        &SIZE
+    }
+
+    fn seat(&self) -> Seat {
+        Seat::MachineOrOne
+    }
+
     fn evidence(&self) -> Evidence {
         Evidence::Tone
     }
 
+    fn parameters(&self) -> &'static [&'static Parameter] {
+        &[&AMPLITUDE_UM, &FREQUENCY_HZ, &PHASE_RAD]
+    }
+
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
         machine.vibration = Some(Tone {
-            frequency_hz: effect.value,
-            amplitude_m: effect.param("amplitude_um", 0.0) * 1e-6,
-            phase_rad: effect.param("phase_rad", 0.0),
+            frequency_hz: effect.value(),
+            amplitude_m: effect.get(&AMPLITUDE_UM) * 1e-6,
+            phase_rad: effect.get(&PHASE_RAD),
         });
     }
 }

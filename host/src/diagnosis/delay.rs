@@ -11,8 +11,7 @@ use super::orders;
 use super::spread;
 use super::survey::Survey;
 use super::tangent;
-use crate::causes::{Cause, ORDERS};
-use giotto_shared::Axis;
+use crate::causes::{Cause, ORDERS, Site};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -43,7 +42,7 @@ pub struct Explanation {
     /// The best.
     pub found: Explained,
     /// Causes under each delay tried, with its weight; that of the best is among them.
-    under: Vec<(f64, Vec<(Cause, Option<Axis>)>)>,
+    under: Vec<(f64, Vec<(Cause, Site)>)>,
     /// The delay, if it is known.
     pub delay: Option<Delay>,
     /// Whether places on the circle depend on a delay that is not known.
@@ -95,9 +94,9 @@ fn of_lag(found: &Explained) -> Delay {
     Delay { value, ci95: [value - half, value + half] }
 }
 
-fn causes(found: &Explained) -> Vec<(Cause, Option<Axis>)> {
+fn causes(found: &Explained) -> Vec<(Cause, Site)> {
     let cause = |item: &usize| match found.items[*item].kind {
-        Kind::Cause { cause, axis, .. } => Some((cause, axis)),
+        Kind::Cause { cause, site, .. } => Some((cause, site)),
         Kind::Pattern(_) => None,
     };
     found.chosen.iter().filter_map(cause).collect()
@@ -142,12 +141,12 @@ fn cost(found: &Explained) -> f64 {
 
 impl Explanation {
     /// Share of the delays, by weight, under which a cause is found.
-    fn share_of(&self, cause: Cause, axis: Option<Axis>) -> f64 {
+    fn share_of(&self, cause: Cause, site: Option<Site>) -> f64 {
         let whole: f64 = self.under.iter().map(|(weight, _)| weight).sum();
         let with: f64 = self
             .under
             .iter()
-            .filter(|(_, causes)| causes.iter().any(|c| c.0 == cause && (axis.is_none() || c.1 == axis)))
+            .filter(|(_, causes)| causes.iter().any(|c| c.0 == cause && site.is_none_or(|site| c.1 == site)))
             .map(|(weight, _)| weight)
             .sum();
         with / whole.max(f64::MIN_POSITIVE)
@@ -160,7 +159,7 @@ impl Explanation {
                 matches!(self.found.items[item].kind, Kind::Cause { cause, .. } if cause == finding.cause)
             });
             if known && self.under.len() > 1 {
-                finding.probability *= self.share_of(finding.cause, finding.axis);
+                finding.probability *= self.share_of(finding.cause, finding.axis.and(finding.effects.first()).map(|effect| effect.site()));
             }
             let placed = self.found.chosen.iter().any(|&item| {
                 matches!(self.found.items[item].kind, Kind::Cause { cause, .. } if cause == finding.cause)

@@ -14,7 +14,7 @@ use super::spread;
 use super::survey::{Lag, Prepared, Response, Survey, misfit};
 use super::tangent;
 use super::tone::{self, Tone};
-use crate::causes::{ALL, Cause, Evidence, Harmonics, RunView};
+use crate::causes::{ALL, Cause, Evidence, Harmonics, RunView, Site};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -288,7 +288,7 @@ fn enter(found: &mut Explained, start: &Start, kinds: &[Kind]) {
     if start.own_fourth_order {
         let fourth = Kind::Cause {
             cause: Cause::HigherOrderDynamics,
-            axis: None,
+            site: Site::Machine,
             shape: Vec::new(),
         };
         let columns = fourth.columns_over(&runs);
@@ -305,14 +305,14 @@ fn enter(found: &mut Explained, start: &Start, kinds: &[Kind]) {
             continue;
         }
         let shapes = model.shapes(&views);
-        for &axis in model.axes() {
+        for site in model.sites(&views) {
             let known = kinds.iter().any(
-                |kind| matches!(kind, Kind::Cause { cause, axis: at, .. } if *cause == model.cause() && *at == axis),
+                |kind| matches!(kind, Kind::Cause { cause, site: at, .. } if *cause == model.cause() && *at == site),
             );
             if let (false, Some(first)) = (known, shapes.first()) {
                 let kind = Kind::Cause {
                     cause: model.cause(),
-                    axis,
+                    site,
                     shape: first.clone(),
                 };
                 further.push((kind, shapes.len()));

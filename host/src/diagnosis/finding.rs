@@ -1,6 +1,7 @@
 //! What is reported of a cause.
 use super::status::Status;
 use crate::causes::{Cause, Effect};
+use giotto_shared::Actuator;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -31,10 +32,10 @@ pub struct Largest {
 pub struct Finding {
     /// Name in the closed list.
     pub cause: Cause,
-    /// `x`, `y` or nothing.
-    pub axis: Option<giotto_shared::Axis>,
-    /// Actuators that it sits on: one, two of a pair, none where it is the machine's as a whole.
-    pub actuators: Vec<String>,
+    /// The actuator it is named by, or nothing.
+    pub axis: Option<Actuator>,
+    /// All actuators that it concerns: one, or two for a pair.
+    pub actuators: Vec<Actuator>,
     /// Probability that it is there rather than the best explanation without it.
     pub probability: f64,
     /// How large.
@@ -62,6 +63,14 @@ pub struct Finding {
     /// The same as entries of a model.
     #[serde(skip)]
     pub effects: Vec<Effect>,
+}
+
+impl Finding {
+    /// Where it is, for a person: `x`, `x y` for a pair; nothing for the machine as a whole.
+    pub fn place(&self) -> String {
+        let names: Vec<&str> = self.actuators.iter().map(|a| a.name()).collect();
+        names.join(" ")
+    }
 }
 
 /// What is left that matches nothing in the list.

@@ -55,7 +55,7 @@ pub fn machine(response: &Response, effects: &[Effect], lag_s: Option<f64>) -> M
             kv_per_s: response.a_s2.powf(-0.5),
             feed_forward: 0.0,
         };
-        machine.servo = [servo; 2];
+        machine.servo = [servo; 3];
         if response.b_s4 != 0.0 {
             machine.add_beta2(-0.5 * response.b_s4);
         }
@@ -67,8 +67,8 @@ pub fn machine(response: &Response, effects: &[Effect], lag_s: Option<f64>) -> M
     }
     for effect in effects {
         // Already in the response.
-        if effect.cause != Cause::HigherOrderDynamics {
-            effect.cause.model().apply(effect, &mut machine);
+        if effect.cause() != Cause::HigherOrderDynamics {
+            effect.cause().model().apply(effect, &mut machine);
         }
     }
     machine
@@ -112,7 +112,7 @@ fn fitted(found: &Explained, weights: &[f64], set: &[usize]) -> Option<(Response
     }
     let mut effects = Vec::new();
     for &item in &set {
-        let Kind::Cause { cause, axis, .. } = &found.items[item].kind else {
+        let Kind::Cause { cause, .. } = &found.items[item].kind else {
             continue;
         };
         // What has two names is fitted, so that it bends nothing else, but belongs to no machine.
@@ -132,19 +132,11 @@ fn fitted(found: &Explained, weights: &[f64], set: &[usize]) -> Option<(Response
         } else {
             values[0]
         };
-        let mut params = super::verdict::parameters(found, item);
-        if values.len() == 2 {
-            params.insert("phase_rad".into(), values[1].atan2(values[0]));
-        }
-        effects.push(Effect {
-            cause: *cause,
-            axis: *axis,
-            value: size,
-            ci95: [size; 2],
-            params,
-        });
+        effects.extend(super::verdict::effect_with(
+            found, item, &values, size, [size; 2],
+        ));
     }
-    effects.extend(found.teeth.iter().map(super::verdict::teeth_effect));
+    effects.extend(found.teeth.iter().filter_map(super::verdict::teeth_effect));
     let fastest = found.runs.iter().map(|run| run.view.omega_rad_s).fold(0.0, f64::max);
     let (w2, a, b) = (fastest * fastest, response.a_s2, response.b_s4);
     // A response that would blow up within the measured range is no response.
@@ -442,7 +434,7 @@ pub fn extended_model(
         },
         effects: effects
             .into_iter()
-            .filter(|e| e.cause != Cause::HigherOrderDynamics)
+            .filter(|e| e.cause() != Cause::HigherOrderDynamics)
             .collect(),
         delay_s,
     }

@@ -198,9 +198,10 @@ mod tests {
     use super::super::survey::{Response, Survey, misfit};
     use super::*;
     use crate::causes::Cause;
+    use crate::causes::Site;
     use crate::model_file::Servo;
     use crate::simulation::{self, Plan};
-    use giotto_shared::Axis;
+    use giotto_shared::{Actuator, Plane};
     use std::path::Path;
 
     const PLAN: &str = r#"
@@ -219,15 +220,15 @@ directions = ["ccw", "cw"]
 
     /// Columns of both sorts: low orders only, and with samples of their own.
     fn kinds() -> Vec<Kind> {
-        let cause = |cause, axis, shape: &[f64]| Kind::Cause {
+        let cause = |cause, site, shape: &[f64]| Kind::Cause {
             cause,
-            axis,
+            site,
             shape: shape.to_vec(),
         };
         let mut kinds = vec![
-            cause(Cause::Squareness, None, &[]),
-            cause(Cause::Backlash, Some(Axis::X), &[0.0, 0.0]),
-            cause(Cause::CyclicError, Some(Axis::Y), &[0.02]),
+            cause(Cause::Squareness, Site::Pair(Plane::Xy), &[]),
+            cause(Cause::Backlash, Site::One(Actuator::X), &[0.0, 0.0]),
+            cause(Cause::CyclicError, Site::One(Actuator::Y), &[0.02]),
         ];
         kinds.extend(Pattern::sizes().into_iter().take(2).map(Kind::Pattern));
         kinds

@@ -535,7 +535,7 @@ fn clamp_energy_m2(campaign: &Campaign, found: &Explained) -> f64 {
 fn knows_clamp(known: &[Effect]) -> bool {
     known
         .iter()
-        .any(|effect| effect.cause == crate::causes::Cause::FeedClamp)
+        .any(|effect| effect.cause() == crate::causes::Cause::FeedClamp)
 }
 
 /// The campaign with what the given effects do taken out, by the simulation with and without them.

@@ -159,8 +159,8 @@ mod tests {
                 servo: [PositionLoop {
                     kv_per_s: 40.0,
                     feed_forward: 0.0,
-                }; 2],
-                squareness_rad: 200e-6,
+                }; 3],
+                squareness_rad: [200e-6, 0.0, 0.0],
                 ..Machine::default()
             },
             instrument: Instrument {

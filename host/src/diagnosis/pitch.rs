@@ -4,7 +4,7 @@
 //! place, folded into fine bins of x, holds every pitch at once in one transform; 1 % of a gain is lost to the bins.
 use super::column::Column;
 use super::survey::Prepared;
-use giotto_shared::Axis;
+use giotto_shared::Actuator;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
@@ -28,10 +28,16 @@ pub fn scan(
     runs: &[Prepared],
     whitened: &Column,
     noise_m2: f64,
-    axis: Axis,
+    axis: Actuator,
     finest_wave_per_m: f64,
 ) -> Option<Best> {
-    let radius_m = runs.iter().map(|run| run.view.radius_m).fold(0.0, f64::max);
+    let at_axis = axis.index();
+    // How far from the middle of all circles the axis goes.
+    let (low, high) = runs.iter().fold((f64::MAX, f64::MIN), |(low, high), run| {
+        let (centre, radius) = (run.view.centre_m[at_axis], run.view.radius_m);
+        (low.min(centre - radius), high.max(centre + radius))
+    });
+    let (middle_m, radius_m) = (0.5 * (low + high), 0.5 * (high - low).max(0.0));
     let travel_m = 2.0 * radius_m;
     let bins_per_m = BINS * finest_wave_per_m;
     // `own` is read at twice the frequency.
@@ -44,8 +50,9 @@ pub fn scan(
             if run.hidden.get(at).is_some_and(|hidden| *hidden) {
                 continue;
             }
-            let along = direction[axis.index()];
-            let place = ((radius_m + run.view.radius_m * along) * bins_per_m) as usize;
+            let along = direction[at_axis];
+            let from = run.view.centre_m[at_axis] - middle_m + radius_m;
+            let place = ((from + run.view.radius_m * along) * bins_per_m) as usize;
             pull[place.min(length - 1)].re += along * value;
             own[place.min(length - 1)].re += along * along;
         }

@@ -5,14 +5,14 @@
 //! steep there too. Where teeth are found, the other explanations do not look.
 use super::spread::Spread;
 use super::survey::Prepared;
-use giotto_shared::Axis;
+use giotto_shared::Actuator;
 use rayon::prelude::*;
 
 /// Teeth on one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Teeth {
     /// Axis that sticks.
-    pub axis: Axis,
+    pub axis: Actuator,
     /// Speed of the axis below which it does, m/s.
     pub below_m_s: f64,
     /// Height of a tooth, m: √3 times its root mean square (a ramp from nothing to the height).
@@ -39,30 +39,34 @@ const PARTLY: f64 = 1.15;
 /// Variance ratio of the slow parts of runs that have fast parts too.
 const CONTRAST: f64 = 1.25;
 
-/// Looks for teeth on both axes.
+/// Looks for teeth on every axis that moves.
 pub fn find(runs: &[Prepared], residual: &[Vec<f64>], spread: &Spread) -> Vec<Teeth> {
-    let both = [Axis::X, Axis::Y].map(|axis| find_on(axis, runs, residual, spread, None));
-    let rougher = |a: &Teeth, b: &Teeth| a.significance > b.significance;
-    match both {
-        // One axis's teeth lie where the other is fast: hide them before the other is believed.
-        [Some(x), Some(y)] => {
-            let (first, other) = if rougher(&x, &y) {
-                (x, Axis::Y)
-            } else {
-                (y, Axis::X)
-            };
-            std::iter::once(first)
-                .chain(find_on(other, runs, residual, spread, Some(&first)))
-                .collect()
-        }
-        [x, y] => x.into_iter().chain(y).collect(),
+    let mut rest: Vec<Actuator> = Actuator::SLIDES
+        .into_iter()
+        .filter(|axis| runs.iter().any(|run| run.view.moves(*axis)))
+        .collect();
+    let mut found: Vec<Teeth> = Vec::new();
+    // One axis's teeth lie where the other is fast: hide them before the other is believed.
+    while !rest.is_empty() {
+        let teeth = rest
+            .iter()
+            .filter_map(|&axis| find_on(axis, runs, residual, spread, &found))
+            .max_by(|a, b| a.significance.total_cmp(&b.significance));
+        let Some(teeth) = teeth else { break };
+        rest.retain(|axis| *axis != teeth.axis);
+        found.push(teeth);
     }
+    found
 }
 
-/// Speed of the axis at a sample, m/s.
-fn axis_speed(run: &Prepared, axis: Axis, sample: usize) -> f64 {
-    let [cos, sin] = run.view.direction[sample];
-    run.view.feed_m_s * if axis == Axis::X { sin } else { cos }.abs()
+/// Speed of the axis at a sample, m/s; infinite for one that stands still, which cannot stick.
+fn axis_speed(run: &Prepared, axis: Actuator, sample: usize) -> f64 {
+    if !run.view.moves(axis) {
+        return f64::INFINITY;
+    }
+    let swing = run.view.swing(axis);
+    let facing = run.view.direction[sample][axis.index()];
+    run.view.feed_m_s * (swing * swing - facing * facing).max(0.0).sqrt()
 }
 
 fn bin_of(speed: f64) -> Option<usize> {
@@ -71,19 +75,19 @@ fn bin_of(speed: f64) -> Option<usize> {
 }
 
 fn find_on(
-    axis: Axis,
+    axis: Actuator,
     runs: &[Prepared],
     residual: &[Vec<f64>],
     spread: &Spread,
-    known: Option<&Teeth>,
+    known: &[Teeth],
 ) -> Option<Teeth> {
     let (sums, counts) = runs
         .par_iter()
         .zip(residual)
         .map(|(run, left)| {
             let (mut sums, mut counts) = ([0.0; BINS], [0.0; BINS]);
-            let strokes = run.view.strokes_of(Some(axis));
-            for i in 1..left.len().saturating_sub(1) {
+            let strokes = run.view.strokes_of(axis);
+            for i in 1..left.len().min(strokes.len()).saturating_sub(1) {
                 let share = strokes[i].share;
                 let facing = run.view.direction[i][axis.index()].abs();
                 // A step at the reversal itself shows beside it, if the lag is off.
@@ -91,7 +95,7 @@ fn find_on(
                 if share * run.view.half_turn_s() < SPIKE_S
                     || beside
                     || facing < 0.3
-                    || known.is_some_and(|known| known.covers(run, i))
+                    || known.iter().any(|known| known.covers(run, i))
                 {
                     continue;
                 }
@@ -191,7 +195,7 @@ fn find_on(
 /// Runs in which the axis is both slow and fast have to be rough where it is slow and smooth where it is fast: a
 /// tone seen by a slow sampling is rough all around its run, and slow runs are those in which the axis is slow.
 fn contrast(
-    axis: Axis,
+    axis: Actuator,
     below_m_s: f64,
     runs: &[Prepared],
     residual: &[Vec<f64>],

@@ -147,7 +147,7 @@ mod tests {
             .map(|(i, cause)| Item {
                 kind: Kind::Cause {
                     cause,
-                    axis: None,
+                    site: crate::causes::Site::Machine,
                     shape: Vec::new(),
                 },
                 columns: vec![i + 1],

@@ -13,8 +13,7 @@ use super::products::Products;
 use super::search::columns_of;
 use super::survey::Prepared;
 use super::vector::dot;
-use crate::causes::{Bend, Cause, RunView};
-use giotto_shared::Axis;
+use crate::causes::{Bend, Cause, RunView, Site};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -84,7 +83,7 @@ fn settle<'a>(found: &mut Explained, shapes: impl IntoIterator<Item = (&'a Task,
 struct Task {
     item: usize,
     cause: Cause,
-    axis: Option<Axis>,
+    site: Site,
     shape: Vec<f64>,
     chosen: bool,
     price: f64,
@@ -95,7 +94,7 @@ struct Task {
 impl Task {
     /// `None`: it has no shape, or none that is to be fitted here and now.
     fn of(found: &mut Explained, item: usize) -> Option<Self> {
-        let Kind::Cause { cause, axis, shape } = found.items[item].kind.clone() else {
+        let Kind::Cause { cause, site, shape } = found.items[item].kind.clone() else {
             return None;
         };
         let model = cause.model();
@@ -122,7 +121,7 @@ impl Task {
         Some(Self {
             item,
             cause,
-            axis,
+            site,
             shape,
             chosen,
             price: found.items[item].price,
@@ -136,7 +135,7 @@ impl Task {
         self.cause.model().tidy(&mut shape);
         Kind::Cause {
             cause: self.cause,
-            axis: self.axis,
+            site: self.site,
             shape,
         }
     }
@@ -180,8 +179,8 @@ impl<'a> Fit<'a> {
         } else {
             // A scan of a part of the runs sees that part of the gain.
             let share = self.runs.len() as f64 / self.sample.len().max(1) as f64;
-            let best = match (task.cause, task.axis) {
-                (Cause::CyclicError, Some(axis)) => {
+            let best = match (task.cause, task.site) {
+                (Cause::CyclicError, Site::One(axis)) => {
                     let finest = crate::causes::cyclic_error::finest_wave_per_m(&self.views);
                     pitch::scan(
                         &self.runs,

@@ -1,4 +1,4 @@
-//! What is said of a finding beside its size: where it sits, the largest thing it does, what to set right.
+//! What is said of a finding beside its size: the largest thing it does, what to set right.
 use super::explained::Explained;
 use super::finding::Largest;
 use super::roughness::Teeth;
@@ -6,37 +6,13 @@ use super::search::columns_of;
 use super::survey::Prepared;
 use super::tone::{Amplitude, Tone};
 use crate::causes::Cause;
-use giotto_shared::Axis;
+use giotto_shared::Actuator;
 
-fn name(axis: Axis) -> String {
-    if axis == Axis::X { "x" } else { "y" }.to_string()
-}
-
-/// Causes whose estimate is the first axis less the second.
-const DIFFERENCES: [Cause; 3] = [Cause::ScaleMismatch, Cause::ServoMismatch, Cause::BandwidthMismatch];
-
-/// Actuators of a cause: the one it sits on, both of a pair, none where it is the machine's as a whole.
-pub fn actuators(cause: Cause, axis: Option<Axis>) -> Vec<String> {
-    let pair = DIFFERENCES.contains(&cause) || cause == Cause::Squareness;
-    match axis {
-        Some(axis) => vec![name(axis)],
-        None if pair => [Axis::X, Axis::Y].map(name).to_vec(),
-        None => Vec::new(),
-    }
-}
-
-/// What to set right, with its side.
-pub fn remedy(cause: Cause, axis: Option<Axis>, value: f64) -> String {
-    let adjust = cause.model().words().adjust;
-    match axis {
-        Some(axis) => format!("{}: {adjust}", name(axis).to_uppercase()),
-        None if DIFFERENCES.contains(&cause) => {
-            let larger = if value > 0.0 { "X" } else { "Y" };
-            format!("{adjust} (that of {larger} is the larger one)")
-        }
-        None if value < 0.0 => format!("{adjust} (it is negative)"),
-        None => adjust.to_string(),
-    }
+/// What to set right, and which way.
+pub fn remedy(cause: Cause, actuators: &[Actuator], value: f64) -> String {
+    let names: Vec<String> = actuators.iter().map(ToString::to_string).collect();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    crate::causes::remedy::remedy(cause, &names, value)
 }
 
 fn on(run: &Prepared, size_m: f64) -> Largest {

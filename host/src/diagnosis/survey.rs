@@ -266,6 +266,8 @@ impl Survey {
                         feed_m_s: feed,
                         omega_rad_s: omega,
                         sign: run.sign(),
+                        frame: run.frame,
+                        centre_m: run.centre_m.unwrap_or_default(),
                         elapsed: if span > 0.0 {
                             (middle(index, omega) - began) / span
                         } else {

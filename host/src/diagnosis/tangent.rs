@@ -71,7 +71,7 @@ fn lay(found: &mut Explained, weights: &[f64], whole: bool) -> Option<Tangents> 
         .collect();
     let mut shapes = Vec::new();
     for (item, amounts) in &amounts {
-        let Kind::Cause { cause, axis, shape } = found.items[*item].kind.clone() else {
+        let Kind::Cause { cause, site, shape } = found.items[*item].kind.clone() else {
             continue;
         };
         for which in 0..shape.len() {
@@ -82,7 +82,7 @@ fn lay(found: &mut Explained, weights: &[f64], whole: bool) -> Option<Tangents> 
             };
             let mut shape = shape.clone();
             shape[which] += step;
-            let moved = Kind::Cause { cause, axis, shape };
+            let moved = Kind::Cause { cause, site, shape };
             let tangent = difference(found, *item, amounts, &moved, &runs);
             columns.push(found.ledger.push(tangent));
             shapes.push(Shape {

@@ -6,7 +6,7 @@ use super::column::Column;
 use super::spread::Spread;
 use super::survey::Prepared;
 use super::vector::{axpy, dot, wave_sum};
-use giotto_shared::Axis;
+use giotto_shared::Actuator;
 use rayon::prelude::*;
 use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
@@ -30,7 +30,7 @@ pub struct Tone {
     /// Its standard error, Hz.
     pub se_hz: f64,
     /// Axis along which it swings; `None`: along the radius.
-    pub axis: Option<Axis>,
+    pub axis: Option<Actuator>,
     /// Law of the amplitude.
     pub amplitude: Amplitude,
     /// Root mean square amplitude over the runs that show it, m.
@@ -168,13 +168,13 @@ fn refine(
                 && start_hz * clean.turn_s > FEWEST_WAVES
         })
         .collect();
-    let swung = |axis: Option<Axis>| -> Vec<Vec<f64>> {
+    let swung = |axis: Option<Actuator>| -> Vec<Vec<f64>> {
         usable
             .par_iter()
             .map(|clean| swing(clean.run, clean.samples, axis))
             .collect()
     };
-    let sum_at = |swung: &[Vec<f64>], axis: Option<Axis>, hz: f64| -> f64 {
+    let sum_at = |swung: &[Vec<f64>], axis: Option<Actuator>, hz: f64| -> f64 {
         usable
             .iter()
             .zip(swung)
@@ -184,11 +184,13 @@ fn refine(
             .sum()
     };
     // A swing along an axis shows on the circle as two sidebands, one turn below and above.
-    let (axis, start_hz) = [None, Some(Axis::X), Some(Axis::Y)]
+    let (axis, start_hz) = std::iter::once(None)
+        .chain(moved(runs).map(Some))
+        .collect::<Vec<_>>()
         .into_iter()
         .flat_map(|axis| {
             let swung = swung(axis);
-            let sums: Vec<(f64, Option<Axis>, f64)> = (-24..=24)
+            let sums: Vec<(f64, Option<Actuator>, f64)> = (-24..=24)
                 .into_par_iter()
                 .map(|i| start_hz + step_hz * f64::from(i))
                 .map(|hz| (sum_at(&swung, axis, hz), axis, hz))
@@ -419,8 +421,15 @@ impl Spectrum {
     }
 }
 
+/// The slides that move in any run.
+fn moved(runs: &[Prepared]) -> impl Iterator<Item = Actuator> {
+    Actuator::SLIDES
+        .into_iter()
+        .filter(|axis| runs.iter().any(|run| run.view.moves(*axis)))
+}
+
 /// Samples times the direction cosine of the axis.
-fn swing(run: &Prepared, samples: &[f64], axis: Option<Axis>) -> Vec<f64> {
+fn swing(run: &Prepared, samples: &[f64], axis: Option<Actuator>) -> Vec<f64> {
     match axis {
         None => samples.to_vec(),
         Some(axis) => samples
@@ -432,7 +441,7 @@ fn swing(run: &Prepared, samples: &[f64], axis: Option<Axis>) -> Vec<f64> {
 }
 
 /// Mean square of 1 over that of the direction cosine: 2 for a swing along an axis.
-fn loudness(axis: Option<Axis>) -> f64 {
+fn loudness(axis: Option<Actuator>) -> f64 {
     if axis.is_some() { 2.0 } else { 1.0 }
 }
 

@@ -10,8 +10,7 @@ use super::statement;
 use super::status::{Status, TIE};
 use super::tangent;
 use super::tone::{Amplitude, Tone};
-use crate::causes::{Cause, Effect};
-use giotto_shared::Axis;
+use crate::causes::{Cause, Effect, Fitted, Site};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::collections::BTreeMap;
@@ -48,7 +47,7 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
     };
     let rms = |energy: f64| (energy / samples).sqrt() * 1e6;
     let stated = |(at, &item): (usize, &usize)| {
-        let Kind::Cause { cause, axis, .. } = &found.items[item].kind else {
+        let Kind::Cause { cause, site, .. } = &found.items[item].kind else {
             return None;
         };
         if found.tied.contains(&item) {
@@ -56,23 +55,18 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
         }
         let words = cause.model().words();
         let (value, half) = estimate(found, item);
-        let params = parameters(found, item);
         let ci95 = [value - half, value + half];
-        let effect = Effect {
-            cause: *cause,
-            axis: *axis,
-            value,
-            ci95,
-            params: params.clone(),
-        };
+        // Beyond what a machine can have, it is something else.
+        let effect = effect_of(found, item, value, ci95)?;
+        let params = named(&effect);
         Some(Finding {
             cause: *cause,
-            axis: *axis,
-            actuators: statement::actuators(*cause, *axis),
+            axis: site.axis(),
+            actuators: site.actuators(),
             probability: probability(found, &weights, at),
             status: Status::default(),
             effect_um: statement::largest(found, item),
-            remedy: statement::remedy(*cause, *axis, value),
+            remedy: statement::remedy(*cause, &site.actuators(), value),
             estimate: Estimate {
                 value,
                 ci95,
@@ -100,20 +94,13 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
     if let Some((clamp, energy)) = clamp {
         let value = clamp.limit_m_s2 * 1e3;
         let half = 2.0 * clamp.se_m_s2 * 1e3;
-        let finding = plain(
-            Cause::FeedClamp,
-            None,
-            value,
-            half,
-            HIGHEST,
-            share(energy),
-            rms(energy),
-            BTreeMap::new(),
-        );
-        out.push(Finding {
+        let ci95 = [value - half, value + half];
+        let effect = Effect::new(Cause::FeedClamp, Site::Machine, value, ci95, []);
+        let finding = effect.ok().map(|effect| plain(effect, HIGHEST, share(energy), rms(energy)));
+        out.extend(finding.map(|finding| Finding {
             effect_um: statement::of_slower_feed(found),
             ..finding
-        });
+        }));
     }
     let (pieces, energy) = unexplained_energy(found, &each);
     let hidden_by_pieces = pieces >= PIECES && tone_energy < 9.0 * energy;
@@ -123,35 +110,20 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
         .zip(tone_energies)
         .filter(|_| !hidden_by_pieces)
     {
-        out.push(Finding {
+        let finding = tone_finding(tone, share(energy), rms(energy));
+        out.extend(finding.map(|finding| Finding {
             effect_um: statement::of_tone(found, tone),
-            ..tone_finding(tone, share(energy), rms(energy))
-        });
+            ..finding
+        }));
     }
     for (teeth, energy) in found.teeth.iter().zip(teeth_energy) {
         let odds = 0.5 * teeth.significance.powi(2) - 14.0;
-        let Effect {
-            cause,
-            axis,
-            value,
-            ci95,
-            params,
-        } = teeth_effect(teeth);
-        let half = 0.5 * (ci95[1] - ci95[0]);
-        let finding = plain(
-            cause,
-            axis,
-            value,
-            half,
-            sigmoid(odds),
-            share(energy),
-            rms(energy),
-            params,
-        );
-        out.push(Finding {
+        let effect = teeth_effect(teeth);
+        let finding = effect.map(|effect| plain(effect, sigmoid(odds), share(energy), rms(energy)));
+        out.extend(finding.map(|finding| Finding {
             effect_um: statement::of_teeth(found, teeth),
             ..finding
-        });
+        }));
     }
     out.sort_by(|a, b| b.share_percent.total_cmp(&a.share_percent));
     out
@@ -192,8 +164,7 @@ fn without_bent(
     findings
         .into_iter()
         .filter(|f| {
-            let flexible =
-                !f.cause.model().shape_names().is_empty() || f.cause == Cause::LateralPlay;
+            let flexible = f.cause.model().flexible();
             let piece = is_piece(f.rms_um, flexible, pieces, unexplained_um);
             // Teeth smear out of the zone in which they are hidden.
             let smear = flexible
@@ -216,37 +187,20 @@ fn is_piece(rms_um: f64, flexible: bool, pieces: usize, unexplained_um: f64) -> 
     pieces >= PIECES && rms_um < LARGER_THAN_PIECES[usize::from(flexible)] * unexplained_um
 }
 
-#[allow(clippy::too_many_arguments, reason = "one line a field")]
-fn plain(
-    cause: Cause,
-    axis: Option<Axis>,
-    value: f64,
-    half: f64,
-    probability: f64,
-    share_percent: f64,
-    rms_um: f64,
-    params: BTreeMap<String, f64>,
-) -> Finding {
-    let words = cause.model().words();
-    let ci95 = [value - half, value + half];
-    let effect = Effect {
-        cause,
-        axis,
-        value,
-        ci95,
-        params: params.clone(),
-    };
+/// A finding without look-alikes of its own.
+fn plain(effect: Effect, probability: f64, share_percent: f64, rms_um: f64) -> Finding {
+    let words = effect.cause().model().words();
     Finding {
-        cause,
-        axis,
-        actuators: statement::actuators(cause, axis),
+        cause: effect.cause(),
+        axis: effect.site().axis(),
+        actuators: effect.site().actuators(),
         probability,
         status: Status::default(),
         effect_um: Largest::default(),
-        remedy: statement::remedy(cause, axis, value),
+        remedy: statement::remedy(effect.cause(), &effect.site().actuators(), effect.value()),
         estimate: Estimate {
-            value,
-            ci95,
+            value: effect.value(),
+            ci95: effect.ci95(),
             unit: words.unit,
         },
         share_percent,
@@ -259,61 +213,56 @@ fn plain(
         compensable: compensable(&effect),
         next_measurement: words.next.to_string(),
         note: None,
-        params,
+        params: named(&effect),
         effects: vec![effect],
     }
 }
 
-/// Teeth as an effect of a machine.
-pub fn teeth_effect(teeth: &Teeth) -> Effect {
-    let (value, half) = (teeth.height_m * 1e6, 2.0 * teeth.se_m * 1e6);
-    Effect {
-        cause: Cause::StickSlip,
-        axis: Some(teeth.axis),
-        value,
-        ci95: [value - half, value + half],
-        params: BTreeMap::from([("below_mm_s".to_string(), teeth.below_m_s * 1e3)]),
-    }
+fn named(effect: &Effect) -> BTreeMap<String, f64> {
+    let named = |(name, value): (&str, f64)| (name.to_owned(), value);
+    effect.parameters().iter().map(named).collect()
 }
 
-fn tone_finding(tone: &Tone, share: f64, rms: f64) -> Finding {
-    let params = BTreeMap::from([
-        ("amplitude_um".to_string(), tone.amplitude_m * 1e6),
-        ("frequency_hz".to_string(), tone.frequency_hz),
-    ]);
+/// Teeth as an effect of a machine.
+pub fn teeth_effect(teeth: &Teeth) -> Option<Effect> {
+    let (value, half) = (teeth.height_m * 1e6, 2.0 * teeth.se_m * 1e6);
+    let ci95 = [value - half, value + half];
+    let below = [("below_mm_s", teeth.below_m_s * 1e3)];
+    Effect::new(Cause::StickSlip, Site::One(teeth.axis), value, ci95, below).ok()
+}
+
+fn tone_finding(tone: &Tone, share: f64, rms: f64) -> Option<Finding> {
+    let params = [
+        ("amplitude_um", tone.amplitude_m * 1e6),
+        ("frequency_hz", tone.frequency_hz),
+    ];
     let law = sigmoid(tone.law_evidence.min(50.0));
     // The frequency is sharper than the model of it: a part in 1e5 for the clock of the instrument.
     let se_hz = tone.se_hz.hypot(1e-5 * tone.frequency_hz);
-    let (cause, value, half) = match tone.amplitude {
-        Amplitude::Constant => (Cause::Vibration, tone.frequency_hz, 2.0 * se_hz),
+    let on_axis = tone.axis.map_or(Site::Machine, Site::One);
+    let (cause, site, value, half) = match tone.amplitude {
+        Amplitude::Constant => (Cause::Vibration, on_axis, tone.frequency_hz, 2.0 * se_hz),
         Amplitude::Centripetal => {
-            let period = tone.frequency_hz.recip();
-            (
-                Cause::InterpolationChord,
-                period,
-                2.0 * se_hz * period * period,
-            )
+            let period = 1.0 / tone.frequency_hz;
+            let half = 2.0 * se_hz * period * period;
+            (Cause::InterpolationChord, Site::Machine, period, half)
         }
     };
     let other = match tone.amplitude {
         Amplitude::Constant => Cause::InterpolationChord,
         Amplitude::Centripetal => Cause::Vibration,
     };
-    let axis = if cause == Cause::Vibration {
-        tone.axis
-    } else {
-        None
-    };
-    let mut finding = plain(cause, axis, value, half, law, share, rms, params);
+    let effect = Effect::new(cause, site, value, [value - half, value + half], params).ok()?;
+    let mut finding = plain(effect, law, share, rms);
     if tone.law_evidence < 3.0 {
         finding.indistinguishable_from.push(other.id().to_string());
     }
-    finding
+    Some(finding)
 }
 
 /// Through a term of the table, or through its κ4.
 fn compensable(effect: &Effect) -> bool {
-    effect.cause == Cause::HigherOrderDynamics || effect.cause.model().term(effect).is_some()
+    effect.cause() == Cause::HigherOrderDynamics || effect.cause().model().term(effect).is_some()
 }
 
 fn sigmoid(log_odds: f64) -> f64 {
@@ -521,60 +470,38 @@ fn look_alikes(found: &Explained, weights: &[f64], at: usize) -> Vec<String> {
     out
 }
 
-/// Further parameters of an explanation, in the units of their names.
-pub fn parameters(found: &Explained, item: usize) -> BTreeMap<String, f64> {
-    let Kind::Cause { cause, shape, .. } = &found.items[item].kind else {
-        return BTreeMap::new();
+/// A chosen explanation as an effect of a machine; `None` beyond what a machine can have.
+fn effect_of(found: &Explained, item: usize, value: f64, ci95: [f64; 2]) -> Option<Effect> {
+    let columns = columns_of(&found.nuisance, &found.items, &found.chosen);
+    let amount = |column: &usize| {
+        let at = columns.iter().position(|other| other == column);
+        at.map_or(0.0, |at| found.solution.coefficients[at])
     };
-    let names = cause.model().shape_names();
-    let mut params = names
-        .iter()
-        .map(|n| (*n).to_string())
-        .zip(shape.iter().copied())
-        .collect();
-    complete(*cause, found, item, &mut params);
-    params
+    let amounts: Vec<f64> = found.items[item].columns.iter().map(amount).collect();
+    effect_with(found, item, &amounts, value, ci95)
 }
 
-/// Parameters that the linear fit gives: the phase of a cyclic error, where a bow was measured, ….
-fn complete(cause: Cause, found: &Explained, item: usize, params: &mut BTreeMap<String, f64>) {
-    let columns = columns_of(&found.nuisance, &found.items, &found.chosen);
-    let value = |k: usize| {
-        found.items[item]
-            .columns
-            .get(k)
-            .and_then(|c| columns.iter().position(|other| other == c))
-            .map_or(0.0, |i| found.solution.coefficients[i])
+/// The same with other amounts of its columns.
+pub fn effect_with(
+    found: &Explained,
+    item: usize,
+    amounts: &[f64],
+    value: f64,
+    ci95: [f64; 2],
+) -> Option<Effect> {
+    let Kind::Cause { cause, site, shape } = &found.items[item].kind else {
+        return None;
     };
-    match cause {
-        Cause::CyclicError => {
-            params.insert("phase_rad".into(), value(1).atan2(value(0)));
-            if let Some(pitch) = params.remove("pitch_m") {
-                params.insert("pitch_mm".into(), pitch * 1e3);
-            }
-        }
-        Cause::Straightness => {
-            let largest = found
-                .runs
-                .iter()
-                .map(|run| run.view.largest_radius_m)
-                .fold(0.0, f64::max);
-            params.insert("over_radius_mm".into(), largest * 1e3);
-        }
-        Cause::ThermalDrift => {
-            // Time constant as a share of the campaign; 0: linear.
-            let curvature = params
-                .remove("curvature")
-                .filter(|curvature| *curvature > 1e-3);
-            params.insert("settling".into(), curvature.map_or(0.0, f64::recip));
-            let campaign_s = found.runs.first().map(|run| run.view.campaign_s);
-            params.insert("campaign_s".into(), campaign_s.unwrap_or_default());
-        }
-        Cause::Backlash => {
-            params.remove("play_m");
-        }
-        _ => {}
-    }
+    let fit = Fitted {
+        shape,
+        amounts,
+        first_view: &found.runs.first()?.view,
+    };
+    let stated = cause.model().stated(&fit);
+    let stated = stated
+        .into_iter()
+        .map(|(parameter, value)| (parameter.name, value));
+    Effect::new(*cause, *site, value, ci95, stated).ok()
 }
 
 /// One finding where both axes show the same cause of the same size.
@@ -582,7 +509,8 @@ fn join_axes(findings: Vec<Finding>) -> Vec<Finding> {
     let mut out: Vec<Finding> = Vec::new();
     for finding in findings {
         let twin = out.iter_mut().find(|other| {
-            other.cause == finding.cause && other.axis.is_some() && finding.axis.is_some()
+            let one_of_several = other.axis.is_some() || other.actuators.len() > 1;
+            other.cause == finding.cause && one_of_several && finding.axis.is_some()
         });
         match twin {
             Some(twin) if alike(twin, &finding) => {
@@ -591,12 +519,15 @@ fn join_axes(findings: Vec<Finding>) -> Vec<Finding> {
                 let value = 0.5 * (twin.estimate.value + finding.estimate.value);
                 let half = 0.5 * halves[0].hypot(halves[1]);
                 twin.axis = None;
-                twin.actuators = [twin.actuators.clone(), finding.actuators.clone()].concat();
-                twin.actuators.sort();
+                for actuator in finding.actuators {
+                    if !twin.actuators.contains(&actuator) {
+                        twin.actuators.push(actuator);
+                    }
+                }
                 if finding.effect_um.max > twin.effect_um.max {
                     twin.effect_um = finding.effect_um;
                 }
-                twin.remedy = statement::remedy(twin.cause, None, value);
+                twin.remedy = statement::remedy(twin.cause, &twin.actuators, value);
                 twin.estimate.value = value;
                 twin.estimate.ci95 = [value - half, value + half];
                 twin.share_percent += finding.share_percent;

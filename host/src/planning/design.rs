@@ -146,11 +146,11 @@ fn columns_of(cause: Cause, views: &[RunView]) -> Vec<Column> {
         return Vec::new();
     };
     let mut out = Vec::new();
-    for &axis in model.axes() {
+    for site in model.sites(views) {
         for at in 0..model.columns() {
             out.push(Column {
                 cause: Some(cause),
-                axis,
+                site,
                 shape: shape.clone(),
                 at,
                 scale: 1.0,
@@ -174,6 +174,7 @@ fn problem(
             radius_m: run.radius_m,
             feed_m_s: run.feed_m_s,
             direction: run.direction,
+            plane: super::grid::plane_of(run),
         })
         .collect();
     let last = (seen.len().max(2) - 1) as f64;
@@ -182,7 +183,7 @@ fn problem(
     let possible = information::views(circles, &response, &vec![0.5; circles.len()]);
     let mut columns = vec![Column {
         cause: None,
-        axis: None,
+        site: crate::causes::Site::Machine,
         shape: Vec::new(),
         at: 0,
         scale: 1.0,
@@ -233,7 +234,8 @@ fn pairs(problem: &Problem, diagnosis: &Diagnosis, question: &Question) -> Vec<P
             continue;
         };
         let Some(own) = problem.columns.iter().position(|c| {
-            c.cause == Some(finding.cause) && (finding.axis.is_none() || c.axis == finding.axis)
+            c.cause == Some(finding.cause)
+                && (finding.axis.is_none() || c.site.axis() == finding.axis)
         }) else {
             continue;
         };

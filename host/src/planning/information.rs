@@ -1,13 +1,13 @@
 //! What a circle would tell of every explanation: products of the causes' signatures over one turn, with the
 //! noise of a sample and the scatter between runs in the metric.
 use super::grid::Circle;
-use crate::causes::{Cause, RunView};
+use crate::causes::{Cause, RunView, Site};
 use crate::diagnosis::Diagnosis;
 use crate::diagnosis::basis::{Basis, COLUMNS, ORDERS};
 use crate::diagnosis::spread::Spread;
 use crate::diagnosis::survey::Response;
 use crate::diagnosis::vector::dot;
-use giotto_shared::Axis;
+use giotto_shared::Frame;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -23,7 +23,7 @@ pub struct Column {
     /// Which cause; nothing: the second cumulant of the simulation itself.
     pub cause: Option<Cause>,
     /// Where.
-    pub axis: Option<Axis>,
+    pub site: Site,
     /// Parameters of the signature.
     pub shape: Vec<f64>,
     /// Which of its columns.
@@ -47,6 +47,8 @@ pub fn views(circles: &[Circle], response: &Response, elapsed: &[f64]) -> Vec<Ru
                 feed_m_s: circle.feed_m_s,
                 omega_rad_s: omega,
                 sign,
+                frame: Frame::of(circle.plane),
+                centre_m: [0.0; 3],
                 elapsed: *elapsed,
                 campaign_s: 3600.0,
                 largest_radius_m: largest,
@@ -82,7 +84,7 @@ fn samples(column: &Column, view: &RunView) -> Vec<f64> {
         Some(cause) => {
             cause
                 .model()
-                .signature(column.axis, &column.shape, column.at, view, &mut out)
+                .signature(column.site, &column.shape, column.at, view, &mut out)
         }
         None => out.fill(-0.5 * view.radius_m * view.omega_rad_s.powi(2) * view.gain.powi(3)),
     }

@@ -110,6 +110,7 @@ impl Plan {
                     start_angle_deg: 0.0,
                     started_s: None,
                     centre_mm: None,
+                    plane: step.plane,
                 })
                 .collect(),
             ..PlanFile::default()

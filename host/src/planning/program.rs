@@ -6,7 +6,8 @@
 //! origin of the work offset or work object; the third axis is not moved. Written from the manuals and read back by
 //! giotto's own readers and the `gcode` crate: no such program has been run on a real machine.
 use super::{Plan, Purpose, Step};
-use crate::campaign::Direction;
+use crate::campaign::{Direction, Plane};
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 /// Beyond the ±1 mm of a ballbar, mm: where the tangents begin and end.
@@ -16,13 +17,15 @@ const RUN_UP_S: f64 = 0.1;
 /// Feed between runs, mm/s.
 const POSITIONING_MM_S: f64 = 50.0;
 
-/// What the machine is told, in the plane of the circles.
+/// What the machine is told, along the two axes of the plane of each circle.
 #[derive(Clone, Debug, PartialEq)]
 enum Order {
     Say(String),
     /// Stand still until the operator goes on.
     Wait(String),
     Line([f64; 2], f64),
+    /// What follows lies in this plane.
+    In(Plane),
     /// About the origin: angles in quarter turns from the X axis, CCW positive.
     Arc {
         radius_mm: f64,
@@ -52,34 +55,48 @@ fn words(step: &Step) -> String {
     } else {
         "cw"
     };
-    format!("R {} mm, {} mm/s, {way}", step.radius_mm, step.feed_mm_s)
+    let plane = match step.plane {
+        Plane::Xy => "",
+        Plane::Yz => ", plane YZ",
+        Plane::Zx => ", plane ZX",
+    };
+    format!(
+        "R {} mm, {} mm/s, {way}{plane}",
+        step.radius_mm, step.feed_mm_s
+    )
 }
 
 fn orders(plan: &Plan) -> Vec<Order> {
     let mut out = Vec::new();
     let mut bar = None;
-    let circle = |out: &mut Vec<Order>, step: &Step, turns: usize, before: &str, after: &str| {
-        let (r, f, d) = (step.radius_mm, step.feed_mm_s, sign(step));
-        let lead = ((r + OUT_OF_RANGE_MM).powi(2) - r * r)
-            .sqrt()
-            .max(RUN_UP_S * f);
-        let lead = (lead * 10.0).ceil() / 10.0;
-        let side = f64::from(d);
-        out.push(Order::Line([-lead, -side * r], POSITIONING_MM_S));
-        out.push(Order::Wait(before.to_owned()));
-        out.push(Order::Line([0.0, -side * r], f));
-        let arc = |from, quarters| Order::Arc {
-            radius_mm: r,
-            from,
-            quarters,
-            feed_mm_s: f,
+    let mut plane = None;
+    let mut circle =
+        |out: &mut Vec<Order>, step: &Step, turns: usize, before: &str, after: &str| {
+            let (r, f, d) = (step.radius_mm, step.feed_mm_s, sign(step));
+            let lead = ((r + OUT_OF_RANGE_MM).powi(2) - r * r)
+                .sqrt()
+                .max(RUN_UP_S * f);
+            let lead = (lead * 10.0).ceil() / 10.0;
+            let side = f64::from(d);
+            if plane != Some(step.plane) {
+                plane = Some(step.plane);
+                out.push(Order::In(step.plane));
+            }
+            out.push(Order::Line([-lead, -side * r], POSITIONING_MM_S));
+            out.push(Order::Wait(before.to_owned()));
+            out.push(Order::Line([0.0, -side * r], f));
+            let arc = |from, quarters| Order::Arc {
+                radius_mm: r,
+                from,
+                quarters,
+                feed_mm_s: f,
+            };
+            out.push(arc(-d, d));
+            out.extend((0..turns).map(|_| arc(0, 4 * d)));
+            out.push(arc(0, d));
+            out.push(Order::Line([-lead, side * r], f));
+            out.push(Order::Wait(after.to_owned()));
         };
-        out.push(arc(-d, d));
-        out.extend((0..turns).map(|_| arc(0, 4 * d)));
-        out.push(arc(0, d));
-        out.push(Order::Line([-lead, side * r], f));
-        out.push(Order::Wait(after.to_owned()));
-    };
     if let Some(first) = plan.runs.first() {
         out.push(Order::Say(format!(
             "warm-up: {} turns of {}",
@@ -147,7 +164,15 @@ fn head(plan: &Plan, campaign: &str) -> [String; 3] {
             plan.seed,
             (plan.duration_s / 60.0).ceil()
         ),
-        "centre of the circles at X0 Y0, in the plane XY, Z as it stands".into(),
+        {
+            let planes: BTreeSet<_> = plan.runs.iter().map(|step| step.plane).collect();
+            if planes.iter().all(|plane| *plane == Plane::Xy) {
+                "centre of the circles at X0 Y0, in the plane XY, Z as it stands".into()
+            } else {
+                "centre of the circles at X0 Y0 Z0; the axis across a circle stays where it is"
+                    .into()
+            }
+        },
         "the path between runs is a straight line: take the bar off first".into(),
     ]
 }
@@ -163,6 +188,15 @@ fn number(value: f64) -> String {
     }
 }
 
+/// Code of a plane and the words of its two coordinates and of the centre.
+const fn gcode_words(plane: Plane) -> (&'static str, [char; 4]) {
+    match plane {
+        Plane::Xy => ("G17", ['X', 'Y', 'I', 'J']),
+        Plane::Yz => ("G19", ['Y', 'Z', 'J', 'K']),
+        Plane::Zx => ("G18", ['Z', 'X', 'K', 'I']),
+    }
+}
+
 impl Plan {
     /// The measuring program in RS-274, as LinuxCNC and Grbl read it.
     pub fn gcode(&self, campaign: &str) -> String {
@@ -172,17 +206,27 @@ impl Plan {
             .iter()
             .for_each(|line| _ = writeln!(out, "({line})"));
         out += "G17 G21 G40 G90 G94\n";
+        let mut words = gcode_words(Plane::Xy);
         for order in orders(self) {
             let _ = match order {
                 Order::Say(text) => writeln!(out, "({text})"),
+                Order::In(plane) => {
+                    words = gcode_words(plane);
+                    if words.0 == "G17" && !out.contains("G18") && !out.contains("G19") {
+                        continue;
+                    }
+                    writeln!(out, "{}", words.0)
+                }
                 Order::Wait(text) => writeln!(out, "M0 ({text})"),
                 Order::Line([x, y], feed) => {
                     writeln!(
                         out,
-                        "G1 X{} Y{} F{}",
+                        "G1 {first}{} {second}{} F{}",
                         number(x),
                         number(y),
-                        number(feed * 60.0)
+                        number(feed * 60.0),
+                        first = words.1[0],
+                        second = words.1[1],
                     )
                 }
                 Order::Arc {
@@ -199,8 +243,12 @@ impl Plan {
                     let [x, y, i, j] = [x, y, -sx, -sy].map(number);
                     writeln!(
                         out,
-                        "{code} X{x} Y{y} I{i} J{j} F{}",
-                        number(feed_mm_s * 60.0)
+                        "{code} {first}{x} {second}{y} {third}{i} {fourth}{j} F{}",
+                        number(feed_mm_s * 60.0),
+                        first = words.1[0],
+                        second = words.1[1],
+                        third = words.1[2],
+                        fourth = words.1[3],
                     )
                 }
             };
@@ -220,13 +268,14 @@ impl Plan {
                 PERS tooldata giotto_tool := [TRUE,[[0,0,0],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];\n    \
                 PERS wobjdata giotto_frame := [FALSE,TRUE,\"\",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n    \
                 PROC main()\n        ConfL \\Off;\n";
-        let target = |[x, y]: [f64; 2]| {
-            format!(
-                "[[{},{},0],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]",
-                number(x),
-                number(y)
-            )
+        let target = |plane: Plane, [u, v]: [f64; 2]| {
+            let mut point = [0.0; 3];
+            let [first, second] = plane.axes();
+            (point[first.index()], point[second.index()]) = (u, v);
+            let [x, y, z] = point.map(number);
+            format!("[[{x},{y},{z}],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]")
         };
+        let mut plane = Plane::Xy;
         let speed = |feed: f64| format!("[{},500,5000,1000]", number(feed));
         let with = "giotto_tool\\WObj:=giotto_frame";
         let list = orders(self);
@@ -239,6 +288,10 @@ impl Plan {
             };
             let _ = match order {
                 Order::Say(text) => writeln!(out, "        ! {text}"),
+                Order::In(new) => {
+                    plane = *new;
+                    Ok(())
+                }
                 Order::Wait(text) => {
                     writeln!(out, "        TPWrite \"{text}\";\n        Stop \\NoRegain;")
                 }
@@ -246,7 +299,7 @@ impl Plan {
                     writeln!(
                         out,
                         "        MoveL {},{},{zone},{with};",
-                        target(*to),
+                        target(plane, *to),
                         speed(*feed)
                     )
                 }
@@ -259,10 +312,10 @@ impl Plan {
                     // Half a turn at most in one instruction.
                     let parts = (quarters.abs() + 1) / 2;
                     let at = |share: f64| {
-                        target(on(
-                            *radius_mm,
-                            f64::from(*from) + share * f64::from(*quarters),
-                        ))
+                        target(
+                            plane,
+                            on(*radius_mm, f64::from(*from) + share * f64::from(*quarters)),
+                        )
                     };
                     for part in 0..parts {
                         let share = |s: f64| (f64::from(part) + s) / f64::from(parts);

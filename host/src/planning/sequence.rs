@@ -1,7 +1,7 @@
 //! The order of the runs: shuffled, so that drift does not pass for an effect of speed; one circle of the old
 //! campaign first, in the middle and last, so that drift is seen; turns before all of it to warm up.
-use super::grid::Circle;
-use crate::campaign::{Campaign, Direction};
+use super::grid::{self, Circle};
+use crate::campaign::{Campaign, Direction, Plane};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -27,6 +27,8 @@ pub struct Step {
     pub feed_mm_s: f64,
     /// Direction.
     pub direction: Direction,
+    /// Plane of the circle.
+    pub plane: Plane,
     /// What it is for.
     pub purpose: Purpose,
 }
@@ -45,6 +47,7 @@ fn step(circle: &Circle, purpose: Purpose) -> Step {
         radius_mm: mm(circle.radius_m),
         feed_mm_s: mm(circle.feed_m_s),
         direction: circle.direction,
+        plane: circle.plane,
         purpose,
     }
 }
@@ -61,6 +64,7 @@ pub fn sequence(campaign: &Campaign, circles: &[Circle], seed: u64) -> (Vec<Step
         radius_m: reference.radius_m,
         feed_m_s: reference.feed_m_s,
         direction: reference.direction,
+        plane: grid::plane_of(reference),
     };
     let mut tests = circles.to_vec();
     tests.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));

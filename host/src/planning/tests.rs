@@ -12,7 +12,7 @@ fn machine() -> Machine {
         servo: [PositionLoop {
             kv_per_s: 40.0,
             feed_forward: 0.0,
-        }; 2],
+        }; 3],
         radius_offset_m: 30e-6,
         ..Machine::default()
     }
@@ -178,7 +178,7 @@ fn a_gain_and_a_dead_time_are_left_to_a_line_test() {
         radius_offset_m: 0.0,
         ..machine()
     };
-    machine.split_lag(2e-4);
+    machine.split_lag(giotto_shared::Plane::Xy, 2e-4);
     let mut grid = one_radius();
     grid.extend(one_radius().into_iter().map(|(_, f, d)| (0.25, f, d)));
     let old = run(&machine, &grid, 3);

@@ -271,11 +271,11 @@ mod tests {
             servo: [PositionLoop {
                 kv_per_s: 40.0,
                 feed_forward: 0.3,
-            }; 2],
+            }; 3],
             mechanics: [Some(SecondOrder {
                 omega_n_rad_s: 60.0,
                 zeta: 0.4,
-            }); 2],
+            }); 3],
             ..Machine::default()
         }
     }
@@ -285,7 +285,7 @@ mod tests {
         for servo_only in [false, true] {
             let mut machine = full();
             if servo_only {
-                machine.mechanics = [None; 2];
+                machine.mechanics = [None; 3];
             }
             let mut stepper = Discrete::new(Chain::new(&machine, 0), 0.01).at_rest::<4>(0.25);
             let start = stepper.look([0.25, 0.0]);
@@ -369,7 +369,7 @@ mod tests {
         }
         let machine = full();
         let no_mechanics = Machine {
-            mechanics: [None; 2],
+            mechanics: [None; 3],
             ..full()
         };
         let no_filter = Machine {

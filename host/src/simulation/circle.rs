@@ -8,7 +8,7 @@ use super::memory::Memory;
 use super::orbit::{self, PIECE, Round};
 use super::wave::Turns;
 use crate::campaign::{Run, Samples};
-use giotto_shared::Direction;
+use giotto_shared::{Direction, Frame};
 use std::f64::consts::TAU;
 
 /// Most samples a turn and the fastest rate of the simulated ballbar.
@@ -41,7 +41,9 @@ pub struct CircleTest {
     /// First sample in campaign time, s.
     pub started_s: f64,
     /// Centre in machine coordinates, m.
-    pub centre_m: [f64; 2],
+    pub centre_m: [f64; 3],
+    /// How the circle lies in the machine.
+    pub frame: Frame,
     /// Samples over the turn; `None`: those of a ballbar, at most 1000 a turn and 1000 a second.
     pub samples: Option<usize>,
 }
@@ -56,7 +58,8 @@ impl CircleTest {
             direction,
             start_angle_rad,
             started_s,
-            centre_m: [0.0; 2],
+            centre_m: [0.0; 3],
+            frame: Frame::default(),
             samples: None,
         }
     }
@@ -69,7 +72,8 @@ impl CircleTest {
             direction: run.direction,
             start_angle_rad: run.start_angle_rad,
             started_s: run.started_s.unwrap_or(0.0),
-            centre_m: run.centre_m.map_or([0.0; 2], |[x, y, _]| [x, y]),
+            centre_m: run.centre_m.unwrap_or_default(),
+            frame: run.frame,
             samples: Some(run.samples.deviation_m.len()),
         }
     }
@@ -84,7 +88,7 @@ pub struct Trace {
     pub turn_s: f64,
     /// Angle of the command at each sample, rad, unwrapped: what a ballbar infers from time.
     pub angle_rad: Vec<f64>,
-    /// Tool positions about the centre, m.
+    /// Tool positions about the centre along the directions of the frame, m.
     pub position_m: Vec<[f64; 2]>,
     /// Distance from the centre minus programmed radius, m.
     pub deviation_m: Vec<f64>,
@@ -181,11 +185,17 @@ impl Lap<'_> {
         self.turn_s * sample as f64 / self.samples as f64
     }
 
-    fn tool(&self, sample: usize, axes: [AxisPoint; 2]) -> [f64; 2] {
+    /// Share of the circle's two directions that an axis has.
+    fn shares(&self, axis: usize) -> [f64; 2] {
+        self.test.frame.shares(axis)
+    }
+
+    fn tool(&self, sample: usize, axes: [AxisPoint; 3]) -> [f64; 2] {
         let place = Place {
             centre_m: self.test.centre_m,
+            frame: self.test.frame,
         };
-        geometry::tool(
+        geometry::in_plane(
             self.machine,
             place,
             self.test.started_s + self.seconds(sample),
@@ -202,7 +212,7 @@ impl Lap<'_> {
         self.turn_s / (self.samples * self.every()) as f64
     }
 
-    /// The controller commands the arc itself. Both axes go piece by piece, so that what lies between is never far.
+    /// The controller commands the arc itself. The axes go piece by piece, so that what lies between is never far.
     fn along_arc(&self) -> Vec<[f64; 2]> {
         let (machine, samples, every, step_s) =
             (self.machine, self.samples, self.every(), self.step_s());
@@ -216,28 +226,36 @@ impl Lap<'_> {
             omega_rad_s,
             step_s,
         };
-        let [x, y] = [0, 1].map(|axis| Chain::new(machine, axis));
-        let same = x == y;
-        let x = Discrete::new(x, step_s);
-        let y = if same {
-            x.clone()
-        } else {
-            Discrete::new(y, step_s)
-        };
-        let mut axes = [orbit::axis(round, 0, &x), orbit::axis(round, 1, &y)];
+        let mut known: Vec<Discrete> = Vec::with_capacity(3);
+        let mut axes = [0, 1, 2].map(|axis| {
+            let shares = self.shares(axis);
+            // An axis across the circle stands still.
+            (shares != [0.0; 2]).then(|| {
+                let chain = Chain::new(machine, axis);
+                let at = known.iter().position(|k| *k.chain() == chain);
+                let at = at.unwrap_or_else(|| {
+                    known.push(Discrete::new(chain, step_s));
+                    known.len() - 1
+                });
+                orbit::axis(round, axis, shares, &known[at])
+            })
+        });
         let piece = samples.min((PIECE / every).max(1));
         let mut waves = vec![[0.0; 2]; piece * every];
-        let mut points = [0, 1].map(|_| Vec::with_capacity(piece));
+        let mut points = [0; 3].map(|_| vec![AxisPoint::default(); piece]);
         let mut position_m = Vec::with_capacity(samples);
         for first in (0..samples).step_by(piece) {
             let waves = &mut waves[..piece.min(samples - first) * every];
             turns.fill((first * every) as f64, waves);
             for (axis, points) in axes.iter_mut().zip(&mut points) {
-                points.clear();
-                axis.follow(waves, every, points);
+                if let Some(axis) = axis {
+                    points.clear();
+                    axis.follow(waves, every, points);
+                }
             }
-            let both = points[0].iter().zip(&points[1]).enumerate();
-            position_m.extend(both.map(|(i, (x, y))| self.tool(first + i, [*x, *y])));
+            let count = waves.len() / every;
+            let at = |i: usize| [0, 1, 2].map(|axis| points[axis][i]);
+            position_m.extend((0..count).map(|i| self.tool(first + i, at(i))));
         }
         position_m
     }
@@ -245,7 +263,10 @@ impl Lap<'_> {
     /// The controller issues a set-point every `dt` and joins them by chords.
     fn along_chords(&self, dt: f64) -> Vec<[f64; 2]> {
         let step_s = dt / (dt / self.step_s()).ceil();
-        let axes = [0, 1].map(|axis| {
+        let axes = [0, 1, 2].map(|axis| {
+            if self.shares(axis) == [0.0; 2] {
+                return vec![AxisPoint::default(); self.samples];
+            }
             let grid = self.grid(axis, step_s);
             let knots = self.chords(axis, dt, grid);
             axis::motion(
@@ -256,12 +277,8 @@ impl Lap<'_> {
                 (0..self.samples).map(|i| self.seconds(i)),
             )
         });
-        axes[0]
-            .iter()
-            .zip(&axes[1])
-            .enumerate()
-            .map(|(i, (x, y))| self.tool(i, [*x, *y]))
-            .collect()
+        let at = |i: usize| [0, 1, 2].map(|axis| axes[axis][i]);
+        (0..self.samples).map(|i| self.tool(i, at(i))).collect()
     }
 
     /// Steps from rest, until nothing is left of the start and what remembers reversals has seen one, then the lap.
@@ -296,7 +313,10 @@ impl Lap<'_> {
         let turns = Turns::new(self.test.start_angle_rad, self.omega_rad_s * dt);
         let mut waves = vec![[0.0; 2]; (before + after) as usize + 1];
         turns.fill(-before, &mut waves);
-        let vertices = waves.iter().map(|wave| self.test.radius_m * wave[axis]);
+        let [u, v] = self.shares(axis);
+        let vertices = waves
+            .iter()
+            .map(|[cos, sin]| self.test.radius_m * (u * cos + v * sin));
         Knots::chords(-before * dt, dt, vertices.collect())
     }
 }

@@ -16,7 +16,7 @@ fn loops(kv_per_s: f64, feed_forward: f64) -> Machine {
         servo: [PositionLoop {
             kv_per_s,
             feed_forward,
-        }; 2],
+        }; 3],
         ..Machine::default()
     }
 }
@@ -65,8 +65,8 @@ fn linear_chain_is_its_transfer_function() {
         mechanics: [Some(SecondOrder {
             omega_n_rad_s: 38.0,
             zeta: 0.72,
-        }); 2],
-        dead_time_s: [0.012; 2],
+        }); 3],
+        dead_time_s: [0.012; 3],
         ..loops(50.0, 0.4)
     };
     let error = worst(&m, |r, f| r * (gain(&m, f / r) - 1.0));
@@ -135,7 +135,7 @@ fn cumulants_of_every_element() {
                 mechanics: [Some(SecondOrder {
                     omega_n_rad_s: wn,
                     zeta: z,
-                }); 2],
+                }); 3],
                 ..Machine::default()
             },
             -2.0 * (1.0 - 2.0 * z * z) / (wn * wn),
@@ -143,7 +143,7 @@ fn cumulants_of_every_element() {
         ),
         (
             Machine {
-                dead_time_s: [0.05; 2],
+                dead_time_s: [0.05; 3],
                 ..Machine::default()
             },
             0.0,
@@ -223,18 +223,18 @@ fn departure(machine: &Machine, radius: f64, feed: f64, law: impl Fn(f64, f64) -
 fn geometry_has_its_profiles() {
     let r = 0.15;
     let square = Machine {
-        squareness_rad: 80e-6,
+        squareness_rad: [80e-6, 0.0, 0.0],
         ..Machine::default()
     };
     assert!(departure(&square, r, 0.1, |th, _| 0.5 * 80e-6 * r * (2.0 * th).sin()) < 1e-9);
     let scale = Machine {
-        scale: [60e-6, -40e-6],
+        scale: [60e-6, -40e-6, 0.0],
         ..Machine::default()
     };
     let law = |th: f64, _: f64| 0.5 * r * 20e-6 + 0.5 * r * 100e-6 * (2.0 * th).cos();
     assert!(departure(&scale, r, 0.1, law) < 1e-9);
     let bow = Machine {
-        straightness_per_m: [1e-3, 0.0],
+        straightness_per_m: [[0.0, 1e-3, 0.0], [0.0; 3], [0.0; 3]],
         ..Machine::default()
     };
     let law = |th: f64, _: f64| 1e-3 * r * r / 4.0 * (th.sin() + (3.0 * th).sin());
@@ -250,7 +250,7 @@ fn geometry_has_its_profiles() {
         phase_rad: 0.7,
     };
     let cyclic = Machine {
-        cyclic: [None, Some(cyclic)],
+        cyclic: [None, Some(cyclic), None],
         ..Machine::default()
     };
     let law = |th: f64, _: f64| 3e-6 * th.sin() * (TAU * r * th.sin() / 0.02 + 0.7).sin();
@@ -263,7 +263,7 @@ fn unequal_axes_have_their_profiles() {
     // Feed-forward errors of first order only: τ = (1 − a)/kv per axis with κ2 nearly equal is not needed,
     // the second order is 0.4 % of the first here.
     let (kx, ky) = (500.0, 1000.0);
-    let servo = [kx, ky].map(|kv_per_s| PositionLoop {
+    let servo = [kx, ky, ky].map(|kv_per_s| PositionLoop {
         kv_per_s,
         feed_forward: 0.0,
     });
@@ -277,14 +277,14 @@ fn unequal_axes_have_their_profiles() {
     assert!(error < 2.0 * f * f / r / (kx * kx), "{error:e}");
     // The same with dead time instead: no κ2, so the profile is closer still.
     let dead = Machine {
-        dead_time_s: [0.0010, 0.0],
+        dead_time_s: [0.0010, 0.0, 0.0],
         ..Machine::default()
     };
     let law = |th: f64, d: f64| d * 0.5 * f * 0.0010 * (2.0 * th).sin();
     assert!(departure(&dead, r, f, law) < f * f / r * 0.001 * 0.001);
     // Equal delay, unequal κ2: second-order elements of equal 2ζ/ωn.
     let lag_s = 0.02;
-    let mechanics = [60.0, 90.0].map(|wn| {
+    let mechanics = [60.0, 90.0, 90.0].map(|wn| {
         Some(SecondOrder {
             omega_n_rad_s: wn,
             zeta: 0.5 * lag_s * wn,
@@ -336,7 +336,7 @@ fn backlash_steps_outward_both_ways() {
     let step = |b| {
         run(
             &Machine {
-                backlash_m: [b, 0.0],
+                backlash_m: [b, 0.0, 0.0],
                 ..Machine::default()
             },
             r,
@@ -354,11 +354,11 @@ fn backlash_steps_outward_both_ways() {
 fn lateral_play_moves_the_mean() {
     let l = 10e-6;
     let first = Machine {
-        lateral_play_m: [l, 0.0],
+        lateral_play_m: [[0.0, l, 0.0], [0.0; 3], [0.0; 3]],
         ..Machine::default()
     };
     let second = Machine {
-        lateral_play_m: [0.0, l],
+        lateral_play_m: [[0.0; 3], [l, 0.0, 0.0], [0.0; 3]],
         ..Machine::default()
     };
     assert!(departure(&first, 0.1, 0.1, |th, d| -d * l / 2.0 * th.sin().abs()) < 0.02 * l);
@@ -433,7 +433,7 @@ fn stick_slip_shows_only_near_reversals() {
         ..Friction::default()
     };
     let machine = Machine {
-        friction: [Some(friction), None],
+        friction: [Some(friction), None, None],
         ..Machine::default()
     };
     let trace = run(&machine, 0.1, 0.02, Ccw);
@@ -523,7 +523,7 @@ fn friction_does_not_depend_on_the_steps() {
             ..Friction::default()
         };
         let machine = Machine {
-            friction: [Some(friction); 2],
+            friction: [Some(friction); 3],
             ..loops(40.0, 0.0)
         };
         let lap = |samples| {

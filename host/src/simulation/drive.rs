@@ -4,6 +4,7 @@ use super::circle::{CircleTest, Trace};
 use super::command::Knots;
 use super::geometry::{self, Place};
 use super::machine::Machine;
+use giotto_shared::Frame;
 use std::f64::consts::TAU;
 
 /// Set-points as a controller issues them.
@@ -12,9 +13,11 @@ pub struct SetPoints<'a> {
     /// Distance in time, s.
     pub dt_s: f64,
     /// Positions in machine coordinates, m.
-    pub position_m: &'a [[f64; 2]],
+    pub position_m: &'a [[f64; 3]],
     /// Centre about which geometry, growth and the radial errors act, m.
-    pub centre_m: [f64; 2],
+    pub centre_m: [f64; 3],
+    /// Directions in which the radial errors act.
+    pub frame: Frame,
     /// First set-point in campaign time, s.
     pub started_s: f64,
     /// How the drives join the set-points.
@@ -37,7 +40,7 @@ pub struct Path {
     /// Distance in time, s.
     pub dt_s: f64,
     /// Tool positions in machine coordinates, m, at the times of the set-points.
-    pub position_m: Vec<[f64; 2]>,
+    pub position_m: Vec<[f64; 3]>,
 }
 
 /// Moves the machine along set-points, from rest at the first one.
@@ -57,10 +60,10 @@ pub fn drive(machine: &Machine, set_points: &SetPoints<'_>) -> Path {
     if !(dt_s > 0.0 && dt_s.is_finite() && machine.check().is_ok()) {
         return Path {
             dt_s,
-            position_m: vec![[f64::NAN; 2]; n],
+            position_m: vec![[f64::NAN; 3]; n],
         };
     }
-    let axes: [Vec<_>; 2] = std::array::from_fn(|axis| {
+    let axes: [Vec<_>; 3] = std::array::from_fn(|axis| {
         let centre = set_points.centre_m[axis];
         let positions: Vec<f64> = set_points
             .position_m
@@ -77,13 +80,15 @@ pub fn drive(machine: &Machine, set_points: &SetPoints<'_>) -> Path {
         };
         axis::motion(machine, axis, &knots, grid, (0..n).map(|i| dt_s * i as f64))
     });
+    let centre_m = set_points.centre_m;
     let place = Place {
-        centre_m: set_points.centre_m,
+        centre_m,
+        frame: set_points.frame,
     };
     let tool = |i: usize| {
         let t = set_points.started_s + dt_s * i as f64;
-        let [x, y] = geometry::tool(machine, place, t, [axes[0][i], axes[1][i]]);
-        [x + set_points.centre_m[0], y + set_points.centre_m[1]]
+        let tool = geometry::tool(machine, place, t, [0, 1, 2].map(|axis| axes[axis][i]));
+        [0, 1, 2].map(|axis| tool[axis] + centre_m[axis])
     };
     Path {
         dt_s,
@@ -123,12 +128,13 @@ impl Path {
         if self.position_m.is_empty() {
             return Trace::new(test, turn_s, vec![[f64::NAN; 2]; n]);
         }
-        let axes: [Knots; 2] = std::array::from_fn(|axis| {
-            let positions = self
-                .position_m
-                .iter()
-                .map(|p| p[axis] - test.centre_m[axis])
-                .collect();
+        let axes = [test.frame.first(), test.frame.second()].map(|direction| {
+            let along = |p: &[f64; 3]| -> f64 {
+                (0..3)
+                    .map(|axis| direction[axis] * (p[axis] - test.centre_m[axis]))
+                    .sum()
+            };
+            let positions = self.position_m.iter().map(along).collect();
             Knots::smooth(0.0, self.dt_s, positions)
         });
         let at = |i: usize| {
@@ -152,15 +158,13 @@ mod tests {
     use giotto_shared::Direction;
 
     /// Set-points of a circle from standstill at full speed, three turns.
-    fn set_points(test: &CircleTest, dt: f64) -> Vec<[f64; 2]> {
+    fn set_points(test: &CircleTest, dt: f64) -> Vec<[f64; 3]> {
         let omega = f64::from(test.direction.sign()) * test.feed_m_s / test.radius_m;
         let n = (3.0 * Path::turn_s(test) / dt) as usize;
         let point = |i: usize| {
             let (sin, cos) = (test.start_angle_rad + omega * dt * i as f64).sin_cos();
-            [
-                test.centre_m[0] + test.radius_m * cos,
-                test.centre_m[1] + test.radius_m * sin,
-            ]
+            let (first, second) = (test.frame.first(), test.frame.second());
+            [0, 1, 2].map(|k| test.centre_m[k] + test.radius_m * (cos * first[k] + sin * second[k]))
         };
         (0..n).map(point).collect()
     }
@@ -172,28 +176,42 @@ mod tests {
             servo: [PositionLoop {
                 kv_per_s: 30.0,
                 feed_forward: 0.2,
-            }; 2],
+            }; 3],
             mechanics: [Some(SecondOrder {
                 omega_n_rad_s: 70.0,
                 zeta: 0.6,
-            }); 2],
-            dead_time_s: [0.0033, 0.0041],
-            squareness_rad: 50e-6,
-            scale: [1e-5, -2e-5],
-            backlash_m: [10e-6, -5e-6],
+            }); 3],
+            dead_time_s: [0.0033, 0.0041, 0.0021],
+            squareness_rad: [50e-6, -30e-6, 80e-6],
+            scale: [1e-5, -2e-5, 4e-5],
+            backlash_m: [10e-6, -5e-6, 7e-6],
             radius_offset_m: 3e-6,
             ..Machine::default()
         };
-        machine.straightness_per_m = [1e-3, -5e-4];
-        for direction in [Direction::Ccw, Direction::Cw] {
+        machine.straightness_per_m[0][1] = 1e-3;
+        machine.straightness_per_m[1][2] = -5e-4;
+        machine.lateral_play_m[2][0] = 4e-6;
+        let frames = [
+            [0.0, 0.0, 1.0],
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [0.4, -0.5, 0.7],
+        ];
+        let frames = frames.map(|normal| Frame::across(normal).unwrap());
+        for (frame, direction) in frames
+            .into_iter()
+            .flat_map(|f| [(f, Direction::Ccw), (f, Direction::Cw)])
+        {
             let mut test = CircleTest::new(0.1, 0.7, direction);
-            test.centre_m = [0.4, -0.3];
+            test.centre_m = [0.4, -0.3, 0.2];
+            test.frame = frame;
             test.start_angle_rad = 0.6;
             let positions = set_points(&test, 1e-3);
             let set_points = SetPoints {
                 dt_s: 1e-3,
                 position_m: &positions,
                 centre_m: test.centre_m,
+                frame: test.frame,
                 started_s: 0.0,
                 hold: Hold::Cubic,
             };
@@ -228,15 +246,16 @@ mod tests {
                 servo: [PositionLoop {
                     kv_per_s: 100.0,
                     feed_forward: 0.0,
-                }; 2],
+                }; 3],
                 interpolation_s,
                 ..Machine::default()
             };
-            let centre_m = [0.0; 2];
+            let centre_m = [0.0; 3];
             let set_points = SetPoints {
                 dt_s: 1e-3,
                 position_m: &positions,
                 centre_m,
+                frame: test.frame,
                 started_s: 0.0,
                 hold,
             };
@@ -258,25 +277,26 @@ mod tests {
             servo: [PositionLoop {
                 kv_per_s: 30.0,
                 feed_forward: 0.0,
-            }; 2],
-            dead_time_s: [0.0105; 2],
+            }; 3],
+            dead_time_s: [0.0105; 3],
             ..Machine::default()
         };
         let set_points = |position_m| SetPoints {
             dt_s: 1e-3,
             position_m,
-            centre_m: [1.0, 2.0],
+            centre_m: [1.0, 2.0, 0.0],
+            frame: Frame::default(),
             started_s: 0.0,
             hold: Hold::Cubic,
         };
-        let path = drive(&machine, &set_points(&[[0.25, -0.5]; 50]));
+        let path = drive(&machine, &set_points(&[[0.25, -0.5, 0.1]; 50]));
         assert!(
             path.position_m
                 .iter()
                 .all(|p| (p[0] - 0.25).abs() < 1e-12 && (p[1] + 0.5).abs() < 1e-12)
         );
         assert!(drive(&machine, &set_points(&[])).position_m.is_empty());
-        let one = drive(&machine, &set_points(&[[0.25, -0.5]]));
+        let one = drive(&machine, &set_points(&[[0.25, -0.5, 0.1]]));
         assert!((one.position_m[0][0] - 0.25).abs() < 1e-12);
     }
 }

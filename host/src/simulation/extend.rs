@@ -1,12 +1,13 @@
 //! Changes to the chain that a diagnosis asks for: a response of higher order, axes that differ.
 use super::machine::{Machine, PositionLoop, SecondOrder};
+use giotto_shared::Plane;
 
 impl Machine {
     /// Gives a chain of one lag per axis the fourth-order coefficient β2 (s⁴) beyond the lag's own 3κ2²/8, with
     /// κ2 as it is: (R/Rm)² = 1 + κ2ω² − 2β2ω⁴. Negative β2: second-order mechanics with ωn⁴ = −1/(2β2) instead
     /// of the loop; positive: feed-forward in the loop. A chain without a finite lag gets mechanics of its κ2 = 0.
     pub fn add_beta2(&mut self, beta2_s4: f64) {
-        for axis in 0..2 {
+        for axis in 0..3 {
             let a = self.servo[axis].kv_per_s.powi(-2);
             let b = -2.0 * beta2_s4;
             if b > 0.0 {
@@ -30,34 +31,37 @@ impl Machine {
         }
     }
 
-    /// Makes X lag by `delta_tau_s` more than Y: in the gains of the loops where both have a finite one, else as
-    /// dead time.
-    pub fn split_lag(&mut self, delta_tau_s: f64) {
-        let lags = self.servo.map(|servo| 1.0 / servo.kv_per_s);
+    /// Makes the first axis of a plane lag by `delta_tau_s` more than the second: in the gains of the loops where both have
+    /// a finite one, else as dead time.
+    pub fn split_lag(&mut self, plane: Plane, delta_tau_s: f64) {
+        let axes = plane.axes().map(|axis| axis.index());
+        let lags = axes.map(|axis| 1.0 / self.servo[axis].kv_per_s);
         let split = [lags[0] + 0.5 * delta_tau_s, lags[1] - 0.5 * delta_tau_s];
         if lags.iter().all(|lag| *lag > 0.0) && split.iter().all(|lag| *lag > 0.0) {
-            self.servo[0].kv_per_s = 1.0 / split[0];
-            self.servo[1].kv_per_s = 1.0 / split[1];
+            for (axis, lag) in axes.into_iter().zip(split) {
+                self.servo[axis].kv_per_s = 1.0 / lag;
+            }
         } else {
-            self.split_dead_time(delta_tau_s);
+            self.split_dead_time(plane, delta_tau_s);
         }
     }
 
-    /// Delays X by `delta_s` more than Y.
-    pub fn split_dead_time(&mut self, delta_s: f64) {
-        let [x, y] = &mut self.dead_time_s;
-        *x += delta_s.max(0.0);
-        *y += (-delta_s).max(0.0);
+    /// Delays the first axis of a plane by `delta_s` more than the second.
+    pub fn split_dead_time(&mut self, plane: Plane, delta_s: f64) {
+        let [first, second] = plane.axes().map(|axis| axis.index());
+        self.dead_time_s[first] += delta_s.max(0.0);
+        self.dead_time_s[second] += (-delta_s).max(0.0);
+        // The mean of the two is what the third one has: only the difference is an error.
+        self.dead_time_s[plane.normal().index()] += 0.5 * delta_s.abs();
     }
 
-    /// Gives X a second cumulant larger by `delta_kappa2_s2` than Y's and the same delay: the loop or the
-    /// mechanics take the one, dead time makes up for the other.
-    pub fn split_bandwidth(&mut self, delta_kappa2_s2: f64) {
+    /// Gives the first axis of a plane a second cumulant larger by `delta_kappa2_s2` than that of the second and the same
+    /// delay: the loop or the mechanics take the one, dead time makes up for the other.
+    pub fn split_bandwidth(&mut self, plane: Plane, delta_kappa2_s2: f64) {
         let mut delay = [0.0; 2];
-        for (axis, share) in [0.5 * delta_kappa2_s2, -0.5 * delta_kappa2_s2]
-            .into_iter()
-            .enumerate()
-        {
+        let shares = [0.5 * delta_kappa2_s2, -0.5 * delta_kappa2_s2];
+        let axes = plane.axes().map(|axis| axis.index());
+        for (at, (axis, share)) in axes.into_iter().zip(shares).enumerate() {
             let lag = 1.0 / self.servo[axis].kv_per_s;
             let square = lag * lag + share;
             if let (true, Some(mechanics)) =
@@ -68,14 +72,14 @@ impl Machine {
                 let zeta = (mechanics.zeta.powi(2) + 0.25 * share * omega_n * omega_n)
                     .max(1e-4)
                     .sqrt();
-                delay[axis] = 2.0 * (zeta - mechanics.zeta) / omega_n;
+                delay[at] = 2.0 * (zeta - mechanics.zeta) / omega_n;
                 mechanics.zeta = zeta;
             } else if square > 0.0 {
                 self.servo[axis].kv_per_s = square.powf(-0.5);
-                delay[axis] = square.sqrt() - lag;
+                delay[at] = square.sqrt() - lag;
             }
         }
-        self.split_dead_time(delay[1] - delay[0]);
+        self.split_dead_time(plane, delay[1] - delay[0]);
     }
 }
 
@@ -104,7 +108,7 @@ mod tests {
             servo: [PositionLoop {
                 kv_per_s,
                 feed_forward: 0.0,
-            }; 2],
+            }; 3],
             ..Machine::default()
         }
     }
@@ -113,7 +117,7 @@ mod tests {
     fn unequal_bandwidth_is_a_quarter_of_the_centripetal_acceleration_and_even() {
         for direction in [Direction::Ccw, Direction::Cw] {
             let mut machine = lag(100.0);
-            machine.split_bandwidth(2e-6);
+            machine.split_bandwidth(Plane::Xy, 2e-6);
             // Slow enough that the delays' own third order, ½f·ω²·Δτ³/3, stays below the bound.
             let [cos, sin] = oval(&machine, 0.1, 0.15, direction);
             let expected = -0.25 * 2e-6 * 0.15 * 0.15 / 0.1;
@@ -129,7 +133,7 @@ mod tests {
     fn unequal_lag_is_half_of_the_way_and_odd() {
         for (direction, sign) in [(Direction::Ccw, 1.0), (Direction::Cw, -1.0)] {
             let mut machine = lag(100.0);
-            machine.split_lag(4e-5);
+            machine.split_lag(Plane::Xy, 4e-5);
             let [_, sin] = oval(&machine, 0.3, 0.2, direction);
             let expected = sign * 0.5 * 0.2 * 4e-5;
             assert!(

@@ -31,17 +31,17 @@ impl Machine {
             machine.set_delay(delay_s);
         }
         for effect in &model.effects {
-            effect.cause.model().apply(effect, &mut machine);
+            effect.cause().model().apply(effect, &mut machine);
         }
         machine.check()?;
         Ok(machine)
     }
 
-    /// Gives both axes so much delay behind the command, s: what their chain does not have of it is dead time.
+    /// Gives every axis so much delay behind the command, s: what their chain does not have of it is dead time.
     pub fn set_delay(&mut self, delay_s: f64) {
         let mechanics = self.mechanics[0].map_or(0.0, |m| 2.0 * m.zeta / m.omega_n_rad_s);
         let own_s = mechanics + (1.0 - self.servo[0].feed_forward) / self.servo[0].kv_per_s;
-        self.dead_time_s = [(delay_s - own_s).max(0.0); 2];
+        self.dead_time_s = [(delay_s - own_s).max(0.0); 3];
     }
 
     /// As [`Self::from_model`], without effects.
@@ -55,7 +55,7 @@ impl Machine {
                 machine.servo = [PositionLoop {
                     kv_per_s,
                     feed_forward: 0.0,
-                }; 2]
+                }; 3]
             }
             Servo::SecondOrder {
                 omega_n_rad_s,
@@ -64,7 +64,7 @@ impl Machine {
                 machine.mechanics = [Some(SecondOrder {
                     omega_n_rad_s,
                     zeta,
-                }); 2];
+                }); 3];
             }
             Servo::Beta {
                 beta1_s2, beta2_s4, ..
@@ -101,23 +101,23 @@ impl Machine {
             self.servo = [PositionLoop {
                 kv_per_s: k2.powf(-0.5),
                 feed_forward: 0.0,
-            }; 2];
+            }; 3];
         } else if second_order {
-            self.mechanics = [Some(second_order_of(k2, k4)); 2];
+            self.mechanics = [Some(second_order_of(k2, k4)); 3];
         } else if k2 > 0.0 && ratio <= FEED_FORWARD_MAX_RATIO {
             let a2 = (ratio - 6.0) / (ratio + 6.0);
             self.servo = [PositionLoop {
                 kv_per_s: ((1.0 - a2) / k2).sqrt(),
                 feed_forward: a2.sqrt(),
-            }; 2];
+            }; 3];
         } else {
             // With p from 3(κ2 − p)² + 6p² = 2κ4 the rest has ζ² > 0 with room to spare.
             let p = (k2 + (2.0 * k4 - 2.0 * k2 * k2).sqrt()) / 3.0;
             self.servo = [PositionLoop {
                 kv_per_s: p.powf(-0.5),
                 feed_forward: 0.0,
-            }; 2];
-            self.mechanics = [Some(second_order_of(k2 - p, k4 - 6.0 * p * p)); 2];
+            }; 3];
+            self.mechanics = [Some(second_order_of(k2 - p, k4 - 6.0 * p * p)); 3];
         }
     }
 }
@@ -193,7 +193,7 @@ mod tests {
         let kv: f64 = 40.0;
         // Eq. 14 with its own fourth-order term: κ2²/8 + κ4/24 = 3/(8kv⁴).
         let machine = beta(-0.5 / (kv * kv), 0.375 / kv.powi(4)).unwrap();
-        assert_eq!(machine.mechanics, [None; 2]);
+        assert_eq!(machine.mechanics, [None; 3]);
         assert!(
             (machine.servo[0].kv_per_s - kv).abs() < 1e-9 * kv
                 && machine.servo[0].feed_forward < 1e-4

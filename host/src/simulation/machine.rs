@@ -1,6 +1,6 @@
 //! What a simulated machine is made of. [`Machine::default`] is a perfect one.
 
-/// A two-axis machine. Every element is off in the default.
+/// A machine of three slides, X, Y and Z in this order. Every element is off in the default.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Machine {
     /// The controller issues set-points every so many seconds and joins them by chords.
@@ -9,33 +9,34 @@ pub struct Machine {
     pub centripetal_limit_m_s2: Option<f64>,
     /// Acceleration/deceleration filter, the same on both axes.
     pub acc_dec: AccDec,
-    /// Position loops of X and Y.
-    pub servo: [PositionLoop; 2],
-    /// Second-order mechanics behind the loops of X and Y.
-    pub mechanics: [Option<SecondOrder>; 2],
+    /// Position loops.
+    pub servo: [PositionLoop; 3],
+    /// Second-order mechanics behind the loops.
+    pub mechanics: [Option<SecondOrder>; 3],
     /// Pure delay of each axis, s.
-    pub dead_time_s: [f64; 2],
+    pub dead_time_s: [f64; 3],
     /// Friction of each axis.
-    pub friction: [Option<Friction>; 2],
+    pub friction: [Option<Friction>; 3],
     /// Backlash of each axis, m (positive: outward step after a reversal, as the term `Backlash`).
-    pub backlash_m: [f64; 2],
-    /// Lateral play: index is the moving axis, the other one shifts, m.
-    pub lateral_play_m: [f64; 2],
+    pub backlash_m: [f64; 3],
+    /// Lateral play, m: first index the moving axis, second the one that shifts (as the term `LateralPlay`).
+    pub lateral_play_m: [[f64; 3]; 3],
     /// Relative scale error of each axis, m/m.
-    pub scale: [f64; 2],
-    /// Squareness error ε, rad.
-    pub squareness_rad: f64,
-    /// Guide curvature along each axis, 1/m (as the term `Straightness`).
-    pub straightness_per_m: [f64; 2],
+    pub scale: [f64; 3],
+    /// Squareness error ε of the planes XY, YZ, ZX, rad.
+    pub squareness_rad: [f64; 3],
+    /// Guide curvature, 1/m: first index the axis of travel, second the one that shifts (as the term `Straightness`).
+    pub straightness_per_m: [[f64; 3]; 3],
     /// Periodic error of each axis.
-    pub cyclic: [Option<Cyclic>; 2],
+    pub cyclic: [Option<Cyclic>; 3],
     /// Structural vibration at a fixed frequency.
     pub vibration: Option<Vibration>,
     /// Growth over campaign time, m/m per s at its start.
     pub thermal_per_s: f64,
     /// Time constant with which the growth settles, s; 0: it does not.
     pub thermal_settling_s: f64,
-    /// Lag of each axis behind the *other* one's velocity (serial arm, A12 = −A21 = half of it), s.
+    /// In the plane of the circle, lag of each direction behind the *other* one's velocity (serial arm, A12 = −A21 = half
+    /// of it), s.
     pub cross_lag_s: f64,
     /// Constant error of the radius (ball, bar), m.
     pub radius_offset_m: f64,
@@ -200,7 +201,7 @@ impl Machine {
             AccDec::Exponential(t) => time_constant("exponential_s", t)?,
             AccDec::MovingAverage(t) => time_constant("moving_average_s", t)?,
         }
-        for axis in 0..2 {
+        for axis in 0..3 {
             let servo = self.servo[axis];
             if servo.kv_per_s.is_nan() || servo.kv_per_s < 1.0 / MAX_TIME_CONSTANT_S {
                 return fail("kv_per_s", servo.kv_per_s, "0.2 /s and more");
@@ -229,16 +230,18 @@ impl Machine {
                 finite("cyclic.phase_rad", c.phase_rad)?;
             }
             finite("backlash_m", self.backlash_m[axis])?;
-            finite("lateral_play_m", self.lateral_play_m[axis])?;
             finite("scale", self.scale[axis])?;
-            finite("straightness_per_m", self.straightness_per_m[axis])?;
+            finite("squareness_rad", self.squareness_rad[axis])?;
+            for other in 0..3 {
+                finite("lateral_play_m", self.lateral_play_m[axis][other])?;
+                finite("straightness_per_m", self.straightness_per_m[axis][other])?;
+            }
         }
         if let Some(v) = self.vibration {
             positive("vibration.frequency_hz", v.frequency_hz)?;
             finite("vibration.amplitude_m", v.amplitude_m)?;
             finite("vibration.phase_rad", v.phase_rad)?;
         }
-        finite("squareness_rad", self.squareness_rad)?;
         finite("thermal_per_s", self.thermal_per_s)?;
         finite("thermal_settling_s", self.thermal_settling_s)?;
         finite("cross_lag_s", self.cross_lag_s)?;

@@ -1,5 +1,6 @@
 //! `[machine]` of a plan: the machine in the units of the workshop.
 use super::machine::{AccDec, Cyclic, Friction, Machine, MachineError, SecondOrder, Vibration};
+use giotto_shared::Actuator;
 use serde::{Deserialize, Serialize};
 
 /// A machine as a plan writes it. What is left out is perfect.
@@ -18,8 +19,12 @@ pub struct MachineSpec {
     /// Length of a moving average, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub moving_average_s: Option<f64>,
-    /// Squareness error, µm/m.
+    /// Squareness error of X and Y, µm/m.
     pub squareness_um_per_m: f64,
+    /// Squareness error of Y and Z, µm/m.
+    pub squareness_yz_um_per_m: f64,
+    /// Squareness error of Z and X, µm/m.
+    pub squareness_zx_um_per_m: f64,
     /// Growth, µm/m per hour.
     pub thermal_um_per_m_per_h: f64,
     /// Constant error of the radius, µm.
@@ -27,12 +32,14 @@ pub struct MachineSpec {
     /// Vibration.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vibration: Option<VibrationSpec>,
-    /// What both axes have.
+    /// What all axes have.
     pub both: AxisSpec,
     /// What X has; goes before `both`.
     pub x: AxisSpec,
     /// What Y has; goes before `both`.
     pub y: AxisSpec,
+    /// What Z has; goes before `both`.
+    pub z: AxisSpec,
 }
 
 /// Vibration at a fixed frequency.
@@ -45,6 +52,9 @@ pub struct VibrationSpec {
     #[serde(default)]
     pub phase_deg: f64,
 }
+
+/// The axis that shifts where a plan names none: Y for X, X for Y and for Z.
+const NEXT: [Actuator; 3] = [Actuator::Y, Actuator::X, Actuator::X];
 
 /// One axis.
 #[derive(Clone, Copy, Debug, PartialEq, Default, Serialize, Deserialize)]
@@ -68,10 +78,16 @@ pub struct AxisSpec {
     pub backlash_um: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lateral_play_um: Option<f64>,
+    /// The axis that shifts; left out: Y for X, X for Y and Z.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lateral_play_across: Option<Actuator>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale_um_per_m: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub straightness_per_m: Option<f64>,
+    /// The axis that shifts; left out: Y for X, X for Y and Z.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub straightness_across: Option<Actuator>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub friction_peak_um: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -108,7 +124,12 @@ impl MachineSpec {
         let mut machine = Machine {
             interpolation_s: self.interpolation_s,
             centripetal_limit_m_s2: self.centripetal_limit_mm_s2.map(|a| a * 1e-3),
-            squareness_rad: self.squareness_um_per_m * 1e-6,
+            squareness_rad: [
+                self.squareness_um_per_m,
+                self.squareness_yz_um_per_m,
+                self.squareness_zx_um_per_m,
+            ]
+            .map(|v| v * 1e-6),
             thermal_per_s: self.thermal_um_per_m_per_h * 1e-6 / 3600.0,
             radius_offset_m: self.radius_offset_um * 1e-6,
             vibration: self.vibration.map(|v| Vibration {
@@ -129,7 +150,7 @@ impl MachineSpec {
             (None, Some(t)) => AccDec::MovingAverage(t),
             (None, None) => AccDec::None,
         };
-        for (axis, own) in [self.x, self.y].into_iter().enumerate() {
+        for (axis, own) in [self.x, self.y, self.z].into_iter().enumerate() {
             let get = |part: fn(&AxisSpec) -> Option<f64>| part(&own).or_else(|| part(&self.both));
             if let Some(kv) = get(|a| a.kv_per_s) {
                 machine.servo[axis].kv_per_s = kv;
@@ -146,9 +167,11 @@ impl MachineSpec {
             };
             machine.dead_time_s[axis] = get(|a| a.dead_time_s).unwrap_or(0.0);
             machine.backlash_m[axis] = get(|a| a.backlash_um).unwrap_or(0.0) * 1e-6;
-            machine.lateral_play_m[axis] = get(|a| a.lateral_play_um).unwrap_or(0.0) * 1e-6;
+            let shifts = across(axis, own.lateral_play_across)?;
+            machine.lateral_play_m[axis][shifts] = get(|a| a.lateral_play_um).unwrap_or(0.0) * 1e-6;
             machine.scale[axis] = get(|a| a.scale_um_per_m).unwrap_or(0.0) * 1e-6;
-            machine.straightness_per_m[axis] = get(|a| a.straightness_per_m).unwrap_or(0.0);
+            let bows = across(axis, own.straightness_across)?;
+            machine.straightness_per_m[axis][bows] = get(|a| a.straightness_per_m).unwrap_or(0.0);
             let (peak, stick) = (get(|a| a.friction_peak_um), get(|a| a.stick_slip_um));
             if peak.is_some() || stick.is_some() {
                 let standard = Friction::default();
@@ -179,4 +202,17 @@ impl MachineSpec {
         machine.check()?;
         Ok(machine)
     }
+}
+
+/// Index of the axis that shifts when `axis` moves.
+fn across(axis: usize, named: Option<Actuator>) -> Result<usize, MachineError> {
+    let other = named.unwrap_or(NEXT[axis]);
+    if other.is_slide() && other.index() != axis {
+        return Ok(other.index());
+    }
+    Err(MachineError {
+        name: "across",
+        value: f64::NAN,
+        allowed: "another one of x, y and z",
+    })
 }

@@ -56,7 +56,7 @@ impl Memory {
     pub(super) fn needed(machine: &Machine, axis: usize) -> bool {
         machine.backlash_m[axis] != 0.0
             || machine.friction[axis].is_some()
-            || machine.lateral_play_m[axis] != 0.0
+            || machine.lateral_play_m[axis] != [0.0; 3]
     }
 
     /// `None` for an axis on which nothing does.
@@ -242,7 +242,7 @@ mod tests {
     #[test]
     fn play_lags_on_both_sides() {
         let machine = Machine {
-            backlash_m: [2e-5, 0.0],
+            backlash_m: [2e-5, 0.0, 0.0],
             ..Machine::default()
         };
         let mut memory = Memory::new(&machine, 0, [0.0, 1.0], 1.0).unwrap();
@@ -265,7 +265,7 @@ mod tests {
             ..Friction::default()
         };
         let machine = Machine {
-            friction: [Some(friction), None],
+            friction: [Some(friction), None, None],
             ..Machine::default()
         };
         let mut memory = Memory::new(&machine, 0, [0.0, 1.0], 1.0).unwrap();

@@ -39,4 +39,6 @@ pub use plan::{Plan, PlannedTest, campaign};
 #[cfg(test)]
 mod closed_forms;
 #[cfg(test)]
+mod in_every_plane;
+#[cfg(test)]
 mod plan_tests;

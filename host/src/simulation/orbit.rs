@@ -10,7 +10,7 @@ use super::wave::{Turns, phasor};
 /// Steps for which waves are worked out at a time: they stay in the L1 cache.
 pub(super) const PIECE: usize = 512;
 
-/// The circle that both axes are on.
+/// The circle that the axes are on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Round<'a> {
     pub(super) machine: &'a Machine,
@@ -27,13 +27,18 @@ pub(super) trait Orbit {
 }
 
 /// The axis, ready to step from step 0 of the waves.
-pub(super) fn axis(round: Round<'_>, axis: usize, chain: &Discrete) -> Box<dyn Orbit> {
+pub(super) fn axis(
+    round: Round<'_>,
+    axis: usize,
+    shares: [f64; 2],
+    chain: &Discrete,
+) -> Box<dyn Orbit> {
     match chain.chain().states() {
-        0 => Box::new(Axis::<0>::new(round, axis, chain)),
-        1 => Box::new(Axis::<1>::new(round, axis, chain)),
-        2 => Box::new(Axis::<2>::new(round, axis, chain)),
-        3 => Box::new(Axis::<3>::new(round, axis, chain)),
-        _ => Box::new(Axis::<4>::new(round, axis, chain)),
+        0 => Box::new(Axis::<0>::new(round, axis, shares, chain)),
+        1 => Box::new(Axis::<1>::new(round, axis, shares, chain)),
+        2 => Box::new(Axis::<2>::new(round, axis, shares, chain)),
+        3 => Box::new(Axis::<3>::new(round, axis, shares, chain)),
+        _ => Box::new(Axis::<4>::new(round, axis, shares, chain)),
     }
 }
 
@@ -50,7 +55,7 @@ struct Track {
 }
 
 impl<const S: usize> Axis<S> {
-    fn new(round: Round<'_>, axis: usize, chain: &Discrete) -> Self {
+    fn new(round: Round<'_>, axis: usize, shares: [f64; 2], chain: &Discrete) -> Self {
         let Round {
             machine,
             turns,
@@ -59,7 +64,12 @@ impl<const S: usize> Axis<S> {
             ..
         } = round;
         let before = run_in_s(round, axis).map_or(0.0, |s| (s / step_s).min(MAX_STEPS).ceil());
-        let phasor = phasor(machine, axis, round.radius_m, omega_rad_s);
+        let phasor = phasor(
+            machine,
+            axis,
+            shares.map(|share| round.radius_m * share),
+            omega_rad_s,
+        );
         let start = turns.at(-before);
         let chain = chain.in_orbit(phasor, omega_rad_s, turns.step_rad(), start);
         let last = chain.look(start);
@@ -145,21 +155,21 @@ mod tests {
             servo: [PositionLoop {
                 kv_per_s: 30.0,
                 feed_forward: 0.0,
-            }; 2],
+            }; 3],
             ..Machine::default()
         };
         let machines = [
             Machine {
-                backlash_m: [2e-5; 2],
+                backlash_m: [2e-5; 3],
                 ..lagging()
             },
             Machine {
-                friction: [Some(sharp); 2],
+                friction: [Some(sharp); 3],
                 ..lagging()
             },
             Machine {
-                friction: [Some(soft); 2],
-                backlash_m: [1e-5; 2],
+                friction: [Some(soft); 3],
+                backlash_m: [1e-5; 3],
                 ..lagging()
             },
         ];
@@ -176,7 +186,7 @@ mod tests {
                     step_s,
                 };
                 let chain = Discrete::new(Chain::new(machine, 0), step_s);
-                let mut axis = axis(round, 0, &chain);
+                let mut axis = axis(round, 0, [1.0, 0.0], &chain);
                 let mut waves = [[0.0; 2]; STEPS];
                 let mut lap = |first: usize| {
                     let mut points = Vec::new();

@@ -2,7 +2,7 @@
 use super::circle::{CircleTest, circle};
 use super::instrument::Instrument;
 use super::machine::Machine;
-use crate::campaign::{Campaign, Frame, Run};
+use crate::campaign::{Campaign, Run};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -77,12 +77,8 @@ pub fn campaign(plan: &Plan, seed: u64) -> Campaign {
             start_angle_rad: test.start_angle_rad,
             started_s: Some(test.started_s),
             temperature_c: None,
-            centre_m: (test.centre_m != [0.0; 2]).then_some([
-                test.centre_m[0],
-                test.centre_m[1],
-                0.0,
-            ]),
-            frame: Frame::default(),
+            centre_m: (test.centre_m != [0.0; 3]).then_some(test.centre_m),
+            frame: test.frame,
             setup: None,
             samples,
         }

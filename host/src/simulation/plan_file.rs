@@ -26,7 +26,7 @@ use super::machine_spec::MachineSpec;
 use super::plan::{Plan, PlannedTest};
 use crate::model_file::ModelFile;
 use crate::toml_file::{TomlFileError, TomlText};
-use giotto_shared::Direction;
+use giotto_shared::{Direction, Frame, Plane};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -107,6 +107,9 @@ pub struct Grid {
     /// How often each circle is run.
     #[serde(default = "once")]
     pub repeats: usize,
+    /// Planes of the circles.
+    #[serde(default = "flat")]
+    pub planes: Vec<Plane>,
 }
 
 /// Order of a grid.
@@ -139,6 +142,13 @@ pub struct RunSpec {
     /// Centre in the machine, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub centre_mm: Option<[f64; 3]>,
+    /// Plane of the circle.
+    #[serde(default)]
+    pub plane: Plane,
+}
+
+fn flat() -> Vec<Plane> {
+    vec![Plane::Xy]
 }
 
 fn both_directions() -> Vec<Direction> {
@@ -317,11 +327,11 @@ impl Grid {
                 return Err(text.value_error(&["grid", key, &i.to_string()], list[i], RANGE));
             }
         }
-        if self.directions.is_empty() || self.repeats == 0 {
-            let key = if self.repeats == 0 {
-                "repeats"
-            } else {
-                "directions"
+        if self.directions.is_empty() || self.planes.is_empty() || self.repeats == 0 {
+            let key = match (self.repeats, self.planes.len()) {
+                (0, _) => "repeats",
+                (_, 0) => "planes",
+                _ => "directions",
             };
             return Err(text.missed(
                 &["grid", key],
@@ -337,8 +347,13 @@ impl Grid {
                     .iter()
                     .flat_map(|d| std::iter::repeat_n(*d, self.repeats))
                 {
-                    let test = CircleTest::new(radius * 1e-3, feed * 1e-3, direction);
-                    tests.push(PlannedTest { test, timed: false });
+                    for plane in &self.planes {
+                        let test = CircleTest {
+                            frame: Frame::of(*plane),
+                            ..CircleTest::new(radius * 1e-3, feed * 1e-3, direction)
+                        };
+                        tests.push(PlannedTest { test, timed: false });
+                    }
                 }
                 if tests.len() > MAX_RUNS {
                     return Ok(tests);
@@ -375,7 +390,8 @@ impl RunSpec {
         let test = CircleTest {
             start_angle_rad: self.start_angle_deg.to_radians(),
             started_s: started,
-            centre_m: [centre[0] * 1e-3, centre[1] * 1e-3],
+            centre_m: centre.map(|c| c * 1e-3),
+            frame: Frame::of(self.plane),
             ..CircleTest::new(self.radius_mm * 1e-3, self.feed_mm_s * 1e-3, self.direction)
         };
         Ok(PlannedTest {

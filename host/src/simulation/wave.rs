@@ -1,7 +1,6 @@
 //! The command of a circle at a constant rate: a wave on each axis, Re(phasor·e^{iψ}), ψ the angle of the command.
 use super::machine::{AccDec, Machine};
 use nalgebra::Complex;
-use std::f64::consts::FRAC_PI_2;
 
 /// Steps from one evaluated angle to the next.
 const FINE: usize = 32;
@@ -51,15 +50,15 @@ fn wave(angle_rad: f64) -> [f64; 2] {
     [cos, sin]
 }
 
-/// Phasor of what reaches the chain of one axis (0: X, 1: Y), m: the circle behind dead time and moving average.
+/// Phasor of what reaches the chain of an axis that is commanded `reach_m[0]`·cosψ + `reach_m[1]`·sinψ: behind dead time
+/// and moving average.
 pub(super) fn phasor(
     machine: &Machine,
     axis: usize,
-    radius_m: f64,
+    reach_m: [f64; 2],
     omega_rad_s: f64,
 ) -> Complex<f64> {
-    let quarter = if axis == 0 { 0.0 } else { FRAC_PI_2 };
-    let circle = Complex::from_polar(radius_m, -quarter);
+    let circle = Complex::new(reach_m[0], -reach_m[1]);
     let late = Complex::cis(-omega_rad_s * machine.dead_time_s[axis]);
     let mean = match machine.acc_dec {
         // ∫e^{iωt}dt over the window before now, over its length.
@@ -104,7 +103,7 @@ mod tests {
     fn phasor_is_the_late_mean_of_the_circle() {
         let machine = Machine {
             acc_dec: AccDec::MovingAverage(0.08),
-            dead_time_s: [0.01, 0.03],
+            dead_time_s: [0.01, 0.03, 0.02],
             ..Machine::default()
         };
         let (radius, omega, psi, n) = (0.2, -5.0, 0.7, 20_000);
@@ -115,7 +114,9 @@ mod tests {
             };
             let window = |k: i32| 0.08 * (f64::from(k) + 0.5) / f64::from(n);
             let mean = (0..n).map(|k| at(window(k))).sum::<f64>() / f64::from(n);
-            let found = (phasor(&machine, axis, radius, omega) * Complex::cis(psi)).re;
+            let found = (phasor(&machine, axis, [[radius, 0.0], [0.0, radius]][axis], omega)
+                * Complex::cis(psi))
+            .re;
             assert!((found - mean).abs() < 1e-10, "axis {axis}: {found} {mean}");
         }
     }

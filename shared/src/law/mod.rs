@@ -7,4 +7,5 @@ mod operator;
 mod profile;
 
 pub use operator::{AngularMotion, Gain, Operator};
-pub use profile::{CyclicError, MAX_CYCLIC, Profile, ProfileError, Spike};
+pub use profile::{CyclicError, MAX_CYCLIC, Profile, Spike, Unmergeable};
+pub(crate) use profile::{finite, positive, slide_index};

@@ -104,6 +104,7 @@ impl CircleRun {
             centre_nm: to_nm(Quantity::Centre, &self.centre_m)?,
             radius_half_nm: to_half_nm(self.radius_m),
             feed_m_s: self.feed_m_s as f32,
+            plane: self.plane,
             direction: self.direction,
             laps: self.laps,
             start: phase_from_rad(self.start_rad),
@@ -232,8 +233,8 @@ fn unit(a: [f64; 3]) -> Option<[f64; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Direction;
     use crate::angle::RAD_PER_UNIT;
+    use crate::{Direction, Plane};
     use std::vec::Vec;
 
     const FROM_NM: [i32; 3] = [60_000_000, 5_000_000, 1_000_000];
@@ -333,6 +334,7 @@ mod tests {
             centre_m: [-0.29, 0.987, 0.615],
             radius_m: 0.1,
             feed_m_s: 0.7,
+            plane: Plane::Zx,
             direction: Direction::Cw,
             laps: 3,
             start_rad: -TAU / 4.0,
@@ -364,6 +366,7 @@ mod tests {
             centre_m: [0.0; 3],
             radius_m: 0.1,
             feed_m_s: 0.7,
+            plane: Plane::Xy,
             direction: Direction::Ccw,
             laps: 1,
             start_rad: 0.0,

@@ -3,9 +3,9 @@
 //!
 //! `convert` makes these from SI. Where a segment ends is said here once, so that a host knows to the nanometre where the
 //! controller will stand: the next arc starts there.
-use crate::Direction;
 use crate::angle::sincos;
 use crate::fixed::mulh_add;
+use crate::{Direction, Plane};
 use serde::{Deserialize, Serialize};
 
 /// Farthest coordinate, m: positions are `i32` nanometres, ±2.147 m.
@@ -28,6 +28,8 @@ pub struct ExactCircle {
     pub radius_half_nm: i32,
     /// Feed, m/s.
     pub feed_m_s: f32,
+    /// Plane.
+    pub plane: Plane,
     /// Sense.
     pub direction: Direction,
     /// Whole turns at constant feed.

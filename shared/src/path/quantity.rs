@@ -40,4 +40,6 @@ pub enum Quantity {
     Terms,
     #[error("distance of the set-points (s)")]
     Window,
+    #[error("override of the feed (%)")]
+    Override,
 }

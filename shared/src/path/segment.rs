@@ -1,7 +1,7 @@
 //! What a program asks for. SI, machine coordinates.
-use crate::Direction;
+use crate::{Direction, Plane};
 
-/// Full circles in the plane Z = const: an entry that gains speed along the circle, whole turns at constant feed,
+/// Full circles in a coordinate plane: an entry that gains speed along the circle, whole turns at constant feed,
 /// an exit that loses it along the circle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CircleRun {
@@ -11,7 +11,9 @@ pub struct CircleRun {
     pub radius_m: f64,
     /// Feed, m/s.
     pub feed_m_s: f64,
-    /// Sense.
+    /// Plane; polar angles run from its first axis to its second.
+    pub plane: Plane,
+    /// Sense, as the angle grows or falls.
     pub direction: Direction,
     /// Whole turns at constant feed, at least 1.
     pub laps: u32,

@@ -3,7 +3,7 @@
 //! ```text
 //! offset  size  what
 //!      0     4  magic 47 49 4F 54 ("GIOT")          ┐
-//!      4     2  format version, 1                   │ fixed for all versions, so that a newer table
+//!      4     2  format version, 2                   │ fixed for all versions, so that a newer table
 //!      6     2  flags: bit 0 = signed               │ is told from a broken one
 //!      8     4  length n of the whole image, bytes  │
 //!     12     4  CRC-32 of bytes 0..12 and 16..n     ┘
@@ -15,12 +15,13 @@
 //! The CRC is ISO-HDLC (the one of Ethernet and zip). The order of checks is magic, length, CRC, version,
 //! flags, schema, body, numbers: a flipped bit is called a flipped bit, not a newer version.
 use super::{Limits, MAX_TERMS, MAX_ZONES, Table, TableError, Zone};
-use crate::wire::{Crc32, crc32, take};
+use crate::encoding::{Crc32, crc32, take};
 
 /// First four bytes of a table.
 pub const MAGIC: [u8; 4] = *b"GIOT";
-/// Format written and the newest read by this build.
-pub const FORMAT_VERSION: u16 = 1;
+/// Format written and read by this build. Format 1 knew X and Y of one plane only: whether its terms meant this
+/// machine's X and Y its bytes do not say.
+pub const FORMAT_VERSION: u16 = 2;
 /// Flag bit 0: a signature follows the body.
 pub const FLAG_SIGNED: u16 = 1;
 /// Length of the header.
@@ -30,7 +31,7 @@ pub const SIGNATURE_BYTES: usize = 64;
 /// Changes when the body's meaning does.
 pub const SCHEMA_HASH: u32 = crc32(include_bytes!("schema.txt"));
 
-/// Longest body: every string, vector and option full, every term the longest (tag, axis, three numbers).
+/// Longest body: every string, vector and option full, every term the longest (tag, actuator, three numbers).
 const MAX_BODY_BYTES: usize = {
     let term = 1 + 1 + 3 * 4;
     let zone = (1 + 24) + 8 + 8 + 1 + 8 + (1 + MAX_TERMS * term);
@@ -175,6 +176,12 @@ fn body(bytes: &[u8]) -> Result<&[u8], TableError> {
     match header.version {
         FORMAT_VERSION => {}
         0 => return Err(TableError::UnknownVersion { version: 0 }),
+        version if version < FORMAT_VERSION => {
+            return Err(TableError::OlderVersion {
+                version,
+                supported: FORMAT_VERSION,
+            });
+        }
         version => {
             return Err(TableError::NewerVersion {
                 version,

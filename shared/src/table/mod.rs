@@ -1,9 +1,9 @@
 //! The correction table that the controller keeps: its types here, its bytes in [`image`], its checks in
-//! [`validate`], the bounds of the image in [`bounds`].
-pub mod bounds;
+//! [`validate`], the bounds of the image in [`bounds`](crate::bounds).
 pub mod image;
 pub mod validate;
 
+pub use crate::bounds;
 pub use image::{
     FORMAT_VERSION, Header, MAX_IMAGE_BYTES, SCHEMA_HASH, check, decode, decode_into, encode,
 };

@@ -1,7 +1,7 @@
 //! Every way in which a table can be wrong, each its own error. Whatever passes may be handed to the engine.
-use super::bounds;
 use super::{Limits, Table, Zone};
-use crate::term::Term;
+use crate::term::{Number, Term, Unfit};
+use crate::{Actuator, bounds};
 use serde::{Deserialize, Serialize};
 
 /// Which number of a table an error speaks of.
@@ -15,15 +15,7 @@ pub enum Field {
     Feed,
     Kappa2,
     Kappa4,
-    TermOffset,
-    TermRelative,
-    TermShear,
-    TermDeltaTau,
-    TermDeltaKappa2,
-    TermDecay,
-    TermPitch,
-    TermPhase,
-    TermCurvature,
+    Term(Number),
 }
 
 impl Field {
@@ -37,15 +29,7 @@ impl Field {
             Self::Feed => "feed (m/s)",
             Self::Kappa2 => "kappa2 (s^2)",
             Self::Kappa4 => "kappa4 (s^4)",
-            Self::TermOffset => "length of a term (m)",
-            Self::TermRelative => "relative length of a term (m/m)",
-            Self::TermShear => "squareness (rad)",
-            Self::TermDeltaTau => "lag mismatch (s)",
-            Self::TermDeltaKappa2 => "bandwidth mismatch (s^2)",
-            Self::TermDecay => "decay of a reversal pulse (s)",
-            Self::TermPitch => "pitch (m)",
-            Self::TermPhase => "phase (rad)",
-            Self::TermCurvature => "guide curvature (1/m)",
+            Self::Term(number) => number.name(),
         }
     }
 }
@@ -178,6 +162,32 @@ pub enum TableError {
     /// The signature is not that of these bytes by the provisioned key.
     #[error("table signature does not fit its bytes and the controller's key")]
     BadSignature,
+    /// Written by an older giotto, whose terms had no plane.
+    #[error(
+        "table format {version} is older than this build's {supported}: its terms do not say which plane they are of"
+    )]
+    OlderVersion {
+        /// Version in the header.
+        version: u16,
+        /// Version this build reads.
+        supported: u16,
+    },
+    /// A term of a joint: a zone has no kinematics to correct it through.
+    #[error("{at}: a term is for {actuator}, and a zone corrects slides only")]
+    Joint {
+        /// Which zone.
+        at: Where,
+        /// The joint.
+        actuator: Actuator,
+    },
+    /// A sideways term that names one slide twice.
+    #[error("{at}: a term shifts {actuator} across {actuator} itself")]
+    SameActuator {
+        /// Which zone.
+        at: Where,
+        /// The slide.
+        actuator: Actuator,
+    },
 }
 
 /// Checks of the numbers in one place of the table.
@@ -219,49 +229,27 @@ impl Check {
     }
 
     fn term(&self, term: &Term<f32>) -> Result<(), TableError> {
-        let length = |value| self.magnitude(Field::TermOffset, value, bounds::OFFSET_MAX_M);
-        match *term {
-            Term::RadiusOffset { offset_m } => length(offset_m),
-            Term::ScaleError { relative } | Term::ScaleMismatch { relative } => {
-                self.magnitude(Field::TermRelative, relative, bounds::RELATIVE_MAX)
-            }
-            Term::Squareness { shear_rad } => {
-                self.magnitude(Field::TermShear, shear_rad, bounds::SHEAR_MAX_RAD)
-            }
-            Term::ServoMismatch { delta_tau_s } => {
-                self.magnitude(Field::TermDeltaTau, delta_tau_s, bounds::DELTA_TAU_MAX_S)
-            }
-            Term::BandwidthMismatch { delta_kappa2_s2 } => self.magnitude(
-                Field::TermDeltaKappa2,
-                delta_kappa2_s2,
-                bounds::KAPPA2_MAX_S2,
-            ),
-            Term::Backlash { step_m, .. } => length(step_m),
-            Term::LateralPlay { shift_m, .. } => length(shift_m),
-            Term::ReversalSpike {
-                peak_m, decay_s, ..
-            } => {
-                length(peak_m)?;
-                self.within(Field::TermDecay, decay_s, bounds::DECAY_S)
-            }
-            Term::Cyclic {
-                amplitude_m,
-                pitch_m,
-                phase_rad,
-                ..
-            } => {
-                length(amplitude_m)?;
-                self.within(Field::TermPitch, pitch_m, bounds::PITCH_M)?;
-                self.magnitude(Field::TermPhase, phase_rad, bounds::PHASE_MAX_RAD)
-            }
-            Term::Straightness {
-                curvature_per_m, ..
-            } => self.magnitude(
-                Field::TermCurvature,
-                curvature_per_m,
-                bounds::CURVATURE_MAX_PER_M,
-            ),
-        }
+        let at = self.0;
+        term.validate().map_err(|unfit| match unfit {
+            Unfit::NotFinite(number) => TableError::NonFinite {
+                at,
+                field: Field::Term(number),
+            },
+            Unfit::OutOfBounds {
+                number,
+                value,
+                lo,
+                hi,
+            } => TableError::OutOfBounds {
+                at,
+                field: Field::Term(number),
+                value,
+                lo,
+                hi,
+            },
+            Unfit::Joint(actuator) => TableError::Joint { at, actuator },
+            Unfit::Same(actuator) => TableError::SameActuator { at, actuator },
+        })
     }
 }
 

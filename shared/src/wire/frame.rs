@@ -1,7 +1,6 @@
 //! Frames: `COBS(payload · CRC-32) · 00`. Bytes may be lost, changed or joined anywhere; whatever arrives,
 //! [`Accumulator`] finds the next whole frame after the next zero.
-use super::crc32;
-use super::writer::Writer;
+use crate::encoding::{Writer, crc32};
 use cobs::{DecodeResult, DecoderState};
 use serde::Serialize;
 

@@ -1,11 +1,11 @@
 //! The messages. A change here is a change of [`PROTOCOL_VERSION`].
-use super::Refusal;
+use super::{ClockSource, EVENTS, Event, MachineConfig, Refusal, ResetCause};
 use crate::path::{ExactCircle, ExactSegment};
 use serde::de::{Error, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// Version of the messages of this build; both sides must have the same.
-pub const PROTOCOL_VERSION: u16 = 3;
+pub const PROTOCOL_VERSION: u16 = 4;
 
 /// Most bytes of a table in one message.
 pub const CHUNK: usize = 128;
@@ -21,6 +21,9 @@ pub const IN_FLIGHT: usize = 768;
 /// A link that is silent for so long during a run counts as dead, unless the host asks otherwise, ms: four times the
 /// host's longest silence.
 pub const SUPERVISE_MS: u16 = 1000;
+
+/// Least and most of an override of the feed, percent.
+pub const OVERRIDE_PERCENT: [u8; 2] = [20, 120];
 
 /// A piece of a table.
 pub type Chunk = heapless::Vec<u8, CHUNK>;
@@ -90,7 +93,7 @@ pub enum Command {
         /// On the link between replies; otherwise on the board's own port for set-points.
         on_link: bool,
     },
-    /// Warm reset, when idle.
+    /// Warm reset, when idle. Where the machine stands is kept.
     Reset,
     /// Provision the public key: from now on only tables signed with it are accepted. Once.
     Provision {
@@ -131,6 +134,34 @@ pub enum Command {
         /// For each set-point and axis (X, Y, Z) the change of the step that leads to it from the one before, nm, each as an
         /// i32 of this encoding; the step before the first is 0, the place before it where the machine stands.
         steps: Chunk,
+    },
+    /// At rest in fault: forget it. Where the machine stands is kept.
+    ClearFault,
+    /// At rest: the machine stands here. Nothing moves.
+    Declare {
+        /// Where, nm.
+        place_nm: Pose,
+    },
+    /// Feed hold: slow down along the path within limits; what runs and what waits stays as it is. A ramp in hand is finished
+    /// first, and so is a segment too short to gain its feed again.
+    Pause,
+    /// Ends a feed hold.
+    Resume,
+    /// Feed of what is accepted from now on, as a share of the one asked for, never above the machine's.
+    Override {
+        /// [`OVERRIDE_PERCENT`].
+        percent: u8,
+    },
+    /// The limits in use → [`Reply::Config`].
+    Config,
+    /// At rest: use these limits from now on. A restart brings back those that are stored.
+    Configure(MachineConfig),
+    /// At rest: store the limits in use.
+    SaveConfig,
+    /// What has happened from this number on → [`Reply::Events`].
+    Events {
+        /// Number of the first one wanted; they count from 0 at boot.
+        from: u32,
     },
 }
 
@@ -198,6 +229,20 @@ pub enum Reply {
     },
     /// Not done, and why.
     Refused(Refusal),
+    /// To [`Command::Config`].
+    Config {
+        /// In use.
+        config: MachineConfig,
+        /// They are the ones that are stored; `false` as well where none are.
+        stored: bool,
+    },
+    /// To [`Command::Events`].
+    Events {
+        /// Number of the first one below; what is older than the controller's memory is left out.
+        first: u32,
+        /// In order; none: there are no more.
+        events: heapless::Vec<Event, EVENTS>,
+    },
 }
 
 /// Who the controller is.
@@ -268,8 +313,29 @@ pub enum MotionState {
     Running,
     /// Decelerating after a stop.
     Stopping,
-    /// In fault: at rest, nothing starts before a reset.
+    /// In fault: at rest, nothing starts before the fault is cleared.
     Fault,
+    /// At rest in a feed hold, the rest of the run still to come.
+    Paused,
+}
+
+impl MotionState {
+    /// A run is under way, if only paused.
+    pub const fn is_run(self) -> bool {
+        matches!(self, Self::Running | Self::Stopping | Self::Paused)
+    }
+}
+
+/// What is known of where the machine stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum PositionState {
+    /// Nothing: no run starts and no set-point is meant for a drive, before it is declared, or adopted from the first
+    /// set-point of a stream.
+    Unknown,
+    /// Declared, adopted, or that of a machine which is simulated.
+    Known,
+    /// Kept over a reset.
+    Kept,
 }
 
 /// Why the engine is in fault.
@@ -354,6 +420,18 @@ pub struct Status {
     pub raw_nm: Pose,
     /// Corrected position, nm.
     pub corrected_nm: Pose,
+    /// What is known of where the machine stands.
+    pub position: PositionState,
+    /// Override of the feed, percent.
+    pub override_percent: u8,
+    /// Why the controller started.
+    pub reset: ResetCause,
+    /// What its ticks are counted by.
+    pub clock: ClockSource,
+    /// Longest tick seen, thousandths of the time between two; `None`: not measured.
+    pub worst_tick_permille: Option<u16>,
+    /// Stack never used since boot, bytes; 0: not measured.
+    pub stack_left_bytes: u32,
     /// Counts.
     pub counters: Counters,
 }

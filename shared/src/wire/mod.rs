@@ -19,28 +19,28 @@
 //! | module | holds |
 //! |---|---|
 //! | [`message`] | what is said |
+//! | [`machine`] | its limits, as they are stored |
+//! | [`event`] | what it has done and seen |
 //! | [`frame`] | how it is put into bytes, and found again among any bytes |
-//! | `reader`, `writer` | postcard's format, in code that an image has room for |
 //! | `steps` | set-points of a stream in few bytes |
-//! | [`crc`] | the CRC-32 of frames and tables alike |
 //! | [`refusal`] | why a controller says no |
-pub mod crc;
+pub mod event;
 pub mod frame;
+pub mod machine;
 pub mod message;
-mod reader;
 pub mod refusal;
 mod steps;
-mod writer;
 
+pub use crate::encoding::{Crc32, crc32, put, take};
 /// Paths are asked for in the engine's own numbers.
 pub use crate::path::{ExactArc, ExactCircle, ExactSegment, Quantity};
-pub use crc::{Crc32, crc32};
+pub use event::{ClockSource, EVENTS, Event, ResetCause, What};
 pub use frame::{Accumulator, FrameCounts, MAX_FRAME, MAX_PAYLOAD, encode};
+pub use machine::{ConfigField, MachineConfig};
 pub use message::{
     CHUNK, Chunk, Command, Counters, FaultCause, FromController, IN_FLIGHT, Identity, MotionState,
-    POINTS, PROTOCOL_VERSION, Pose, Probation, Reply, Request, SET_POINTS, SUPERVISE_MS, SetPoint,
-    SetPoints, SlotState, Status, TableInfo,
+    OVERRIDE_PERCENT, POINTS, PROTOCOL_VERSION, Pose, PositionState, Probation, Reply, Request,
+    SET_POINTS, SUPERVISE_MS, SetPoint, SetPoints, SlotState, Status, TableInfo,
 };
-pub use reader::take;
 pub use refusal::{FlashFault, MotionRefusal, Refusal};
 pub use steps::Steps;

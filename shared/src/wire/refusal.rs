@@ -1,4 +1,5 @@
 //! Why a controller says no, in a form the host can put into words.
+use super::ConfigField;
 use crate::path::Quantity;
 use crate::table::TableError;
 use serde::{Deserialize, Serialize};
@@ -63,6 +64,15 @@ pub enum Refusal {
     /// A key is already provisioned, and not this one.
     #[error("a key is already provisioned")]
     KeyProvisioned,
+    /// A number of the configuration is none, or beyond what the image allows.
+    #[error("configuration: the {0} is out of range")]
+    Config(ConfigField),
+    /// This controller has nowhere to store a configuration.
+    #[error("this controller has nowhere to store a configuration")]
+    NoConfigStore,
+    /// Ticks are not counted by a crystal: feed and correction would be wrong by a per cent or two.
+    #[error("the crystal does not run: not corrected unless the configuration allows it")]
+    Clock,
     /// This image has no signatures built in.
     #[error("this image cannot check signatures")]
     NoSignatures,
@@ -116,7 +126,7 @@ pub enum MotionRefusal {
     #[error("no program or stream of this kind is open, or it was stopped")]
     NoProgram,
     /// The engine is in fault.
-    #[error("the controller is in fault; reset it")]
+    #[error("the controller is in fault; clear it")]
     Fault,
     /// Not possible in the present state.
     #[error("a run is in progress")]
@@ -129,4 +139,22 @@ pub enum MotionRefusal {
     /// The stop input is active.
     #[error("the stop input is active")]
     StopInput,
+    /// The path leaves the soft limits of an axis (0 is X).
+    #[error("the path leaves the soft limits of axis {axis}", axis = ['X', 'Y', 'Z'].get(usize::from(*.axis)).copied().unwrap_or('?'))]
+    SoftLimit {
+        /// Which axis.
+        axis: u8,
+    },
+    /// A line longer than a coordinate can say.
+    #[error("a line of more than 2.147 m along an axis: split it")]
+    TooLong,
+    /// Nobody has said where the machine stands.
+    #[error("where the machine stands is not known")]
+    NoPosition,
+    /// A set-point from which a stop would lead out of the workspace.
+    #[error("a stop from there would lead out of the workspace")]
+    NoRoomToStop,
+    /// Nothing runs that could be held, or it is a stream, whose feed is its sender's.
+    #[error("nothing runs whose feed could be held")]
+    NotHeld,
 }

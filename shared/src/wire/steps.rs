@@ -1,8 +1,7 @@
 //! Set-points of a stream in few bytes: for each axis the change of the step from one to the next. At 1 kHz and 5 m/s² that
 //! is two bytes, where the place itself takes five.
 use super::Chunk;
-use super::reader::take;
-use super::writer::Writer;
+use crate::encoding::{Writer, take};
 use serde::Serialize;
 
 /// How far a stream has come.
@@ -21,6 +20,11 @@ impl Steps {
             place_nm,
             step_nm: [0; 3],
         }
+    }
+
+    /// The step that led to the newest set-point, nm.
+    pub const fn step_nm(&self) -> [i32; 3] {
+        self.step_nm
     }
 
     /// Appends a set-point to a message; `false`: there is no room for it, and nothing has changed.

@@ -1,11 +1,15 @@
 //! Writes campaigns with hidden effects and their truth.
 //!
 //! `hide --effect servo_mismatch --strength 3 --seed 5 -o DIR` (effects joined by `+`, or `null_lag`, …);
+//! `hide --row NAME --strength K --seed SEED -o DIR` writes a campaign of the power study by the name of its row
+//! (`arm6_joint_zero_4places`, `backlash@arc(220)`, …), as its list of failures gives it; `hide --rows` lists the names;
 //! `hide --all DIR` writes every effect at 1 and 3 times the noise, nulls, unlisted effects, pairs, triples.
 use clap::Parser;
 use giotto_tests::effects::{Case, Keep, Kind, LISTED, Null, UNLISTED};
 use giotto_tests::files;
 use giotto_tests::machine::base::Variety;
+use giotto_tests::study::seeds::TUNING;
+use giotto_tests::study::{Order, Recipe, schedule};
 use rayon::prelude::*;
 use std::path::PathBuf;
 
@@ -27,6 +31,12 @@ struct Args {
     /// Leaves out most runs: `one-radius`, `one-feed`, `one-direction`, `one-run`.
     #[arg(long, value_parser = keep)]
     keep: Option<Keep>,
+    /// A row of the power study by name.
+    #[arg(long)]
+    row: Option<String>,
+    /// Lists the rows of the power study.
+    #[arg(long)]
+    rows: bool,
     /// Directory to write to.
     #[arg(short, long, default_value = "hidden")]
     output: PathBuf,
@@ -60,8 +70,53 @@ fn kind(name: &str) -> Kind {
     }
 }
 
+/// Rows of the power study, each once.
+fn rows() -> Vec<Recipe> {
+    let order = Order {
+        range: TUNING,
+        round: 0,
+        each: 1,
+        groups: Vec::new(),
+        only: None,
+        most: None,
+    };
+    let mut all: Vec<Recipe> = schedule(&order).into_iter().map(|job| job.kind).collect();
+    all.dedup();
+    all
+}
+
+/// Writes one campaign of a row.
+fn write_row(name: &str, args: &Args) -> Result<(), String> {
+    let row = rows()
+        .into_iter()
+        .find(|r| r.to_string() == name)
+        .ok_or_else(|| format!("{name}: no such row; --rows lists them"))?;
+    let hidden = row
+        .hidden(args.strength, args.seed)
+        .ok_or_else(|| format!("{name}: no such effect"))?;
+    files::write(&hidden, &args.output).map_err(|e| format!("{}: {e}", args.output.display()))
+}
+
 fn main() -> std::process::ExitCode {
     let args = Args::parse();
+    if args.rows {
+        for row in rows() {
+            println!("{row}");
+        }
+        return std::process::ExitCode::SUCCESS;
+    }
+    if let Some(name) = &args.row {
+        return match write_row(name, &args) {
+            Ok(()) => {
+                println!("seed {}: {}", args.seed, args.output.display());
+                std::process::ExitCode::SUCCESS
+            }
+            Err(words) => {
+                eprintln!("{words}");
+                std::process::ExitCode::from(2)
+            }
+        };
+    }
     let variety = if args.broad {
         Variety::Broad
     } else {
@@ -118,7 +173,7 @@ fn main() -> std::process::ExitCode {
             if let Some(keep) = args.keep {
                 keep.thin(&mut case.campaign);
             }
-            files::write(&case, dir)
+            files::write(&case.hidden(), dir)
                 .err()
                 .map(|e| format!("{}: {e}", dir.display()))
         })

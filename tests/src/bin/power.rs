@@ -1,14 +1,14 @@
 //! The power study of `diagnose`: `power` writes `tests/POWER.md`.
 //!
-//! `--only NAME` keeps the rows whose name contains NAME (or one group: `single`, `pair`, `triple`, `null`,
-//! `unlisted`, `permuted`) and then prints instead of writing.
+//! Published seeds and seeds for tuning are ranges of their own (`giotto_tests::study::seeds`); `--tune` takes the
+//! latter and then prints instead of writing, as `--only` and `--group` do. The whole study takes hours; `--most 8`
+//! draws at most eight campaigns a group and says so on the page.
 use clap::Parser;
-use giotto_tests::effects::Case;
 use giotto_tests::files;
-use giotto_tests::machine::base::Variety;
 use giotto_tests::study::schedule::FULL;
-use giotto_tests::study::sheet::{Row, page};
-use giotto_tests::study::{Job, Outcome, judge, schedule};
+use giotto_tests::study::seeds::{PUBLISHED, TUNING};
+use giotto_tests::study::sheet::{Heading, Row, page};
+use giotto_tests::study::{Group, Job, Order, Outcome, judge, schedule};
 use rayon::prelude::*;
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -20,24 +20,24 @@ use std::time::Instant;
 /// Hides effects under seeds and asks `diagnose` for them.
 #[derive(Parser)]
 struct Args {
-    /// Seed of the whole study.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
+    /// Takes the seeds that thresholds may be set on, and prints the page.
+    #[arg(long)]
+    tune: bool,
+    /// Other rows from the same range of seeds.
+    #[arg(long, default_value_t = 0)]
+    round: u64,
     /// Keeps the rows whose name contains this, and prints the page.
     #[arg(long)]
     only: Option<String>,
-    /// Keeps the rows of this strength.
-    #[arg(long)]
-    strength: Option<f64>,
+    /// Keeps these groups (`single`, `scatter`, `arm-sound`, …), and prints the page.
+    #[arg(long, value_parser = group)]
+    group: Vec<Group>,
     /// Campaigns a cause and strength.
     #[arg(long = "per-case", visible_alias = "each", default_value_t = FULL)]
     each: usize,
-    /// Four campaigns a cause and strength.
+    /// At most so many campaigns a group.
     #[arg(long)]
-    quick: bool,
-    /// Other grids, instruments and spreads than the paper's.
-    #[arg(long)]
-    broad: bool,
+    most: Option<usize>,
     /// Where the page goes.
     #[arg(short, long, default_value = "tests/POWER.md")]
     output: PathBuf,
@@ -46,8 +46,20 @@ struct Args {
     rows: Option<PathBuf>,
 }
 
+/// A group by its name, with or without hyphens.
+fn group(name: &str) -> Result<Group, String> {
+    let plain = |s: &str| s.replace(['-', '_'], "").to_lowercase();
+    Group::ALL
+        .into_iter()
+        .find(|g| plain(&format!("{g:?}")) == plain(name))
+        .ok_or_else(|| {
+            let names: Vec<String> = Group::ALL.iter().map(|g| format!("{g:?}")).collect();
+            format!("one of {}", names.join(", "))
+        })
+}
+
 /// The heading of `--rows`.
-const HEADING: &str = "hidden\tstrength\tseed\tseconds\texact\tgain_share\tcovered\tsaid";
+const HEADING: &str = "group\thidden\tstrength\tseed\tseconds\tright\tgain_share\tcovered\tsaid";
 
 /// One line of `--rows`.
 fn line(row: &Row) -> String {
@@ -62,11 +74,12 @@ fn line(row: &Row) -> String {
         .map(|(name, inside)| format!("{name}={}", u8::from(*inside)))
         .collect();
     format!(
-        "{}\t{}\t{}\t{seconds:.2}\t{}\t{:.3}\t{}\t{}",
+        "{:?}\t{}\t{}\t{}\t{seconds:.2}\t{}\t{:.3}\t{}\t{}",
+        job.group,
         job.kind,
         job.strength,
         job.seed,
-        u8::from(verdict.exact),
+        u8::from(giotto_tests::study::groups::right(row)),
         verdict.gain_share.unwrap_or(f64::NAN),
         covered.join(" "),
         verdict.said
@@ -74,8 +87,11 @@ fn line(row: &Row) -> String {
 }
 
 /// Draws the campaign of `job`, has it diagnosed as a user would from its files, judges the answer.
-fn ask(job: &Job, variety: Variety) -> Result<Row, String> {
-    let case = Case::new(&job.kind, job.strength, job.seed, variety).ok_or("no such effect")?;
+fn ask(job: &Job) -> Result<Row, String> {
+    let case = job
+        .kind
+        .hidden(job.strength, job.seed)
+        .ok_or("no such effect")?;
     let dir = tempfile::tempdir().map_err(|e| e.to_string())?;
     files::write(&case, dir.path()).map_err(|e| e.to_string())?;
     let start = Instant::now();
@@ -87,17 +103,72 @@ fn ask(job: &Job, variety: Variety) -> Result<Row, String> {
     })
 }
 
+/// Answers of all jobs in their order, the failed ones by their group and words.
+fn answers(jobs: &[Job], keep: impl Fn(&str) + Sync) -> Vec<Result<Row, (Group, String)>> {
+    let done = AtomicUsize::new(0);
+    jobs.par_iter()
+        .map(|job| {
+            let row = ask(job).map_err(|e| {
+                let words = format!("{} at {}×, seed {}: {e}", job.kind, job.strength, job.seed);
+                (job.group, words)
+            });
+            if let Ok(row) = &row {
+                keep(&line(row));
+            }
+            let n = done.fetch_add(1, Ordering::Relaxed) + 1;
+            if n.is_multiple_of(50) {
+                eprintln!("{n} of {}", jobs.len());
+            }
+            row
+        })
+        .collect()
+}
+
+/// What the page says of itself.
+fn heading(args: &Args, all: usize, drawn: usize) -> Heading {
+    let mut command = format!(
+        "cargo run --release -p giotto-tests --bin power -- --per-case {}",
+        args.each
+    );
+    if args.round != 0 {
+        command += &format!(" --round {}", args.round);
+    }
+    if let Some(most) = args.most {
+        command += &format!(" --most {most}");
+    }
+    if args.tune {
+        command += " --tune";
+    }
+    Heading {
+        command,
+        seeds: if args.tune {
+            format!("Seeds {TUNING:?}: thresholds may have been set on these, so these are no results to publish.")
+        } else {
+            format!("Seeds {PUBLISHED:?}, round {}; tests and thresholds use {TUNING:?} alone.", args.round)
+        },
+        short: (drawn < all).then(|| {
+            format!("A short version: {drawn} of {all} campaigns. Rates of so few say little; read the intervals.")
+        }),
+    }
+}
+
 fn main() -> ExitCode {
     let args = Args::parse();
-    let variety = if args.broad {
-        Variety::Broad
-    } else {
-        Variety::Usual
+    let order = Order {
+        range: if args.tune { TUNING } else { PUBLISHED },
+        round: args.round,
+        each: args.each,
+        groups: args.group.clone(),
+        only: args.only.clone(),
+        most: args.most,
     };
-    let each = if args.quick { 4 } else { args.each };
-    let mut jobs = schedule(args.seed, each, args.only.as_deref());
-    jobs.retain(|j| args.strength.is_none_or(|s| s == j.strength));
-    let done = AtomicUsize::new(0);
+    let jobs = schedule(&order);
+    let all = schedule(&Order {
+        most: None,
+        each: FULL,
+        ..order
+    })
+    .len();
     let rows_file = match args.rows.as_ref().map(std::fs::File::create).transpose() {
         Ok(file) => Mutex::new(file),
         Err(e) => {
@@ -114,51 +185,31 @@ fn main() -> ExitCode {
         }
     };
     keep(HEADING);
-    let answers: Vec<Result<Row, String>> = jobs
-        .par_iter()
-        .map(|job| {
-            let row = ask(job, variety)
-                .map_err(|e| format!("{} at {}×, seed {}: {e}", job.kind, job.strength, job.seed));
-            if let Ok(row) = &row {
-                keep(&line(row));
-            }
-            let n = done.fetch_add(1, Ordering::Relaxed) + 1;
-            if n.is_multiple_of(50) {
-                eprintln!("{n} of {}", jobs.len());
-            }
-            row
-        })
-        .collect();
-    let mut rows = Vec::new();
-    let mut broken = 0;
-    for answer in answers {
+    let (mut rows, mut refused) = (Vec::new(), Vec::new());
+    for answer in answers(&jobs, keep) {
         match answer {
             Ok(row) => rows.push(row),
-            Err(words) => {
-                broken += 1;
+            Err((group, words)) => {
+                refused.push(group);
                 eprintln!("{words}");
             }
         }
     }
-    let command = format!(
-        "cargo run --release -p giotto-tests --bin power -- --seed {} --per-case {each}{}",
-        args.seed,
-        if args.broad { " --broad" } else { "" }
-    );
-    let page = page(&rows, args.seed, &command);
-    if args.only.is_some() || args.strength.is_some() {
+    let page = page(&rows, &refused, &heading(&args, all, jobs.len()));
+    if args.tune || args.only.is_some() || !args.group.is_empty() {
         println!("{page}");
     } else if let Err(e) = std::fs::write(&args.output, &page) {
         eprintln!("{}: {e}", args.output.display());
         return ExitCode::from(2);
     } else {
         println!(
-            "{} campaigns, {broken} without an answer: {}",
+            "{} campaigns, {} without an answer: {}",
             rows.len(),
+            refused.len(),
             args.output.display()
         );
     }
-    if broken == 0 {
+    if refused.is_empty() {
         ExitCode::SUCCESS
     } else {
         ExitCode::from(5)

@@ -1,8 +1,8 @@
 //! A hidden campaign from a seed: a laboratory, its effects, and the truth about them.
-use super::{Effect, listed, scaled, unlisted};
+use super::{Effect, Hidden, Seat, Slides, left_um, listed_on, other_law, scaled, unlisted};
 use crate::machine::base::{Lab, Variety};
-use crate::machine::{Instrument, Machine, Plan, Spread};
-use giotto::campaign::Campaign;
+use crate::machine::{Instrument, Machine, Plan, Plane, Spread};
+use giotto::campaign::{Campaign, Run};
 
 /// What a campaign hides.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,14 +35,31 @@ pub struct Truth {
     pub effect: String,
     /// Causes that count as right.
     pub accept: Vec<String>,
-    /// Axis, 0 X, 1 Y.
-    pub axis: Option<usize>,
-    /// True value.
+    /// What it belongs to.
+    pub seat: Seat,
+    /// True value, of a pair that of the pair it was hidden on.
     pub value: f64,
+    /// Values for the pairs XY, YZ and ZX, where it belongs to two slides: another pair may show it too.
+    pub by_pair: Option<[f64; 3]>,
     /// Its unit.
     pub unit: String,
     /// Misfit it causes alone, m.
     pub misfit_m: f64,
+}
+
+impl Truth {
+    /// An effect that no cause of the list names.
+    pub fn nameless(effect: String) -> Self {
+        Self {
+            effect,
+            accept: Vec::new(),
+            seat: Seat::Whole,
+            value: f64::NAN,
+            by_pair: None,
+            unit: String::new(),
+            misfit_m: f64::NAN,
+        }
+    }
 }
 
 /// A hidden campaign.
@@ -75,8 +92,36 @@ impl Case {
     /// Draws a laboratory under `seed`, hides `kind` in it at `strength` times the sample noise, measures.
     /// `None` if an effect has no such name.
     pub fn new(kind: &Kind, strength: f64, seed: u64, variety: Variety) -> Option<Self> {
-        let lab = Lab::drawn(seed, variety);
+        Self::on(
+            kind,
+            strength,
+            seed,
+            Lab::drawn(seed, variety),
+            &[Slides::XY],
+        )
+    }
+
+    /// The same with circles in other planes, three radii and half of the feeds in each; effects sit on `slides`, one
+    /// after the other (the last for all that are left).
+    pub fn in_space(
+        kind: &Kind,
+        strength: f64,
+        seed: u64,
+        planes: &[Plane],
+        slides: &[Slides],
+    ) -> Option<Self> {
+        let mut lab = Lab::drawn(seed, Variety::Small);
+        lab.grid.planes = planes.to_vec();
+        Self::on(kind, strength, seed, lab, slides)
+    }
+
+    /// Hides `kind` in a laboratory.
+    pub fn on(kind: &Kind, strength: f64, seed: u64, lab: Lab, slides: &[Slides]) -> Option<Self> {
         let (mut base, mut instrument) = (lab.machine, lab.instrument);
+        let seat_of = |index: usize| {
+            let place = index.min(slides.len().saturating_sub(1));
+            slides.get(place).copied().unwrap_or(Slides::XY)
+        };
         let plan = lab.grid.plan(seed ^ 0x706c_616e);
         let mut model = None;
         let effects: Vec<Effect> = match kind {
@@ -101,6 +146,7 @@ impl Case {
                         radius_m: 0.0,
                         oval_m: 0.0,
                         lobes_m: 0.0,
+                        high_m: 0.0,
                         ..instrument.spread
                     };
                     instrument.drift_m = 0.0;
@@ -112,14 +158,15 @@ impl Case {
                     .iter()
                     .zip(1_u64..)
                     .map(|(n, i)| {
-                        listed(n, seed.wrapping_mul(31) + i)
+                        listed_on(n, seed.wrapping_mul(31) + i, seat_of(i as usize - 1))
                             .or_else(|| unlisted(n, seed.wrapping_mul(31) + i))
+                            .or_else(|| other_law(n, seed.wrapping_mul(31) + i))
                     })
                     .collect();
                 effects?
             }
             Kind::Permuted(name) => {
-                vec![listed(name, seed).or_else(|| unlisted(name, seed))?]
+                vec![listed_on(name, seed, seat_of(0)).or_else(|| unlisted(name, seed))?]
             }
         };
         let mut machine = base.clone();
@@ -129,15 +176,22 @@ impl Case {
             let wanted_m = strength * instrument.noise_m;
             let (alone, misfit_m) = scaled(effect, &base, &plan, wanted_m);
             machine = merged(machine, &base, &alone);
+            let pair = match effect.seat {
+                Seat::Pair(pair) => pair,
+                _ => Plane::PAIRS[0],
+            };
             truth.push(Truth {
                 effect: effect.name.to_owned(),
                 accept: effect.accept.iter().map(|s| (*s).to_owned()).collect(),
-                axis: effect.axis,
-                value: (effect.value)(&alone, &plan),
+                seat: effect.seat,
+                value: (effect.value)(&alone, &plan, pair),
+                by_pair: matches!(effect.seat, Seat::Pair(_))
+                    .then(|| Plane::PAIRS.map(|pair| (effect.value)(&alone, &plan, pair))),
                 unit: effect.unit.to_owned(),
                 misfit_m,
             });
         }
+        together(&mut truth);
         let measured_with = seed ^ 0x6d65_6173;
         let mut campaign = instrument.measure(&machine, &plan, measured_with);
         if matches!(kind, Kind::Permuted(_)) {
@@ -157,6 +211,87 @@ impl Case {
             campaign,
             model,
         })
+    }
+}
+
+/// Effects of one name on several pairs add up in each pair: two slides with scales of their own make a third
+/// difference.
+fn together(truth: &mut [Truth]) {
+    let all: Vec<(String, [f64; 3])> = truth
+        .iter()
+        .filter_map(|t| t.by_pair.map(|v| (t.effect.clone(), v)))
+        .collect();
+    for t in truth {
+        let (Some(values), Seat::Pair(pair)) = (&mut t.by_pair, t.seat) else {
+            continue;
+        };
+        *values = [0, 1, 2].map(|k| {
+            let same = all.iter().filter(|(name, _)| *name == t.effect);
+            same.map(|(_, v)| v[k]).sum()
+        });
+        // A pair has the number of its first slide.
+        t.value = values[pair[0]];
+    }
+}
+
+impl Case {
+    /// What is handed over, with its truth.
+    pub fn hidden(&self) -> Hidden {
+        Hidden {
+            name: self.name.clone(),
+            seed: self.seed,
+            strength: self.strength,
+            noise_m: self.instrument.noise_m,
+            scatter_m: self.instrument.spread.radius_m,
+            truth: self.truth.clone(),
+            campaign: self.campaign.clone(),
+            perfect_um: (self.campaign.runs.len() == self.plan.tests.len())
+                .then(|| self.perfect_um()),
+            model: self.model,
+            kinematics: None,
+            spoilt: None,
+        }
+    }
+
+    /// What the true machine leaves of the measurement, rms over all samples, each run's centre removed, µm. The phase of
+    /// a vibration, the places of teeth and where on the circle a polygon has its corners are new in each run: no model
+    /// could foretell them, so they count as left (of a polygon all but its mean).
+    pub fn perfect_um(&self) -> f64 {
+        let case = self;
+        let perfect = Instrument {
+            noise_m: 0.0,
+            resolution_m: 0.0,
+            drift_m: 0.0,
+            jitter_s: 0.0,
+            ..case.instrument
+        };
+        let perfect = Instrument {
+            spread: crate::machine::Spread {
+                radius_m: 0.0,
+                oval_m: 0.0,
+                lobes_m: 0.0,
+                high_m: 0.0,
+                ..perfect.spread
+            },
+            ..perfect
+        };
+        let mut machine = case.machine.clone();
+        machine.vibration = None;
+        machine
+            .axes
+            .iter_mut()
+            .for_each(|axis| axis.stick_slip = None);
+        let polygon = perfect.measure(&machine, &case.plan, case.measured_with);
+        machine.interpolation_s = 0.0;
+        let mut clean = perfect.measure(&machine, &case.plan, case.measured_with);
+        for (run, polygon) in clean.runs.iter_mut().zip(&polygon.runs) {
+            let mean = |run: &Run| {
+                run.samples.deviation_m.iter().sum::<f64>() / run.samples.deviation_m.len() as f64
+            };
+            let shift = mean(polygon) - mean(run);
+            run.samples.deviation_m.iter_mut().for_each(|x| *x += shift);
+        }
+        left_um(&case.campaign, &clean)
     }
 }
 
@@ -202,18 +337,22 @@ fn fraction(seed: u64, salt: u64) -> f64 {
 fn merged(mut machine: Machine, base: &Machine, alone: &Machine) -> Machine {
     macro_rules! take {
         ($($field:ident).+) => { if alone.$($field).+ != base.$($field).+ { machine.$($field).+ = alone.$($field).+.clone(); } };
-        (add $($field:ident).+ [$i:expr]) => { machine.$($field).+[$i] += alone.$($field).+[$i] - base.$($field).+[$i] };
+        (add $($field:ident).+ $([$i:expr])+) => { machine.$($field).+$([$i])+ += alone.$($field).+$([$i])+ - base.$($field).+$([$i])+ };
     }
     take!(interpolation_s);
     take!(centripetal_limit_m_s2);
     take!(vibration);
     take!(thermal);
-    take!(geometry.squareness_rad);
+    take!(override_share);
     machine.radius_offset_m += alone.radius_offset_m - base.radius_offset_m;
-    for i in 0..2 {
+    for i in 0..3 {
         take!(add geometry.scale[i]);
-        take!(add geometry.bow_per_m[i]);
-        take!(add lateral_play_m[i]);
+        take!(add geometry.sense_scale[i]);
+        take!(add geometry.squareness_rad[i]);
+        for j in 0..3 {
+            take!(add geometry.bow_per_m[i][j]);
+            take!(add lateral_play_m[i][j]);
+        }
         if alone.geometry.cyclic[i].is_some() {
             machine.geometry.cyclic[i] = alone.geometry.cyclic[i];
         }
@@ -225,6 +364,7 @@ fn merged(mut machine: Machine, base: &Machine, alone: &Machine) -> Machine {
         to.backlash_m += from.backlash_m - was.backlash_m;
         to.mechanics = from.mechanics.or(to.mechanics);
         to.friction = from.friction.or(to.friction);
+        to.two_mass = from.two_mass.or(to.two_mass);
         to.stick_slip = from.stick_slip.or(to.stick_slip);
     }
     machine.patterns.extend(alone.patterns.iter().copied());

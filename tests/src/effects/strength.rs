@@ -16,7 +16,7 @@ fn profiles(machine: &Machine, tests: &[&Test], campaign_s: f64) -> Vec<Vec<f64>
             let lap = simulate(machine, test, campaign_s, 0.7);
             lap.position_m
                 .iter()
-                .map(|p| p[0].hypot(p[1]) - test.radius_m)
+                .map(|p| test.plane.radius(*p) - test.radius_m)
                 .collect()
         })
         .collect()

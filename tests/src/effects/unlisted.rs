@@ -1,5 +1,5 @@
 //! Effects outside the contract's list. Naming a listed cause for one of these is wrong.
-use super::Effect;
+use super::{Effect, Seat};
 use crate::machine::Pattern;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -71,10 +71,10 @@ pub fn unlisted(name: &str, seed: u64) -> Option<Effect> {
     Some(Effect {
         name,
         accept: Vec::new(),
-        axis: None,
+        seat: Seat::Whole,
         unit: "",
         apply: Box::new(move |m, size| m.patterns.push(pattern(size))),
-        value: Box::new(|_, _| 0.0),
+        value: Box::new(|_, _, _| 0.0),
         first: 3e-6,
     })
 }

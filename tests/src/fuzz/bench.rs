@@ -8,7 +8,9 @@ use giotto_firmware::store::{
     ram::{RamFlash, RamFlashError},
 };
 use giotto_shared::table::{self, MAX_IMAGE_BYTES, bounds};
-use giotto_shared::wire::{FromController, MAX_FRAME, MotionState, Status, crc32};
+use giotto_shared::wire::{
+    ClockSource, FromController, MAX_FRAME, MotionState, ResetCause, Status, crc32,
+};
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
@@ -23,6 +25,8 @@ const BOARD: Board = Board {
     name: "fuzz",
     build: "0",
     tick_hz: 250,
+    clock: ClockSource::Crystal,
+    reset: ResetCause::Power,
 };
 
 /// Its flash.

@@ -205,6 +205,7 @@ fn hold(mut talk: Talk, bytes: &[u8]) -> Talk {
                     centre_nm: [((number() - 0.5) * 1e9) as i32, 0, 0],
                     radius_half_nm: (number() * 2e9) as i32,
                     feed_m_s: 2.0 * number(),
+                    plane: giotto_shared::Plane::ALL[usize::from(step % 3)],
                     direction: if step > 128 {
                         giotto_shared::Direction::Cw
                     } else {

@@ -4,6 +4,7 @@ use giotto_shared::model::Cumulants;
 use giotto_shared::table::{self, Limits, MAX_IMAGE_BYTES, Table, Travel, Zone};
 use giotto_shared::term::Term;
 use giotto_shared::wire::Crc32;
+use giotto_shared::{Actuator, Plane};
 use std::sync::OnceLock;
 
 /// Makes length and CRC of a header right, so that what is behind it is reached.
@@ -77,26 +78,40 @@ fn encoded() -> [Vec<u8>; 2] {
         out[..length].to_vec()
     };
     let plain = image(&zone);
-    let axis = giotto_shared::Axis::X;
+    let (actuator, across) = (Actuator::Z, Actuator::X);
+    let plane = Plane::Zx;
     let terms = [
         Term::RadiusOffset { offset_m: 1e-5 },
-        Term::ScaleMismatch { relative: 1e-4 },
-        Term::Squareness { shear_rad: 1e-4 },
-        Term::ServoMismatch { delta_tau_s: 1e-4 },
-        Term::Backlash { axis, step_m: 1e-5 },
+        Term::ScaleMismatch {
+            plane,
+            relative: 1e-4,
+        },
+        Term::Squareness {
+            plane,
+            shear_rad: 1e-4,
+        },
+        Term::ServoMismatch {
+            plane,
+            delta_tau_s: 1e-4,
+        },
+        Term::Backlash {
+            actuator,
+            step_m: 1e-5,
+        },
         Term::ReversalSpike {
-            axis,
+            actuator,
             peak_m: 5e-6,
             decay_s: 0.02,
         },
         Term::Cyclic {
-            axis,
+            actuator,
             amplitude_m: 2e-6,
             pitch_m: 0.01,
             phase_rad: 0.5,
         },
         Term::Straightness {
-            axis,
+            actuator,
+            across,
             curvature_per_m: 1e-4,
         },
     ];

@@ -24,13 +24,15 @@ pub enum Variety {
     Small,
     /// Other grids, sample counts, start angles, spread shapes, trackers, missing start times.
     Broad,
+    /// As broad, and noise correlated along the turn, jitter of the clock, spread that grows with the speed.
+    Laws,
 }
 
 impl Lab {
     /// Draws a lab: one servo lag the same on both axes, a dead time, a set-up offset, noise and spread.
     pub fn drawn(seed: u64, variety: Variety) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let broad = variety == Variety::Broad;
+        let broad = matches!(variety, Variety::Broad | Variety::Laws);
         let lag_s = if broad {
             rng.random_range(0.003..0.016)
         } else {
@@ -47,7 +49,7 @@ impl Lab {
             ..AxisChain::default()
         };
         let machine = Machine {
-            axes: [axis.clone(), axis],
+            axes: [axis.clone(), axis.clone(), axis],
             ..Machine::default()
         };
         let noise_m = if broad {
@@ -84,6 +86,7 @@ impl Lab {
                     0.0
                 },
                 shape,
+                ..Instrument::perfect().spread
             },
             offset_m: [off * around.cos(), off * around.sin()],
             height_m: if broad {
@@ -99,6 +102,7 @@ impl Lab {
             tick_s: 0.25e-3,
             sees_angle: broad && rng.random_bool(0.25),
             knows_start: !(broad && rng.random_bool(0.2)),
+            ..Instrument::perfect()
         };
         let grid = match variety {
             Variety::Usual => Grid::paper(),
@@ -109,8 +113,15 @@ impl Lab {
                 samples: 500,
                 ..Grid::paper()
             },
-            Variety::Broad => Grid::drawn(&mut rng),
+            Variety::Broad | Variety::Laws => Grid::drawn(&mut rng),
         };
+        let mut instrument = instrument;
+        if variety == Variety::Laws {
+            instrument.memory_rad = rng.random_range(0.02..0.3);
+            instrument.jitter_s = rng.random_range(0.0..3e-4);
+            instrument.spread.grows = [rng.random_range(0.0..1.0), 0.0];
+            instrument.spread.high_m = 0.1 * instrument.spread.radius_m;
+        }
         Self {
             machine,
             grid,

@@ -8,6 +8,7 @@ pub struct Command {
     start_rad: f64,
     ramp_s: f64,
     settle_s: f64,
+    stop_s: f64,
 }
 
 impl Command {
@@ -20,7 +21,19 @@ impl Command {
             start_rad,
             ramp_s,
             settle_s,
+            stop_s: f64::INFINITY,
         }
+    }
+
+    /// The same, coming to rest by the mirror of its start, from `stop_s` on.
+    pub fn stopping(mut self, stop_s: f64) -> Self {
+        self.stop_s = stop_s;
+        self
+    }
+
+    /// Time at which it rests again, s.
+    pub fn end_s(&self) -> f64 {
+        self.stop_s + self.ramp_s
     }
 
     /// Time at which the machine leaves its rest, s (negative).
@@ -30,13 +43,17 @@ impl Command {
 
     /// Polar angle at `t`, rad. During the ramp the acceleration is `1 − cos`, so the jerk is bounded.
     pub fn angle_rad(&self, t: f64) -> f64 {
-        let travelled_s = if t >= -self.settle_s {
+        let turn = 2.0 * std::f64::consts::PI;
+        // Way of the start at its share u, in ramps at full feed.
+        let ramp = |u: f64| u * u / 2.0 + ((turn * u).cos() - 1.0) / (turn * turn);
+        let travelled_s = if t > self.stop_s {
+            let u = ((t - self.stop_s) / self.ramp_s).min(1.0);
+            self.stop_s + self.ramp_s * (u - ramp(u))
+        } else if t >= -self.settle_s {
             t
         } else {
             let u = ((t - self.begin_s()) / self.ramp_s).max(0.0);
-            let turn = 2.0 * std::f64::consts::PI;
-            -self.settle_s - self.ramp_s / 2.0
-                + self.ramp_s * (u * u / 2.0 + ((turn * u).cos() - 1.0) / (turn * turn))
+            -self.settle_s - self.ramp_s / 2.0 + self.ramp_s * ramp(u)
         };
         self.start_rad + self.rate_rad_s * travelled_s
     }
@@ -112,6 +129,18 @@ mod tests {
         assert!(
             (c.angle_rad(0.0) - 0.3).abs() < 1e-12,
             "lap begins at the start angle"
+        );
+    }
+
+    #[test]
+    fn the_stop_mirrors_the_start() {
+        let c = Command::new(0.1, 3.0, 0.3, 0.2, 0.5).stopping(2.0);
+        let way = |from: f64, to: f64| c.angle_rad(to) - c.angle_rad(from);
+        assert!((way(2.0, c.end_s()) - way(c.begin_s(), -0.5)).abs() < 1e-12);
+        assert!(way(c.end_s(), 9.0).abs() < 1e-12, "it rests");
+        assert!(
+            (way(2.0, 2.0 + 1e-4) - 3e-4).abs() < 1e-8,
+            "no jump of the feed"
         );
     }
 

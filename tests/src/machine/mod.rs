@@ -4,7 +4,7 @@
 //! put there by the code under test. The chain of one axis is
 //! command → interpolator → acc/dec filter → position loop → mechanics → friction → hysteresis,
 //! then geometry and play couple the axes, then the instrument looks ([`instrument`]).
-//! SI units throughout; index 0 is X, 1 is Y.
+//! SI units throughout; index 0 is X, 1 is Y, 2 is Z. A circle may lie in any plane ([`Plane`]).
 pub mod base;
 pub mod command;
 pub mod friction;
@@ -14,14 +14,18 @@ pub mod instrument;
 pub mod linear;
 pub mod pattern;
 pub mod plan;
+pub mod plane;
 pub mod run;
+pub mod two_mass;
 
 pub use friction::{Friction, StickSlip};
 pub use geometry::{Cyclic, Geometry};
 pub use instrument::{Instrument, Shape, Spread};
 pub use pattern::Pattern;
 pub use plan::{Plan, Test};
+pub use plane::Plane;
 pub use run::simulate;
+pub use two_mass::TwoMass;
 
 /// Everything that shapes the motion; the default is a perfect machine.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,12 +34,12 @@ pub struct Machine {
     pub interpolation_s: f64,
     /// Largest centripetal acceleration on arcs, m/s².
     pub centripetal_limit_m_s2: f64,
-    /// The two axes.
-    pub axes: [AxisChain; 2],
+    /// The three slides.
+    pub axes: [AxisChain; 3],
     /// Position-dependent errors.
     pub geometry: Geometry,
-    /// Sideways shift of the other axis with the direction of travel of this one, m.
-    pub lateral_play_m: [f64; 2],
+    /// Sideways shift of the slide of the second index with the direction of travel of the first, m.
+    pub lateral_play_m: [[f64; 3]; 3],
     /// Travel over which the sideways shift changes over, m.
     pub lateral_travel_m: f64,
     /// Vibrations of the structure.
@@ -46,6 +50,8 @@ pub struct Machine {
     pub radius_offset_m: f64,
     /// Errors without a name in the contract.
     pub patterns: Vec<Pattern>,
+    /// Share of the programmed feed that is driven: the override, 1 at 100 %.
+    pub override_share: f64,
 }
 
 impl Default for Machine {
@@ -53,14 +59,15 @@ impl Default for Machine {
         Self {
             interpolation_s: 0.0,
             centripetal_limit_m_s2: f64::INFINITY,
-            axes: [AxisChain::default(), AxisChain::default()],
+            axes: Default::default(),
             geometry: Geometry::default(),
-            lateral_play_m: [0.0; 2],
+            lateral_play_m: [[0.0; 3]; 3],
             lateral_travel_m: 10e-6,
             vibration: None,
             thermal: None,
             radius_offset_m: 0.0,
             patterns: Vec::new(),
+            override_share: 1.0,
         }
     }
 }
@@ -82,6 +89,8 @@ pub struct AxisChain {
     pub mechanics: Option<[f64; 2]>,
     /// Friction that an integrating loop works off.
     pub friction: Option<Friction>,
+    /// Friction at the end of a spring, another law than `friction`.
+    pub two_mass: Option<TwoMass>,
     /// Sticking and slipping at low speed.
     pub stick_slip: Option<StickSlip>,
     /// Lost motion, m; negative: the controller's backlash compensation is set too high.
@@ -134,6 +143,8 @@ pub struct Thermal {
     pub total: f64,
     /// 0: linear in time; above: `(1−exp(−c·t/T))/(1−exp(−c))`, a warm-up.
     pub curvature: f64,
+    /// A hump on top, `4·hook·u(1−u)`: the machine warms, the hall cools.
+    pub hook: f64,
 }
 
 impl Thermal {
@@ -144,6 +155,6 @@ impl Thermal {
         } else {
             (-self.curvature * u).exp_m1() / (-self.curvature).exp_m1()
         };
-        self.total * share
+        self.total * (share + 4.0 * self.hook * u * (1.0 - u))
     }
 }

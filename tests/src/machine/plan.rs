@@ -1,4 +1,5 @@
 //! Which circles are run, in which order.
+use super::Plane;
 use giotto::campaign::Direction;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
@@ -20,6 +21,12 @@ pub struct Test {
     pub started_s: f64,
     /// Samples of the turn.
     pub samples: usize,
+    /// How the circle lies in the machine.
+    pub plane: Plane,
+    /// Its centre in the machine, m.
+    pub centre_m: [f64; 3],
+    /// The turn begins and ends at rest, and all of it is recorded.
+    pub from_rest: bool,
 }
 
 impl Test {
@@ -53,6 +60,10 @@ pub struct Grid {
     pub start_angle_rad: f64,
     /// Runs in the order of the grid instead of a random one.
     pub sorted: bool,
+    /// Planes, each with the whole grid.
+    pub planes: Vec<Plane>,
+    /// Runs are recorded from rest to rest.
+    pub from_rest: bool,
 }
 
 impl Grid {
@@ -69,6 +80,8 @@ impl Grid {
             rate_hz: 1000.0,
             start_angle_rad: 0.0,
             sorted: false,
+            planes: vec![Plane::XY],
+            from_rest: false,
         }
     }
 
@@ -94,6 +107,8 @@ impl Grid {
             rate_hz: [250.0, 500.0, 1000.0][rng.random_range(0..3)],
             start_angle_rad: [0.0, PI / 4.0, PI / 2.0, PI, -PI / 2.0][rng.random_range(0..5)],
             sorted: false,
+            planes: vec![Plane::XY],
+            from_rest: false,
         }
     }
 
@@ -101,18 +116,23 @@ impl Grid {
     pub fn plan(&self, seed: u64) -> Plan {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut tests = Vec::new();
-        for &radius_m in &self.radii_m {
-            for &feed_m_s in &self.feeds_m_s {
-                for direction in [Direction::Ccw, Direction::Cw] {
-                    let turn_s = 2.0 * PI * radius_m / feed_m_s;
-                    tests.push(Test {
-                        radius_m,
-                        feed_m_s,
-                        direction,
-                        start_angle_rad: self.start_angle_rad,
-                        started_s: 0.0,
-                        samples: self.samples.min((turn_s * self.rate_hz) as usize).max(32),
-                    });
+        for &plane in &self.planes {
+            for &radius_m in &self.radii_m {
+                for &feed_m_s in &self.feeds_m_s {
+                    for direction in [Direction::Ccw, Direction::Cw] {
+                        let turn_s = 2.0 * PI * radius_m / feed_m_s;
+                        tests.push(Test {
+                            radius_m,
+                            feed_m_s,
+                            direction,
+                            start_angle_rad: self.start_angle_rad,
+                            started_s: 0.0,
+                            samples: self.samples.min((turn_s * self.rate_hz) as usize).max(32),
+                            plane,
+                            centre_m: [0.0; 3],
+                            from_rest: self.from_rest,
+                        });
+                    }
                 }
             }
         }

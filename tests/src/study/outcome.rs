@@ -9,8 +9,8 @@ use std::path::Path;
 pub struct Finding {
     /// Cause.
     pub cause: String,
-    /// `x`, `y` or none.
-    pub axis: Option<String>,
+    /// What it sits on: `actuators`, or `axis` where there is no such field.
+    pub actuators: Vec<String>,
     /// Stated probability.
     pub probability: f64,
     /// Estimate, in `unit`.
@@ -34,6 +34,10 @@ pub struct Outcome {
     pub baseline_um: f64,
     /// Extended simulation on runs left out, rms, µm.
     pub extended_um: f64,
+    /// Flashing is recommended.
+    pub flash: bool,
+    /// Files of the runs that were left out.
+    pub left_out: Vec<String>,
 }
 
 impl Outcome {
@@ -65,6 +69,16 @@ impl Outcome {
             unexplained: json.pointer("/unexplained/present")?.as_bool()?,
             baseline_um: json.pointer("/baseline/heldout_rms_um")?.as_f64()?,
             extended_um: json.pointer("/extended/heldout_rms_um")?.as_f64()?,
+            flash: json
+                .pointer("/recommendation/action")
+                .is_some_and(|action| action == "flash"),
+            left_out: json
+                .get("left_out")
+                .and_then(Value::as_array)
+                .into_iter()
+                .flatten()
+                .filter_map(|run| run.get("file")?.as_str().map(str::to_owned))
+                .collect(),
         })
     }
 }
@@ -74,7 +88,19 @@ fn finding(json: &Value) -> Option<Finding> {
     let ci = estimate.get("ci95")?.as_array()?;
     Some(Finding {
         cause: json.get("cause")?.as_str()?.to_owned(),
-        axis: json.get("axis")?.as_str().map(str::to_owned),
+        actuators: match json.get("actuators") {
+            Some(list) => list
+                .as_array()?
+                .iter()
+                .map(|a| a.as_str().map(str::to_owned))
+                .collect::<Option<_>>()?,
+            None => json
+                .get("axis")?
+                .as_str()
+                .map(str::to_owned)
+                .into_iter()
+                .collect(),
+        },
         probability: json.get("probability")?.as_f64()?,
         value: estimate.get("value")?.as_f64()?,
         // An interval may be open.

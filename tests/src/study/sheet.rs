@@ -1,6 +1,6 @@
 //! The study as a page: the bars, then where it goes wrong.
 use super::bars::Rate;
-use super::{Group, Job, Verdict};
+use super::{Group, Job, Verdict, groups};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
@@ -139,22 +139,41 @@ pub fn bars(rows: &[Row]) -> Vec<[String; 3]> {
     .collect()
 }
 
-/// The page.
-pub fn page(rows: &[Row], seed: u64, command: &str) -> String {
+/// What the page says of itself.
+#[derive(Clone, Debug)]
+pub struct Heading {
+    /// The command that wrote it.
+    pub command: String,
+    /// Where the seeds come from, in words.
+    pub seeds: String,
+    /// What was left out to save time, in words.
+    pub short: Option<String>,
+}
+
+/// The page; `refused` are the groups of campaigns without an answer.
+pub fn page(rows: &[Row], refused: &[Group], heading: &Heading) -> String {
     let mut out = String::from("# Hidden effects: the power study\n\n");
     let _ = writeln!(
         out,
-        "{} campaigns of a simulated machine that is independent of the simulation under test, seed {seed}. Written by\n`{command}`. Strength is the rms misfit of\nthe effect alone in units of the sample noise, after each run's centre has been taken off and one servo lag fitted\nagain. Brackets: hits/trials and Wilson's 95 % interval.\n",
-        rows.len()
+        "{} campaigns of simulated machines that are independent of the simulation under test. Written by\n`{}`.\n{}\n\n\
+         Strength is the rms misfit of the effect alone in units of the sample noise (of all noise for robots and arms), after each\n\
+         run's centre has been taken off and one servo lag fitted again. Brackets: hits/trials and Wilson's 95 % interval.\n",
+        rows.len(),
+        heading.command,
+        heading.seeds
     );
+    if let Some(short) = &heading.short {
+        let _ = writeln!(out, "**{short}**\n");
+    }
     out.push_str("| | bar | measured |\n|---|---|---|\n");
     for [a, b, c] in bars(rows) {
         let _ = writeln!(out, "| {a} | {b} | {c} |");
     }
+    groups::table(rows, refused, &mut out);
     causes(rows, &mut out);
     confusion(rows, &mut out);
     reliability(rows, &mut out);
-    groups(rows, &mut out);
+    sets(rows, &mut out);
     failures(rows, &mut out);
     out
 }
@@ -260,8 +279,8 @@ fn reliability(rows: &[Row], out: &mut String) {
     }
 }
 
-fn groups(rows: &[Row], out: &mut String) {
-    out.push_str("\n## Sets, nulls, unlisted\n\nCampaigns answered exactly (every hidden effect, nothing false; `unexplained` where the list has no name).\n\n| hidden | strength | exact |\n|---|---|---|\n");
+fn sets(rows: &[Row], out: &mut String) {
+    out.push_str("\n## Row by row\n\nCampaigns answered right, as in the table of groups.\n\n| hidden | strength | exact |\n|---|---|---|\n");
     let mut table: BTreeMap<(Group, String, u64), Rate> = BTreeMap::new();
     for row in rows.iter().filter(|r| r.job.group != Group::Single) {
         table
@@ -271,15 +290,15 @@ fn groups(rows: &[Row], out: &mut String) {
                 row.job.strength.to_bits(),
             ))
             .or_default()
-            .add(row.verdict.exact);
+            .add(groups::right(row));
     }
     // Pairs that always come out right say nothing one by one.
-    for ((group, name, strength), r) in table
+    for ((_, name, strength), r) in table
         .iter()
         .filter(|(k, r)| k.0 != Group::Pair || r.hits < r.of)
     {
         let strength = f64::from_bits(*strength);
-        let strength = if *group == Group::Null {
+        let strength = if strength == 0.0 {
             "–".to_owned()
         } else {
             format!("{strength}×")
@@ -289,11 +308,11 @@ fn groups(rows: &[Row], out: &mut String) {
 }
 
 fn failures(rows: &[Row], out: &mut String) {
-    out.push_str("\n## Failures\n\nUp to three a row of the study; `hide --effect NAME --strength K --seed SEED` writes the campaign.\n\n");
+    out.push_str("\n## Failures\n\nUp to three a row of the study; `hide --row NAME --strength K --seed SEED` writes the campaign.\n\n");
     let mut shown: BTreeMap<(String, u64), usize> = BTreeMap::new();
     for row in rows
         .iter()
-        .filter(|r| !r.verdict.exact || (r.job.group == Group::Single && !r.verdict.top_right))
+        .filter(|r| !groups::right(r) || (r.job.group == Group::Single && !r.verdict.top_right))
     {
         let n = shown
             .entry((row.job.kind.to_string(), row.job.strength.to_bits()))

@@ -1,8 +1,6 @@
 //! One campaign judged: was the truth found, and nothing else?
-use super::Outcome;
-use crate::effects::{Case, Truth};
-use crate::machine::Instrument;
-use giotto::campaign::Run;
+use super::{Finding, Outcome};
+use crate::effects::{Hidden, Seat, Truth};
 
 /// How one answer compares with the truth.
 #[derive(Clone, Debug, Default)]
@@ -25,13 +23,21 @@ pub struct Verdict {
     pub stated: Vec<(f64, bool)>,
     /// Gain over the baseline as a share of what the perfect model gains.
     pub gain_share: Option<f64>,
+    /// Something was named and the extended simulation is worse than the baseline on runs left out.
+    pub negative_gain: bool,
+    /// Flashing was recommended where the extended simulation is no better than the baseline on runs left out.
+    pub bad_flash: bool,
+    /// Something was called unexplained.
+    pub unexplained: bool,
+    /// Whether exactly the spoilt run was left out, where one was spoilt.
+    pub spoilt_named: Option<bool>,
 }
 
 /// Share of what a perfect model leaves that it has to gain for a gain to be judged.
 const SOMETHING: f64 = 0.1;
 
 /// Judges `outcome` against the truth of `case`.
-pub fn judge(case: &Case, outcome: &Outcome) -> Verdict {
+pub fn judge(case: &Hidden, outcome: &Outcome) -> Verdict {
     let must = |cause: &str| {
         case.truth
             .iter()
@@ -80,7 +86,7 @@ pub fn judge(case: &Case, outcome: &Outcome) -> Verdict {
         .findings
         .iter()
         .map(|f| {
-            let axis = f.axis.as_deref().map_or(String::new(), |a| format!(" {a}"));
+            let axis: String = f.actuators.iter().map(|a| format!(" {a}")).collect();
             format!(
                 "{}{axis} {:.3e} [{:.3e}, {:.3e}] {} p {:.2}",
                 f.cause, f.value, f.ci95[0], f.ci95[1], f.unit, f.probability
@@ -90,7 +96,6 @@ pub fn judge(case: &Case, outcome: &Outcome) -> Verdict {
         .collect::<Vec<_>>()
         .join("; ");
     for truth in &case.truth {
-        let name = truth.axis.map(|a| ["x", "y"][a]);
         let mut same = outcome
             .findings
             .iter()
@@ -98,98 +103,109 @@ pub fn judge(case: &Case, outcome: &Outcome) -> Verdict {
         let Some(first) = same.clone().next() else {
             continue;
         };
-        if name.is_some() {
-            verdict
-                .axis
-                .push(same.clone().any(|f| f.axis.as_deref() == name));
+        if truth.seat != Seat::Whole {
+            let right = |f: &Finding| sits(truth, &f.actuators);
+            // Each right angle is one of its own; scales and lags of three slides are told by two differences.
+            let named = truth.effect != "squareness" || same.clone().any(|f| own(truth, f));
+            verdict.axis.push(named && same.clone().all(right));
         }
         let at = same
-            .find(|f| name.is_none() || f.axis.as_deref() == name)
+            .clone()
+            .find(|f| own(truth, f))
+            .or_else(|| same.find(|f| sits(truth, &f.actuators)))
             .unwrap_or(first);
-        let inside = at.ci95[0] <= truth.value && truth.value <= at.ci95[1];
+        let value = value_for(truth, &at.actuators);
+        if value.is_nan() {
+            continue;
+        }
+        let inside = at.ci95[0] <= value && value <= at.ci95[1];
         verdict.covered.push((truth.effect.clone(), inside));
     }
-    if !case.truth.is_empty() && !unlisted {
-        let perfect_um = perfect_rms_um(case);
+    if let (false, false, Some(perfect_um)) = (case.truth.is_empty(), unlisted, case.perfect_um) {
         let possible = outcome.baseline_um - perfect_um;
         // Where nothing can be foretold nothing can be gained, and the ratio says nothing.
         if possible > SOMETHING * perfect_um {
             verdict.gain_share = Some((outcome.baseline_um - outcome.extended_um) / possible);
         }
     }
+    verdict.negative_gain =
+        !outcome.findings.is_empty() && outcome.extended_um > outcome.baseline_um;
+    verdict.bad_flash = outcome.flash && outcome.extended_um >= outcome.baseline_um;
+    verdict.unexplained = outcome.unexplained;
+    verdict.spoilt_named = case
+        .spoilt
+        .as_ref()
+        .map(|file| outcome.left_out == [file.as_str()]);
     verdict.false_findings = false_findings;
     verdict
 }
 
-/// What the true machine leaves of the measurement, rms over all samples, each run's centre removed, µm. The phase of
-/// a vibration, the places of teeth and where on the circle a polygon has its corners are new in each run: no model
-/// could foretell them, so they count as left (of a polygon all but its mean).
-pub fn perfect_rms_um(case: &Case) -> f64 {
-    let perfect = Instrument {
-        noise_m: 0.0,
-        resolution_m: 0.0,
-        drift_m: 0.0,
-        ..case.instrument
-    };
-    let perfect = Instrument {
-        spread: crate::machine::Spread {
-            radius_m: 0.0,
-            oval_m: 0.0,
-            lobes_m: 0.0,
-            ..perfect.spread
-        },
-        ..perfect
-    };
-    let mut machine = case.machine.clone();
-    machine.vibration = None;
-    machine
-        .axes
-        .iter_mut()
-        .for_each(|axis| axis.stick_slip = None);
-    let polygon = perfect.measure(&machine, &case.plan, case.measured_with);
-    machine.interpolation_s = 0.0;
-    let mut clean = perfect.measure(&machine, &case.plan, case.measured_with);
-    for (run, polygon) in clean.runs.iter_mut().zip(&polygon.runs) {
-        let mean = |run: &Run| {
-            run.samples.deviation_m.iter().sum::<f64>() / run.samples.deviation_m.len() as f64
-        };
-        let shift = mean(polygon) - mean(run);
-        run.samples.deviation_m.iter_mut().for_each(|x| *x += shift);
+/// Names of the slides.
+const SLIDES: [&str; 3] = ["x", "y", "z"];
+
+/// Place among the pairs XY, YZ, ZX of two slides by name, and whether they come in the order of the plane.
+fn pair_of(actuators: &[String]) -> Option<(usize, bool)> {
+    let [a, b] = actuators else { return None };
+    let index = |name: &str| SLIDES.iter().position(|s| *s == name);
+    let (a, b) = (index(a)?, index(b)?);
+    match (b + 3 - a) % 3 {
+        1 => Some((a, true)),
+        2 => Some((b, false)),
+        _ => None,
     }
-    let (mut sum, mut count) = (0.0, 0.0);
-    for (run, truth) in case.campaign.runs.iter().zip(&clean.runs) {
-        let left: Vec<f64> = run
-            .samples
-            .deviation_m
+}
+
+/// Whether a finding with these actuators sits where the truth does. A finding that names none can only mean the
+/// one plane there was.
+fn sits(truth: &Truth, actuators: &[String]) -> bool {
+    match truth.seat {
+        Seat::Whole => true,
+        Seat::Slide(axis) => actuators.iter().any(|a| a == SLIDES[axis]),
+        Seat::Joint(joint) => actuators
             .iter()
-            .zip(&truth.samples.deviation_m)
-            .map(|(a, b)| a - b)
-            .collect();
-        let n = left.len() as f64;
-        let (mut cos, mut sin) = (0.0, 0.0);
-        for (x, angle) in left.iter().zip(&run.samples.angle_rad) {
-            cos += 2.0 * x * angle.cos() / n;
-            sin += 2.0 * x * angle.sin() / n;
-        }
-        for (x, angle) in left.iter().zip(&run.samples.angle_rad) {
-            sum += (x - cos * angle.cos() - sin * angle.sin()).powi(2);
-        }
-        count += n;
+            .any(|a| *a == format!("joint{}", joint + 1)),
+        Seat::Pair(_) if actuators.is_empty() => true,
+        // Of a slide that differs from both others two pairs tell.
+        Seat::Pair(_) => pair_of(actuators).is_some_and(|(pair, _)| {
+            truth
+                .by_pair
+                .is_some_and(|v| v[pair].abs() > 1e-3 * truth.value.abs())
+        }),
     }
-    1e6 * (sum / count).sqrt()
+}
+
+/// Whether a finding names the very pair that the effect was hidden on.
+fn own(truth: &Truth, finding: &Finding) -> bool {
+    match truth.seat {
+        Seat::Pair(pair) if !finding.actuators.is_empty() => {
+            pair_of(&finding.actuators).is_some_and(|(k, _)| k == pair[0])
+        }
+        _ => sits(truth, &finding.actuators),
+    }
+}
+
+/// The true value of what a finding with these actuators names.
+fn value_for(truth: &Truth, actuators: &[String]) -> f64 {
+    match (truth.by_pair, pair_of(actuators)) {
+        // A right angle has no order; a difference has.
+        (Some(values), Some((pair, in_order))) if in_order || truth.effect == "squareness" => {
+            values[pair]
+        }
+        (Some(values), Some((pair, _))) => -values[pair],
+        _ => truth.value,
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::Kind;
+    use crate::effects::{Case, Kind};
     use crate::machine::base::Variety;
-    use crate::study::Finding;
 
-    fn finding(cause: &str, axis: Option<&str>, ci95: [f64; 2]) -> Finding {
+    fn finding(cause: &str, actuators: &[&str], ci95: [f64; 2]) -> Finding {
         Finding {
             cause: cause.into(),
-            axis: axis.map(str::to_owned),
+            actuators: actuators.iter().map(|a| (*a).to_owned()).collect(),
             probability: 0.9,
             value: 0.5 * (ci95[0] + ci95[1]),
             ci95,
@@ -198,7 +214,7 @@ mod tests {
         }
     }
 
-    fn case(names: &[&str]) -> Case {
+    fn case(names: &[&str]) -> Hidden {
         Case::new(
             &Kind::Effects(names.iter().map(|s| (*s).to_owned()).collect()),
             3.0,
@@ -206,6 +222,7 @@ mod tests {
             Variety::Usual,
         )
         .unwrap()
+        .hidden()
     }
 
     fn answer(findings: Vec<Finding>, unexplained: bool) -> Outcome {
@@ -214,6 +231,7 @@ mod tests {
             unexplained,
             baseline_um: 3.0,
             extended_um: 1.5,
+            ..Outcome::default()
         }
     }
 
@@ -221,7 +239,11 @@ mod tests {
     fn right_wrong_and_beside() {
         let case = case(&["reversal_spike"]);
         let t = case.truth[0].clone();
-        let axis = t.axis.map(|a| ["x", "y"][a]);
+        let axis: &[&str] = match t.seat {
+            Seat::Slide(slide) => &SLIDES[slide..=slide],
+            // On both slides of the pair.
+            _ => &["x"],
+        };
         let around = [0.9 * t.value, 1.1 * t.value];
         let v = judge(
             &case,
@@ -230,7 +252,7 @@ mod tests {
         assert!(v.top_right && v.exact && v.covered[0].1);
         let both = vec![
             finding("reversal_spike", axis, around),
-            finding("higher_order_dynamics", None, [0.0, 1.0]),
+            finding("higher_order_dynamics", &[], [0.0, 1.0]),
         ];
         let v = judge(&case, &answer(both.clone(), false));
         assert!(
@@ -244,7 +266,7 @@ mod tests {
         );
         let v = judge(
             &case,
-            &answer(vec![finding("backlash", Some("x"), [0.0, 1.0])], false),
+            &answer(vec![finding("backlash", &["x"], [0.0, 1.0])], false),
         );
         assert!(
             !v.top_right
@@ -265,7 +287,7 @@ mod tests {
     #[test]
     fn sets_nulls_and_the_unlisted() {
         let pair = case(&["squareness", "thermal_drift"]);
-        let [a, b] = ["squareness", "thermal_drift"].map(|c| finding(c, None, [0.0, 1.0]));
+        let [a, b] = ["squareness", "thermal_drift"].map(|c| finding(c, &[], [0.0, 1.0]));
         assert!(judge(&pair, &answer(vec![a.clone(), b], false)).exact);
         assert!(!judge(&pair, &answer(vec![a.clone()], false)).exact);
         let unlisted = case(&["unknown_bump"]);
@@ -276,13 +298,14 @@ mod tests {
 
     #[test]
     fn the_perfect_model_leaves_noise_and_spread() {
-        let case = case(&["squareness"]);
+        let kind = Kind::Effects(vec!["squareness".into()]);
+        let case = Case::new(&kind, 3.0, 5, Variety::Usual).unwrap();
         let expected = (case.instrument.noise_m.powi(2)
             + case.instrument.spread.radius_m.powi(2)
             + case.instrument.spread.oval_m.powi(2))
         .sqrt()
             * 1e6;
-        let got = perfect_rms_um(&case);
+        let got = case.perfect_um();
         assert!((got / expected - 1.0).abs() < 0.1, "{got} {expected}");
     }
 }

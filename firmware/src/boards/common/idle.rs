@@ -35,11 +35,13 @@ impl Idle {
     ///
     /// A round of the background that takes longer than a tick counts as shorter than it was: by whole ticks, none of
     /// them asleep.
-    pub fn sleep(&mut self) -> Option<u16> {
+    ///
+    /// Asked with interrupts masked, `may` can keep it awake.
+    pub fn sleep(&mut self, may: impl FnOnce() -> bool) -> Option<u16> {
         let period = SYST::get_reload() + 1;
         let woke = cortex_m::interrupt::free(|_| {
             let before = SYST::get_current();
-            if !cfg!(feature = "awake") {
+            if may() {
                 cortex_m::asm::wfi();
             }
             let woke = SYST::get_current();

@@ -17,11 +17,15 @@
 pub mod flash;
 pub mod idle;
 pub mod interrupt;
+pub mod kept;
 pub mod log;
 pub mod port;
 pub mod stack;
+#[cfg(feature = "stepped")]
+pub mod steps;
 
 use core::cell::Cell;
+use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use cortex_m::peripheral::scb::SystemHandler;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{SCB, SYST};
@@ -34,7 +38,7 @@ use giotto_firmware::control::{self, Desk, Job, Shared, Tick};
 use giotto_firmware::engine::{Config, Executor, Planner};
 use giotto_firmware::server::{Board, Buffers, Server, TimedSetPoint};
 use giotto_firmware::store::Layout;
-use giotto_shared::wire::{IN_FLIGHT, MAX_FRAME};
+use giotto_shared::wire::{IN_FLIGHT, MAX_FRAME, PositionState};
 use heapless_spsc::spsc::{Consumer, Producer, Queue};
 
 /// Ticks a second; the `fast` images show how many there can be.
@@ -78,9 +82,27 @@ fn SysTick() {
         *OWNED = critical_section::with(|token| TICK.borrow(token).take());
         return;
     };
+    #[cfg(feature = "stepped")]
+    if !steps::may_pass() {
+        return;
+    }
     SHARED.set_stop_input(super::stop::active());
-    tick.tick(*LATE);
+    kept::keep(tick.tick(*LATE).corrected_nm);
+    // SysTick counts down from the moment that this tick was due.
+    let used = SYST::get_reload().saturating_sub(SYST::get_current());
+    if used > WORST_TICK.load(Relaxed) {
+        WORST_TICK.store(used, Relaxed);
+    }
     *LATE = SCB::is_pendst_pending();
+}
+
+/// Longest tick so far, by SysTick's count.
+static WORST_TICK: AtomicU32 = AtomicU32::new(0);
+
+/// The same as a share of the time between two ticks, thousandths; one that was late counts as less than it was.
+fn worst_tick_permille() -> u16 {
+    let between = (SYST::get_reload() / 1000).max(1);
+    (WORST_TICK.load(Relaxed) / between).min(1000) as u16
 }
 
 /// The server's memory. `None` if asked for twice.
@@ -88,17 +110,29 @@ pub fn buffers() -> Option<&'static mut Buffers> {
     singleton!(: Buffers = Buffers::new())
 }
 
-/// Prepares the engine and hands its fast half to SysTick, which is started. `None` if called twice.
+/// Prepares the engine and hands its fast half to SysTick, which is started; `at_first`: what is known of where the machine
+/// stands where nothing was kept. `None` if called twice.
 #[inline(never)] // Its frame would stay below that of the loop that never returns.
-pub fn start(syst: &mut SYST, scb: &mut SCB, clock_hz: u32) -> Option<BoardDesk> {
+pub fn start(
+    syst: &mut SYST,
+    scb: &mut SCB,
+    clock_hz: u32,
+    at_first: PositionState,
+) -> Option<BoardDesk> {
     let config = Config::robot(TICK_HZ);
     let segments = singleton!(: Queue<Job, SEGMENTS> = Queue::new())?;
     let set_points = singleton!(: Queue<TimedSetPoint, SET_POINTS> = Queue::new())?;
-    let planner = singleton!(: Planner = Planner::new(&config, [0; 3]))?;
+    // The seal of memory that was never written does not fit.
+    let (place_nm, known) = match kept::kept() {
+        Some(place_nm) => (place_nm, PositionState::Kept),
+        None => ([0; 3], at_first),
+    };
+    SHARED.stands(place_nm, known);
+    let planner = singleton!(: Planner = Planner::new(&config, place_nm))?;
     let (segments_in, segments_out) = segments.split();
     let (points_in, points_out) = set_points.split();
     let tick = singleton!(: BoardTick = Tick::new(
-        Executor::new([0; 3], config.engage_ticks(), true), &SHARED, segments_out, points_in
+        Executor::new(place_nm, config.engage_ticks(), true), &SHARED, segments_out, points_in
     ))?;
     critical_section::with(|token| TICK.borrow(token).set(Some(tick)));
     // SAFETY: the priority of SysTick guards no critical section that is based on priorities; there is none.
@@ -124,6 +158,9 @@ pub struct Ports<L, S, G> {
     pub log: G,
     /// Feeds the watchdog.
     pub feed: fn(),
+    /// Stops what counts time on its own, where ticks pass as the host grants them.
+    #[cfg(feature = "stepped")]
+    pub still: fn(),
     /// Bytes the link has lost since it was last asked.
     pub lost: fn() -> u32,
 }
@@ -133,7 +170,7 @@ pub fn background<F, L, S, G>(
     board: Board,
     flash: F,
     layout: Layout,
-    (desk, buffers): (BoardDesk, &'static mut Buffers),
+    (desk, buffers, syst): (BoardDesk, &'static mut Buffers, SYST),
     mut ports: Ports<L, S, G>,
 ) -> !
 where
@@ -152,15 +189,25 @@ where
     }
     let mut rounds: u8 = 0;
     let mut idle = idle::Idle::new();
+    #[cfg(feature = "stepped")]
+    let mut link = steps::Stepped::new(ports.link, syst, ports.still);
+    #[cfg(not(feature = "stepped"))]
+    let mut link = {
+        // The counter runs on by itself.
+        let _ = syst;
+        ports.link
+    };
     loop {
         (ports.feed)();
         server.count_lost_bytes((ports.lost)());
         if rounds == 0 {
-            server.note_stack(stack::worst_bytes());
+            let (worst, left) = stack::worst_and_left_bytes();
+            server.note_stack(worst, left);
+            server.note_worst_tick(worst_tick_permille());
         }
         rounds = rounds.wrapping_add(1);
         // A port that fails loses what was being sent; the host asks again.
-        let _ = server.serve(&mut ports.link);
+        let _ = server.serve(&mut link);
         if let Some(stream) = &mut ports.stream {
             let _ = server.stream(stream);
         }
@@ -168,9 +215,17 @@ where
         if server.reset_requested() {
             defmt::info!("reset");
             log::drain(&mut ports.log);
+            #[cfg(feature = "stepped")]
+            link.close();
             SCB::sys_reset();
         }
-        if let Some(permille) = idle.sleep() {
+        #[cfg(feature = "stepped")]
+        link.round();
+        #[cfg(feature = "stepped")]
+        let may_sleep = || link.may_sleep();
+        #[cfg(not(feature = "stepped"))]
+        let may_sleep = || true;
+        if let Some(permille) = idle.sleep(may_sleep) {
             server.note_idle(permille);
         }
     }

@@ -11,14 +11,14 @@ unsafe extern "C" {
     static _stack_end: u32;
 }
 
-/// Bytes of stack used at the deepest so far.
+/// Bytes of stack used at the deepest so far, and those never used.
 #[allow(unsafe_code, reason = "the stack is memory that no Rust object owns")]
-pub fn worst_bytes() -> u32 {
+pub fn worst_and_left_bytes() -> (u32, u32) {
     let (top, bottom) = (&raw const _stack_start, &raw const _stack_end);
     let mut at = bottom;
     // SAFETY: the linker puts the stack between these two symbols, aligned to words; reading it is reading RAM.
     while at < top && unsafe { ptr::read_volatile(at) } == PAINT {
         at = at.wrapping_add(1);
     }
-    top as u32 - at as u32
+    (top as u32 - at as u32, at as u32 - bottom as u32)
 }

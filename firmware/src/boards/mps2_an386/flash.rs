@@ -11,10 +11,12 @@ const BASE: usize = 0x0010_0000;
 /// Bytes of an erase unit, and of a slot.
 const UNIT: u32 = 4096;
 /// Bytes of the window.
-const SIZE: usize = 3 * UNIT as usize;
+const SIZE: usize = 5 * UNIT as usize;
 
 /// Where the slots are in the window.
-pub const LAYOUT: Layout = Layout::new([0, UNIT], UNIT).with_key(2 * UNIT);
+pub const LAYOUT: Layout = Layout::new([0, UNIT], UNIT)
+    .with_key(2 * UNIT)
+    .with_config([3 * UNIT, 4 * UNIT]);
 
 /// The window. There is one; nothing else of the image uses this memory.
 pub struct Window(());

@@ -7,7 +7,8 @@
 //! | UART2 | the log, in defmt's encoding (`defmt-print -e IMAGE`) |
 //!
 //! Tables are kept in a window of code memory that behaves like NOR flash; it survives a warm reset, not the
-//! end of the emulator. Never run on the FPGA board itself.
+//! end of the emulator. Once the host grants ticks, time passes as it does (`common::steps`). Never run on the FPGA
+//! board itself.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
@@ -35,6 +36,7 @@ mod image {
     use cortex_m_rt::entry;
     use embedded_io::{Read, Write};
     use giotto_firmware::server::Board;
+    use giotto_shared::wire::{ClockSource, PositionState, ResetCause};
 
     /// Clock of core and peripherals (DAI0386 2.5).
     const CLOCK_HZ: u32 = 25_000_000;
@@ -42,6 +44,9 @@ mod image {
         name: "mps2-an386",
         build: env!("GIOTTO_BUILD"),
         tick_hz: common::TICK_HZ,
+        clock: ClockSource::Crystal,
+        // The emulator does not say.
+        reset: ResetCause::Unknown,
     };
 
     /// Sends back what comes, byte for byte: what the line itself carries (feature `echo`, for `giotto-hil link`).
@@ -62,10 +67,15 @@ mod image {
         let started = cortex_m::Peripherals::take().and_then(|mut core| {
             let link = uart::Uart::link()?;
             common::interrupt::enable::<{ vectors::LINK }>(&mut core.NVIC);
-            let desk = common::start(&mut core.SYST, &mut core.SCB, CLOCK_HZ)?;
-            Some((link, desk, common::buffers()?))
+            let desk = common::start(
+                &mut core.SYST,
+                &mut core.SCB,
+                CLOCK_HZ,
+                PositionState::Known,
+            )?;
+            Some((link, desk, common::buffers()?, core.SYST))
         });
-        let Some((link, desk, buffers)) = started else {
+        let Some((link, desk, buffers, syst)) = started else {
             cortex_m::asm::udf()
         };
         if cfg!(feature = "echo") {
@@ -77,13 +87,14 @@ mod image {
             stream: Some(uart::Uart::stream()),
             log: uart::Uart::log(),
             feed: watchdog::feed,
+            still: watchdog::stop,
             lost: common::port::lost,
         };
         common::background(
             BOARD,
             flash::Window::new(),
             flash::LAYOUT,
-            (desk, buffers),
+            (desk, buffers, syst),
             ports,
         )
     }

@@ -28,6 +28,11 @@ pub fn start(clock_hz: u32) {
     write(CONTROL, RUN);
 }
 
+/// Stops it: where time passes by grant it would find every pause too long.
+pub fn stop() {
+    write(CONTROL, 0);
+}
+
 /// Begins the period anew.
 pub fn feed() {
     write(CLEAR, 1);

@@ -1,5 +1,6 @@
 //! 168 MHz from the crystal, or 16 MHz from the internal oscillator if the crystal does not start (RM0090 7.2).
 use super::register::Register;
+use giotto_shared::wire::ResetCause;
 
 const RCC: usize = 0x4002_3800;
 const CR: Register = Register::at(RCC, 0x00);
@@ -8,6 +9,7 @@ const CFGR: Register = Register::at(RCC, 0x08);
 const AHB1ENR: Register = Register::at(RCC, 0x30);
 const APB1ENR: Register = Register::at(RCC, 0x40);
 const APB2ENR: Register = Register::at(RCC, 0x44);
+const CSR: Register = Register::at(RCC, 0x74);
 const FLASH_ACR: Register = Register::at(0x4002_3c00, 0x00);
 
 const HSE_ON: u32 = 1 << 16;
@@ -49,6 +51,24 @@ pub struct Clock {
     pub fell_back: bool,
 }
 
+/// Why the part started (RM0090 7.3.21), forgotten once it was asked for.
+pub fn reset_cause() -> ResetCause {
+    /// Independent and window watchdog, request, power (also brown-out), pin, in this order: a power-up sets the pin's too.
+    const CAUSES: [(u32, ResetCause); 4] = [
+        (0b11 << 29, ResetCause::Watchdog),
+        (1 << 28, ResetCause::Request),
+        (0b101 << 25, ResetCause::Power),
+        (1 << 26, ResetCause::Pin),
+    ];
+    const FORGET: u32 = 1 << 24;
+    let flags = CSR.get();
+    CSR.change(0, FORGET);
+    CAUSES
+        .into_iter()
+        .find(|(mask, _)| flags & mask != 0)
+        .map_or(ResetCause::Unknown, |(_, cause)| cause)
+}
+
 /// Starts the clocks and lets them through to the ports and USARTs used.
 pub fn start() -> Clock {
     let crystal = from_crystal();
@@ -68,7 +88,7 @@ pub fn start() -> Clock {
         }
     } else {
         // The emulator's SysTick counts 168 MHz all the same.
-        let core_hz = if cfg!(feature = "awake") {
+        let core_hz = if cfg!(feature = "stepped") {
             CORE_HZ
         } else {
             HSI_HZ

@@ -42,24 +42,40 @@ mod image {
     use super::{clock, common, flash, stop, usart, vectors, watchdog};
     use cortex_m_rt::entry;
     use giotto_firmware::server::Board;
+    use giotto_shared::wire::{ClockSource, PositionState, ResetCause};
 
-    const BOARD: Board = Board {
-        name: "stm32f405",
-        build: env!("GIOTTO_BUILD"),
-        tick_hz: common::TICK_HZ,
-    };
+    const fn board(clock: ClockSource, reset: ResetCause) -> Board {
+        Board {
+            name: "stm32f405",
+            build: env!("GIOTTO_BUILD"),
+            tick_hz: common::TICK_HZ,
+            clock,
+            reset,
+        }
+    }
 
     #[entry]
     fn main() -> ! {
+        let reset = clock::reset_cause();
         let clock = clock::start();
+        let source = if clock.fell_back {
+            ClockSource::Internal
+        } else {
+            ClockSource::Crystal
+        };
         stop::prepare();
         let started = cortex_m::Peripherals::take().and_then(|mut core| {
             let link = usart::Usart::link(&clock)?;
             common::interrupt::enable::<{ vectors::LINK }>(&mut core.NVIC);
-            let desk = common::start(&mut core.SYST, &mut core.SCB, clock.core_hz)?;
-            Some((link, desk, common::buffers()?))
+            let desk = common::start(
+                &mut core.SYST,
+                &mut core.SCB,
+                clock.core_hz,
+                PositionState::Unknown,
+            )?;
+            Some((link, desk, common::buffers()?, core.SYST))
         });
-        let Some((link, desk, buffers)) = started else {
+        let Some((link, desk, buffers, syst)) = started else {
             cortex_m::asm::udf()
         };
         if clock.fell_back {
@@ -71,13 +87,16 @@ mod image {
             stream: None::<common::port::Port<usart::Usart>>,
             log: usart::Usart::log(&clock),
             feed: watchdog::feed,
+            // The emulator has no watchdog of this part.
+            #[cfg(feature = "stepped")]
+            still: || {},
             lost: common::port::lost,
         };
         common::background(
-            BOARD,
+            board(source, reset),
             flash::Sectors::new(),
             flash::LAYOUT,
-            (desk, buffers),
+            (desk, buffers, syst),
             ports,
         )
     }

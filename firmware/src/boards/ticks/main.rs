@@ -2,7 +2,7 @@
 //!
 //! Run with `-icount shift=10`: an instruction lasts 1024 ns, SysTick counts 40 ns, so a difference of SysTick values
 //! is a count of instructions. What is counted is the call of the tick as the image makes it, compute only: no
-//! interrupt entry, no ports. UART0 says one line a case, `NAME MIN MAX`, and `end`.
+//! interrupt entry, no ports; `interrupt` is all that the handler of a board does. UART0 says one line a case, `NAME MIN MAX`, and `end`.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
@@ -19,6 +19,8 @@ mod image {
     use cortex_m::peripheral::syst::SystClkSource;
     use cortex_m_rt::entry;
     use defmt as _;
+    use giotto_firmware::control::Shared;
+    use giotto_firmware::control::bench::{self, Interrupt};
     use giotto_firmware::engine::bench::{Arc, Libm, Plain, Streamed, Turning};
     use giotto_firmware::engine::flag;
 
@@ -139,6 +141,23 @@ mod image {
         arc.sound().then_some(ranges)
     }
 
+    /// From rest to rest, each set-point recorded.
+    fn interrupt(floor: u32) -> Option<Range> {
+        let shared = cortex_m::singleton!(: Shared = Shared::new())?;
+        let segments = cortex_m::singleton!(: bench::Segments = bench::Segments::new())?;
+        let points = cortex_m::singleton!(: bench::Points = bench::Points::new())?;
+        let mut interrupt = Interrupt::new(HELIX_M, shared, segments, points)?;
+        let mut range = Range::NONE;
+        loop {
+            let before = SYST::get_current();
+            black_box(interrupt.run(black_box(false), black_box(false)));
+            range.add(between(before, SYST::get_current()).saturating_sub(floor));
+            if !interrupt.drain() {
+                return Some(range);
+            }
+        }
+    }
+
     fn stream(floor: u32) -> Option<Range> {
         let mut streamed = Streamed::new()?;
         let mut range = Range::NONE;
@@ -215,6 +234,7 @@ mod image {
         say("helix_beta", &all);
         let [all, _] = arc(true, HELIX_M, floor)?;
         say("helix_extended", &all);
+        say("interrupt", &interrupt(floor)?);
         say("naive_libm", &plain::<Libm>(floor));
         say("naive_nalgebra", &plain::<Nalgebra>(floor));
         say("naive_idsp", &plain::<Idsp>(floor));

@@ -1,4 +1,5 @@
 //! Tick and desk with the queues of a board between them: stop command, stop input, silent host, late ticks.
+mod pause;
 mod programs;
 mod streams;
 
@@ -60,6 +61,7 @@ impl Bench {
             centre_m: [0.0; 3],
             radius_m,
             feed_m_s: 0.3,
+            plane: giotto_shared::Plane::Xy,
             direction: Direction::Ccw,
             laps: 1,
             start_rad: 0.0,

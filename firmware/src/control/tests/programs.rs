@@ -93,6 +93,8 @@ fn whatever_stops_a_program_ends_it() {
         let further = line([0.4, 0.0, 0.0]).exact(at).unwrap();
         assert_eq!(bench.desk.append(&further, 0), Err(refusal), "{name}");
         bench.until_at_rest();
+        // In fault it is at rest before what waits is thrown away.
+        bench.ticks(3);
         let now = bench.now();
         assert_eq!(now.dropped_segments, 2, "{name}");
         // Held, the segment in hand is finished.

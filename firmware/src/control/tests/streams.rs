@@ -126,6 +126,14 @@ fn roughest(bench: &Bench) -> f64 {
     (0..bench.path.len() - 2).map(change).fold(0.0, f64::max) * 1e3
 }
 
+fn until_it_dries_up(bench: &mut Bench) {
+    while bench.now().state == MotionState::Running {
+        bench.ticks(1);
+        assert!(bench.path.len() < 10_000);
+    }
+    assert_eq!(bench.now().state, MotionState::Stopping);
+}
+
 #[test]
 fn a_stream_that_dries_up_comes_to_rest_and_faults() {
     let mut bench = bench();
@@ -136,8 +144,7 @@ fn a_stream_that_dries_up_comes_to_rest_and_faults() {
         bench.ticks(10);
     }
     assert_eq!(bench.now().state, MotionState::Running);
-    bench.ticks(1100);
-    assert_eq!(bench.now().state, MotionState::Stopping);
+    until_it_dries_up(&mut bench);
     bench.until_at_rest();
     let now = bench.now();
     assert_eq!(
@@ -162,18 +169,11 @@ fn a_fault_ends_a_stream_and_what_comes_behind_it_is_refused() {
         source.feed(&mut bench, 1000);
         bench.ticks(10);
     }
-    // Dried up; what comes while it slows down is taken, and too late.
-    bench.ticks(1100);
-    assert_eq!(bench.now().state, MotionState::Stopping);
-    source.feed(&mut bench, STREAMED);
-    assert!(bench.now().queued > 0);
-    while bench.now().fault.is_none() {
-        bench.ticks(1);
-    }
+    until_it_dries_up(&mut bench);
+    assert_eq!(bench.now().fault, Some(FaultCause::Starved));
     assert_eq!(bench.desk.points(&[]), Err(MotionRefusal::NoProgram));
     assert_eq!(bench.desk.end(), Err(MotionRefusal::NoProgram));
-    // What was taken goes, one a tick, and it stays so.
-    bench.ticks(4);
+    bench.until_at_rest();
     let now = bench.now();
     assert_eq!((now.state, now.queued), (MotionState::Fault, 0));
     for _ in 0..50 {
@@ -306,4 +306,93 @@ fn bytes_that_are_no_set_points_are_refused_and_the_stream_goes_on() {
         (bench.now().state, bench.now().raw_nm),
         (MotionState::Idle, streamed(STREAMED))
     );
+}
+
+/// Batches that came just before it dried up: they are thrown away, and the fault is one from the first tick of rest on.
+#[test]
+fn a_fault_is_a_fault_whatever_still_waits() {
+    for wait in 0..4 {
+        let mut bench = bench();
+        bench.desk.begin_stream(1.0, 60).unwrap();
+        let mut source = Source::new([0; 3]);
+        for _ in 0..100 {
+            source.feed(&mut bench, 1000);
+            bench.ticks(10);
+        }
+        // A late tick ends the stream with batches in its queue.
+        source.feed(&mut bench, STREAMED);
+        assert!(bench.now().queued > 0);
+        let output = bench.tick.tick(true);
+        bench.path.push(output.nominal_nm);
+        while bench.now().state == MotionState::Stopping {
+            bench.ticks(1);
+        }
+        assert_eq!(bench.now().state, MotionState::Fault);
+        bench.ticks(wait);
+        assert_eq!(bench.now().state, MotionState::Fault, "{wait}");
+        // Forgotten without a reset, the place is kept.
+        let stood = bench.now().raw_nm;
+        bench.desk.clear_fault().unwrap();
+        bench.ticks(5);
+        let now = bench.now();
+        assert_eq!(
+            (now.state, now.fault, now.raw_nm),
+            (MotionState::Idle, None, stood)
+        );
+        bench.desk.begin().unwrap();
+    }
+}
+
+/// At 1 m/s towards the end of the coordinates: refused before a stop would lead beyond them, and nothing jumps.
+#[test]
+fn a_stream_keeps_room_to_stop_within_the_coordinates() {
+    for (axis, sign) in [(0, 1), (1, -1), (2, 1)] {
+        let mut bench = bench();
+        let mut start = [0; 3];
+        start[axis] = sign * 1_500_000_000;
+        bench.desk.declare(start).unwrap();
+        bench.ticks(1);
+        assert_eq!(bench.now().raw_nm, start);
+        bench.path.clear();
+        bench.desk.begin_stream(1.0, 60).unwrap();
+        let mut steps = Steps::from(start);
+        // To 1 m/s in half a second, then on and on.
+        let place = |n: usize| {
+            let t = n as f64 * 1e-3;
+            let way = 0.5 * smoothstep((t / 0.5).min(1.0)).integral + (t - 0.5).max(0.0);
+            let mut place = start;
+            place[axis] += sign * (way * 1e9).round() as i32;
+            place
+        };
+        let mut sent = 0;
+        let refused = 'sending: loop {
+            let (mut chunk, before, mut count) = (Chunk::new(), steps, 0);
+            while count < 20 && steps.write(place(sent + count), &mut chunk) {
+                count += 1;
+            }
+            loop {
+                match bench.desk.points(&chunk) {
+                    Ok(()) => break,
+                    Err(MotionRefusal::QueueFull) => bench.ticks(5),
+                    Err(other) => break 'sending other,
+                }
+            }
+            sent += count;
+            assert!(sent < 2000);
+            let _ = before;
+        };
+        assert_eq!(refused, MotionRefusal::NoRoomToStop);
+        // Not without need: within a tenth of a second of the last place from which it can stop.
+        assert!(place(sent)[axis].abs() > 1_850_000_000, "{:?}", place(sent));
+        bench.until_at_rest();
+        assert_eq!(bench.now().state, MotionState::Fault);
+        let largest = bench
+            .path
+            .windows(2)
+            .map(|w| i64::from(w[1][axis]) - i64::from(w[0][axis]))
+            .map(i64::abs)
+            .max();
+        assert!(largest < Some(1_050_000), "{largest:?}");
+        assert!(roughest(&bench) < 5.1, "{}", roughest(&bench));
+    }
 }

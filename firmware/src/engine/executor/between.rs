@@ -12,20 +12,11 @@ impl Executor {
         let (before, wrapped) = self.phase.overflowing_sub(self.segment.timing.step);
         (self.phase, self.turns) = (before, self.turns.wrapping_sub(i32::from(wrapped)));
         self.left = self.segment.timing.cruise_ticks.wrapping_add(1);
-        let mut out = match self.mode {
-            Mode::ArcRise => {
-                self.mode = Mode::ArcCruise;
-                self.arc_cruise::<false>()
-            }
-            Mode::TermRise => {
-                self.mode = Mode::TermCruise;
-                self.arc_cruise::<true>()
-            }
-            _ => {
-                self.mode = Mode::Cruise;
-                self.cruise()
-            }
-        };
+        self.mode = Mode::Cruise;
+        let mut out = self.cruise();
+        if self.pause {
+            self.begin_pause();
+        }
         // The last tick of the ramp is not yet one at constant feed.
         out.flags &= !flag::CRUISE;
         out
@@ -33,13 +24,13 @@ impl Executor {
 
     #[inline(never)]
     pub(super) fn standstill(&mut self) -> Output {
-        self.counters.segments = self.counters.segments.wrapping_add(1);
         self.set_phase(self.end);
+        self.stands();
         self.mode = Mode::Rest;
         let phase_q32 = (self.phase >> 32) as u32;
         let (c, s) = self.weights(phase_q32);
         self.rest_nm = self.place(c, s, phase_q32);
-        if self.end == self.segment.timing.end {
+        if self.end == self.segment.timing.end && !self.held {
             self.rest_nm = self.segment.end_nm;
         }
         self.rest_offset_nm = self.standing_offset(c, s);
@@ -48,11 +39,7 @@ impl Executor {
 
     #[inline(always)]
     pub(super) fn begin_fall(&mut self) {
-        self.mode = match self.mode {
-            Mode::ArcCruise => Mode::ArcFall,
-            Mode::TermCruise => Mode::TermFall,
-            _ => Mode::Fall,
-        };
+        self.mode = Mode::Fall;
         self.clock = Clock::falling(self.segment.timing.clock_step);
         // So that the sum of steps less half the last one is the phase.
         self.advance(self.segment.timing.step >> 1);
@@ -61,6 +48,12 @@ impl Executor {
     #[inline(never)]
     pub(super) fn rest(&mut self, inbox: &mut impl Inbox) -> Output {
         self.halting = false;
+        if self.held {
+            return self.pause_tick();
+        }
+        if self.pause {
+            return self.finish(self.rest_nm, self.rest_offset_nm, 0);
+        }
         // At rest nothing else needs the segment in hand.
         if inbox.take(&mut self.segment) {
             if self.segment.epoch != self.epoch || self.fault.is_some() {
@@ -91,16 +84,11 @@ impl Executor {
             let (c, s) = self.weights((self.segment.timing.start >> 32) as u32);
             if self.segment.extended {
                 let extra = &self.segment.extra;
-                // A line moves from its first tick on as it does at its end.
-                let ahead = if self.segment.kind == Kind::Line {
-                    (i32::MAX, 0)
-                } else {
-                    (c, s)
-                };
-                self.sides.begin(extra, extra.ahead_at(ahead.0, ahead.1));
+                self.sides.begin(extra, extra.ahead_at(c, s));
             }
             self.target_nm = self.standing_offset(c, s);
         }
+        (self.from, self.from_turns) = (self.segment.timing.start, 0);
     }
 
     /// Moves the offset from what it is to what the segment starts with, then lets the segment begin.
@@ -124,22 +112,16 @@ impl Executor {
         self.finish(self.rest_nm, offset, flag::SETTLING)
     }
 
-    fn begin_segment(&mut self) {
+    pub(super) fn begin_segment(&mut self) {
         let timing = self.segment.timing;
         self.left = timing.cruise_ticks;
         self.mode = match self.segment.kind {
             _ if self.segment.epoch != self.epoch => Mode::Rest,
             Kind::Dwell | Kind::Clear => Mode::Dwell,
-            Kind::Arc if self.segment.proven && self.segment.extended => Mode::TermRise,
-            Kind::Arc if self.segment.proven => Mode::ArcRise,
             Kind::Arc | Kind::Line | Kind::Helix => Mode::Rise,
         };
-        if self.mode.proven() {
-            self.guard.rely_on_plan();
-        }
         self.clock = Clock::rising(timing.clock_step);
-        self.phase = timing.start;
-        self.turns = 0;
+        (self.phase, self.turns) = (self.from, self.from_turns);
         self.end = timing.end;
     }
 

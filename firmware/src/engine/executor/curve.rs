@@ -1,4 +1,5 @@
-//! Ticks of any curve: lines, helices, arcs whose bounds the planner could not prove, and a stop in a rising ramp.
+//! Ticks of any curve: arcs in any plane, helices, lines, and a stop in a rising ramp. One way for all: each slide is
+//! corrected by its own motion.
 use super::phase::{ramp_phase, scaled};
 use super::{Executor, Mode};
 use crate::engine::planned::{Kind, turn};
@@ -20,11 +21,7 @@ impl Executor {
             Kind::Line | Kind::Dwell | Kind::Clear => [0; 3],
         };
         if self.segment.extended {
-            if self.segment.kind == Kind::Line {
-                let [x, y, _] = &self.segment.extra.linear;
-                wanted[0] = wanted[0].wrapping_add(x.on_line(c, i32::MAX, 0));
-                wanted[1] = wanted[1].wrapping_add(y.on_line(c, i32::MAX, 0));
-            }
+            wanted = self.with_way(c, s, nominal, i32::MAX, 0, wanted);
             wanted = self.with_terms(c, s, nominal, wanted);
         }
         self.left = self.left.wrapping_sub(1);
@@ -35,24 +32,66 @@ impl Executor {
     }
 
     /// Adds the profile terms that are not linear.
-    #[inline(never)]
+    #[inline(always)]
     fn with_terms(&mut self, c: i32, s: i32, nominal: [i32; 3], wanted: [i32; 3]) -> [i32; 3] {
-        let (arm, extra) = (self.arm(c, s), &self.segment.extra);
-        let ([nx, ny, _], [wx, wy, wz]) = (nominal, wanted);
-        let [sx, sy] = self.sides.tick(extra, c, s);
-        let offset = [wx.wrapping_add(sx), wy.wrapping_add(sy)];
-        let [wx, wy] = extra.by_place(&self.sincos, [nx, ny], || arm, offset);
-        [wx, wy, wz]
+        let extra = &self.segment.extra;
+        let offset = sum(wanted, self.sides.tick(extra, c, s));
+        extra.by_place(&self.sincos, nominal, || self.arm(c, s), offset)
     }
 
-    /// Distance from the centre of an arc, nm, X and Y.
+    /// Distance from the centre of an arc, nm.
     #[inline(always)]
-    pub(super) fn arm(&self, c: i32, s: i32) -> [i32; 2] {
-        let [x, y, _] = &self.segment.axes;
+    fn arm(&self, c: i32, s: i32) -> [i32; 3] {
+        let [x, y, z] = &self.segment.axes;
         match self.segment.kind {
-            Kind::Arc | Kind::Helix => [x.turned(c, s), y.turned(c, s)],
-            Kind::Line | Kind::Dwell | Kind::Clear => [0; 2],
+            Kind::Arc | Kind::Helix => [x.turned(c, s), y.turned(c, s), z.turned(c, s)],
+            Kind::Line | Kind::Dwell | Kind::Clear => [0; 3],
         }
+    }
+
+    /// Adds the linear profile terms of a line, or those of the rise of a helix.
+    #[inline(always)]
+    fn with_way(
+        &self,
+        c: i32,
+        s: i32,
+        nominal: [i32; 3],
+        rate: i32,
+        turning: i32,
+        wanted: [i32; 3],
+    ) -> [i32; 3] {
+        match self.segment.kind {
+            Kind::Line => {
+                let [x, y, z] = &self.segment.extra.linear;
+                let along = [x, y, z].map(|slide| slide.on_line(c, rate, turning));
+                sum(wanted, along)
+            }
+            Kind::Helix => self.with_rise(c, s, nominal, rate, turning, wanted),
+            Kind::Arc | Kind::Dwell | Kind::Clear => wanted,
+        }
+    }
+
+    #[inline(never)]
+    fn with_rise(
+        &self,
+        c: i32,
+        s: i32,
+        [nx, ny, nz]: [i32; 3],
+        rate: i32,
+        turning: i32,
+        wanted: [i32; 3],
+    ) -> [i32; 3] {
+        let [x, y, z] = &self.segment.axes;
+        let risen = [
+            nx.wrapping_sub(x.on_arc(c, s)),
+            ny.wrapping_sub(y.on_arc(c, s)),
+            nz.wrapping_sub(z.on_arc(c, s)),
+        ];
+        let [x, y, z] = &self.segment.extra.rising;
+        sum(
+            wanted,
+            [x, y, z].map(|slide| slide.offset(risen, rate, turning)),
+        )
     }
 
     #[inline(never)]
@@ -118,37 +157,31 @@ impl Executor {
                 shape.w4_q31
             };
             wanted = self.with_linear(c, s, shape.s_q31, turning, wanted);
+            wanted = self.with_way(c, s, nominal, shape.s_q31, turning, wanted);
             wanted = self.with_terms(c, s, nominal, wanted);
         }
         self.out(nominal, wanted, flag::MOVING)
     }
 
-    /// Adds the linear profile terms.
+    /// Adds the linear profile terms of an arc.
     #[inline(always)]
     fn with_linear(&self, c: i32, s: i32, rate: i32, turning: i32, wanted: [i32; 3]) -> [i32; 3] {
-        let [x, y, z] = &self.segment.extra.linear;
-        let [wx, wy, wz] = wanted;
-        if self.segment.kind == Kind::Line {
-            let (ex, ey) = (x.on_line(c, rate, turning), y.on_line(c, rate, turning));
-            return [wx.wrapping_add(ex), wy.wrapping_add(ey), wz];
+        if !matches!(self.segment.kind, Kind::Arc | Kind::Helix) {
+            return wanted;
         }
         let rate2 = mulh(rate, rate).wrapping_mul(2);
-        let (ex, ey) = (
-            x.on_arc(rate, rate2, turning, c, s),
-            y.on_arc(rate, rate2, turning, c, s),
-        );
-        [
-            wx.wrapping_add(ex),
-            wy.wrapping_add(ey),
-            wz.wrapping_add(z.at_rest(c, s)),
-        ]
+        let [x, y, z] = &self.segment.extra.linear;
+        let slides = [x, y, z].map(|slide| slide.on_arc(rate, rate2, turning, c, s));
+        sum(wanted, slides)
     }
 
     /// Weights of a curve's two vectors, Q31: cosine and sine, or the share of a line.
     #[inline(always)]
     pub(super) fn weights(&self, phase_q32: u32) -> (i32, i32) {
         if self.segment.kind == Kind::Line {
-            ((phase_q32 >> 1) as i32, 0)
+            // The phase of a line is its share in Q30; rounding may carry it past either end.
+            let share_q30 = (phase_q32 as i32).clamp(-(1 << 30), (1 << 30) - 1);
+            (share_q30.wrapping_mul(2), 0)
         } else {
             sincos_with(self.sincos, phase_q32)
         }
@@ -197,12 +230,15 @@ impl Executor {
         if !self.segment.extended {
             return [0; 3];
         }
-        let [nx, ny, _] = self.rest_nm;
-        let offset = self.sides.standing();
-        let [wx, wy] =
-            self.segment
-                .extra
-                .by_place(&self.sincos, [nx, ny], || self.arm(c, s), offset);
-        self.with_linear(c, s, 0, 0, [wx, wy, 0])
+        let sides = self.sides.standing();
+        let extra = &self.segment.extra;
+        let offset = extra.by_place(&self.sincos, self.rest_nm, || self.arm(c, s), sides);
+        let offset = self.with_linear(c, s, 0, 0, offset);
+        self.with_way(c, s, self.rest_nm, 0, 0, offset)
     }
+}
+
+#[inline(always)]
+fn sum([a, b, c]: [i32; 3], [x, y, z]: [i32; 3]) -> [i32; 3] {
+    [a.wrapping_add(x), b.wrapping_add(y), c.wrapping_add(z)]
 }

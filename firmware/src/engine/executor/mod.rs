@@ -17,9 +17,9 @@
 //! These are arcs whose bounds the planner proved; all else (lines, helices, arcs at their bounds, stops in a ramp,
 //! engagement) runs in `curve` and `between` and takes longer: a helix 455 at most, 522 with the same eight terms; between
 //! two ticks of 8 kHz at 25 MHz are 3125.
-mod arc;
 mod between;
 mod curve;
+mod pause;
 mod phase;
 
 use crate::engine::engage::Engage;
@@ -56,18 +56,6 @@ enum Mode {
     Settle,
     /// Stands still for a time.
     Dwell,
-    /// Arc without profile terms at constant rate, its bounds proven by the planner.
-    ArcCruise,
-    /// The same in a rising ramp.
-    ArcRise,
-    /// The same in a falling ramp.
-    ArcFall,
-    /// Arc with profile terms at constant rate.
-    TermCruise,
-    /// The same in a rising ramp.
-    TermRise,
-    /// The same in a falling ramp.
-    TermFall,
     /// Any segment at constant rate.
     Cruise,
     /// Any segment in a rising ramp.
@@ -77,21 +65,6 @@ enum Mode {
     /// Stopped while rising: the rising ramp runs on, a falling one is laid over it. Each has four continuous
     /// derivatives, so their sum has; it never runs backwards because the second is never ahead of the first.
     Both,
-}
-
-impl Mode {
-    /// Whether the planner proved the bounds of what runs.
-    fn proven(self) -> bool {
-        matches!(
-            self,
-            Self::ArcRise
-                | Self::ArcCruise
-                | Self::ArcFall
-                | Self::TermRise
-                | Self::TermCruise
-                | Self::TermFall
-        )
-    }
 }
 
 /// The engine's fast half: what runs in the timer interrupt.
@@ -120,16 +93,20 @@ pub struct Executor {
     /// Offset wanted there, before engagement, and what the next segment wants there.
     rest_offset_nm: [i32; 3],
     target_nm: [i32; 3],
-    /// Programmed position and wanted offset of a tick with profile terms, while it is being made.
-    at_nm: [i32; 3],
-    wanted_nm: [i32; 3],
-    /// Of the vectors of an arc, as long: radial and tangential, and what X and Y take with opposite signs.
-    shares: [i32; 4],
     sides: Sides,
     /// Segments planned before the last stop or fault carry an older epoch and are thrown away.
     epoch: u8,
     /// On the way to a standstill that was asked for.
     halting: bool,
+    /// Feed hold: nothing begins, and what runs comes to rest on its path …
+    pause: bool,
+    /// … is on its way there, to go on with so many ticks at constant rate …
+    pausing: Option<u32>,
+    /// … and stands there.
+    held: bool,
+    /// Where the segment in hand begins, or goes on: phase and whole turns.
+    from: u64,
+    from_turns: i32,
     fault: Option<Fault>,
 }
 
@@ -155,12 +132,14 @@ impl Executor {
             rest_nm: position_nm,
             rest_offset_nm: [0; 3],
             target_nm: [0; 3],
-            at_nm: [0; 3],
-            wanted_nm: [0; 3],
-            shares: [0; 4],
             sides: Sides::default(),
             epoch: 0,
             halting: false,
+            pause: false,
+            pausing: None,
+            held: false,
+            from: 0,
+            from_turns: 0,
             fault: None,
         }
     }
@@ -172,7 +151,12 @@ impl Executor {
 
     /// Nothing in hand.
     pub fn idle(&self) -> bool {
-        self.mode == Mode::Rest
+        self.mode == Mode::Rest && !self.held
+    }
+
+    /// Stands in a feed hold, a part of the segment in hand still to come.
+    pub fn paused(&self) -> bool {
+        self.mode == Mode::Rest && self.held
     }
 
     /// Epoch that a planned segment must carry to be run; grows with each stop and fault.
@@ -183,6 +167,12 @@ impl Executor {
     /// Counts since start.
     pub const fn counters(&self) -> &Counters {
         &self.counters
+    }
+
+    /// Counts what has begun without a zone of the table.
+    pub fn count_uncorrected(&mut self, uncorrected: bool) {
+        let uncorrected = u32::from(uncorrected);
+        self.counters.uncorrected = self.counters.uncorrected.wrapping_add(uncorrected);
     }
 
     /// Why nothing runs, if so.
@@ -224,6 +214,7 @@ impl Executor {
     /// Something went wrong at rest: nothing more runs until [`Self::clear_fault`], and what is open ends here.
     pub fn fail(&mut self, fault: Fault) {
         self.fault = Some(fault);
+        (self.held, self.pausing) = (false, None);
         self.epoch = self.epoch.wrapping_add(1);
     }
 
@@ -246,20 +237,21 @@ impl Executor {
             return;
         }
         self.halting = true;
+        (self.held, self.pausing) = (false, None);
         self.epoch = self.epoch.wrapping_add(1);
         self.counters.stops = self.counters.stops.wrapping_add(1);
         let timing = &self.segment.timing;
         match self.mode {
-            Mode::ArcCruise | Mode::TermCruise | Mode::Cruise => {
+            Mode::Cruise => {
                 let distance = (timing.step >> 1).wrapping_mul(u64::from(timing.ramp_ticks));
                 self.end = self.phase.wrapping_add(distance);
                 self.begin_fall();
             }
-            Mode::ArcRise | Mode::TermRise | Mode::Rise => {
+            Mode::Rise => {
                 // ∫ of the two ramps together: one step for each tick between their starts.
                 let apart = self.clock.elapsed();
-                self.end = timing
-                    .start
+                self.end = self
+                    .from
                     .wrapping_add(timing.step.wrapping_mul(u64::from(apart)));
                 self.second = Clock::rising(timing.clock_step);
                 self.mode = if apart == 0 { Mode::Rest } else { Mode::Both };
@@ -284,12 +276,6 @@ impl Executor {
     #[inline]
     pub fn tick(&mut self, inbox: &mut impl Inbox) -> Output {
         match self.mode {
-            Mode::ArcCruise => self.arc_cruise::<false>(),
-            Mode::ArcRise => self.arc_ramp::<false, false>(),
-            Mode::ArcFall => self.arc_ramp::<false, true>(),
-            Mode::TermCruise => self.arc_cruise::<true>(),
-            Mode::TermRise => self.arc_ramp::<true, false>(),
-            Mode::TermFall => self.arc_ramp::<true, true>(),
             Mode::Cruise => self.cruise(),
             Mode::Rise => self.any_ramp(false),
             Mode::Fall => self.any_ramp(true),
@@ -315,9 +301,6 @@ impl Executor {
         let wanted = self.engage.apply(wanted);
         let (offset, verdict) = self.guard.pass(wanted);
         self.guard.watch(!self.engage.full());
-        if self.mode.proven() {
-            self.guard.rely_on_plan_if_easy();
-        }
         let mut flags = flags;
         if verdict.offset_cut | verdict.slew_cut {
             self.counters.offset_cuts = self

@@ -1,6 +1,6 @@
 //! Arcs and helices of a program. Whoever asks for one has worked out its vectors; here they are looked at: a plane that
 //! is none, or a start elsewhere, must not move a machine, wherever it comes from.
-use super::numbers::{arm, dot, inside, length, positive, to_m};
+use super::numbers::{arm, dot, inside, is_counter_clockwise, length, positive, to_m};
 use super::round::{MAX_GAIN, Round};
 use super::timing::{TURNS_PER_UNIT, Way};
 use super::{Planner, Refused};
@@ -56,9 +56,9 @@ impl Planner {
         {
             return Err(Refused::OutOfBounds(Quantity::Gap));
         }
+        self.soft_arc(arc)?;
         let end = arc.end_nm(self.position_nm);
         let slope = length(rise) / (TAU * radius);
-        let ([ux, uy, _], [vx, vy, _]) = (u, v);
         let round = Round {
             centre_nm: arc.centre_nm,
             u: arc.u_half_nm,
@@ -66,8 +66,7 @@ impl Planner {
             rise_nm: arc.rise_nm,
             radius_m: radius,
             feed_m_s: feed,
-            // A plane that stands upright counts as one, whatever rounding says.
-            ccw: ux * vy - uy * vx >= -1e-6 * radius * radius,
+            ccw: is_counter_clockwise(u, v),
             steep: libm::sqrtf(1.0 + slope * slope),
         };
         let way = Way {

@@ -6,9 +6,9 @@ use super::{Planner, Refused};
 use crate::engine::config::whole_above;
 use crate::engine::planned::{Planned, Timing};
 use core::f32::consts::TAU;
-use giotto_shared::Direction;
 use giotto_shared::angle::sincos;
 use giotto_shared::path::{ExactCircle, MAX_RADIUS_M, MAX_TURNS, Quantity};
+use giotto_shared::{Actuator, Direction};
 
 impl Planner {
     /// The positioning move to where a circle starts; `false`: the last segment ends there. Refused if the circle would be:
@@ -45,10 +45,16 @@ impl Planner {
         } else {
             run.start.wrapping_neg()
         };
+        let [first, second] = run.plane.axes();
+        let along = |axis: Actuator, arm: i32| {
+            Actuator::SLIDES.map(|slide| if slide == axis { arm } else { 0 })
+        };
+        let u = along(first, arm);
+        let v = along(second, if ccw { arm } else { arm.wrapping_neg() });
         let round = Round {
             centre_nm: run.centre_nm,
-            u: [arm, 0, 0],
-            v: [0, if ccw { arm } else { -arm }, 0],
+            u,
+            v,
             rise_nm: [0; 3],
             radius_m,
             feed_m_s,

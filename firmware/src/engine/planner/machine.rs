@@ -10,6 +10,7 @@ pub(super) struct Machine {
     pub(super) tick_s: f32,
     pub(super) feed_m_s: f32,
     pub(super) acceleration_m_s2: f32,
+    pub(super) jerk_m_s3: f32,
     pub(super) positioning_m_s: f32,
     pub(super) offset_m: f32,
     pub(super) slew_m_s: f32,
@@ -17,6 +18,7 @@ pub(super) struct Machine {
     pub(super) engage_ticks: u32,
     pub(super) stream_window_s: f32,
     pub(super) stream_hold_ticks: u32,
+    pub(super) soft_nm: [[i32; 2]; 3],
     /// Shortest ramp up to a feed f: the longer of f·[0] and √(f·[1]) seconds, by acceleration and by jerk.
     ramp: [f32; 2],
 }
@@ -33,6 +35,7 @@ impl Machine {
             tick_s: 1.0 / rate_hz,
             feed_m_s: config.motion.feed_m_s as f32,
             acceleration_m_s2,
+            jerk_m_s3,
             positioning_m_s: config.positioning_m_s as f32,
             offset_m: config.offset_m as f32,
             slew_m_s: config.slew_m_s as f32,
@@ -40,6 +43,7 @@ impl Machine {
             engage_ticks: config.engage_ticks(),
             stream_window_s: config.stream_window_s as f32,
             stream_hold_ticks: config.stream_hold_ticks,
+            soft_nm: config.soft_nm,
             ramp: [
                 STEEPEST[0] as f32 / acceleration_m_s2,
                 STEEPEST[1] as f32 / jerk_m_s3,

@@ -9,6 +9,7 @@
 //! | `circle`, `arc`, `line` | each its geometry and timing |
 //! | `round` | what circles and arcs have in common |
 //! | `law`, `terms` | the correction, from the numbers of a zone to those of the tick |
+//! | `soft` | the soft limits |
 //! | `worst`, `demand` | what a path asks for at most, and the ramp that keeps it within the bounds |
 //! | `machine` | the configuration, in the form that planning needs |
 //! | `timing`, `numbers` | phases, ticks; numbers at the border, vectors |
@@ -20,6 +21,7 @@ mod line;
 mod machine;
 mod numbers;
 mod round;
+mod soft;
 mod terms;
 mod timing;
 mod worst;
@@ -43,6 +45,8 @@ pub enum Refused {
     NotANumber(Quantity),
     /// Beyond what the configuration or the image allows.
     OutOfBounds(Quantity),
+    /// Beyond the soft limits of this axis (0 is X).
+    SoftLimit(u8),
     /// The queue is full, or the engine is not at rest where it has to be.
     Busy,
     /// A fault has to be cleared first.
@@ -104,6 +108,11 @@ impl Planner {
         self.zones.load(fill)
     }
 
+    /// Other limits, for what is planned from now on.
+    pub fn set_config(&mut self, config: &Config) {
+        self.machine = Machine::new(config);
+    }
+
     /// After a stop or a declared position: plans on from where the executor stands.
     pub fn resync(&mut self, position_nm: [i32; 3], epoch: u8) {
         (self.position_nm, self.epoch) = (position_nm, epoch);
@@ -124,6 +133,7 @@ impl Planner {
         match segment {
             ExactSegment::Line { to_nm, feed_m_s } => {
                 inside(to_nm, Quantity::Position)?;
+                self.soft_place(to_nm)?;
                 self.line_to(*to_nm, positive(*feed_m_s, Quantity::Feed)?, planned)
             }
             ExactSegment::Arc(arc) => self.arc(arc, planned),
@@ -166,6 +176,7 @@ impl Planner {
             window_s: self.machine.stream_window_s,
             feed_m_s,
             acceleration_m_s2: self.machine.acceleration_m_s2,
+            jerk_m_s3: self.machine.jerk_m_s3,
             hold_ticks: self.machine.stream_hold_ticks,
             engage_ticks: self.machine.engage_ticks,
             bounds_nm: self.machine.bounds_nm(bounds.offset_m, bounds.slew_m_s),
@@ -241,6 +252,11 @@ impl Planner {
             tick_s: self.machine.tick_s,
             take_up_ticks: self.machine.take_up_ticks,
         }
+    }
+
+    /// Largest feed of the machine, m/s.
+    pub const fn feed_limit(&self) -> f32 {
+        self.machine.feed_m_s
     }
 
     fn check_feed(&self, feed: f32) -> Result<(), Refused> {

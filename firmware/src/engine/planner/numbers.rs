@@ -45,7 +45,26 @@ pub(super) fn length(v: [f32; 3]) -> f32 {
     libm::sqrtf(dot(v, v))
 }
 
-/// X and Y of a point seen from another.
-pub(super) fn seen_from([x, y, _]: [f32; 3], [rx, ry, _]: [f32; 3]) -> [f32; 2] {
-    [x - rx, y - ry]
+/// A point seen from another.
+pub(super) fn seen_from([x, y, z]: [f32; 3], [rx, ry, rz]: [f32; 3]) -> [f32; 3] {
+    [x - rx, y - ry, z - rz]
+}
+
+/// Square to both.
+pub(super) fn cross([a, b, c]: [f32; 3], [x, y, z]: [f32; 3]) -> [f32; 3] {
+    [b * z - c * y, c * x - a * z, a * y - b * x]
+}
+
+/// Whether a turn from u to v is counter-clockwise, seen from where the largest coordinate of its axis is positive: the
+/// coordinate plane nearest to it, as a [`Frame`](giotto_shared::Frame) counts.
+pub(super) fn is_counter_clockwise(u: [f32; 3], v: [f32; 3]) -> bool {
+    // Of two as large the first counts, whatever rounding says.
+    let largest = |best: f32, c: f32| {
+        if c.abs() > 1.000_01 * best.abs() {
+            c
+        } else {
+            best
+        }
+    };
+    cross(u, v).into_iter().fold(0.0, largest) >= 0.0
 }

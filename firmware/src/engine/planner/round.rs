@@ -26,7 +26,7 @@ pub(super) struct Round {
     pub(super) rise_nm: [i32; 3],
     pub(super) radius_m: f32,
     pub(super) feed_m_s: f32,
-    /// Sense seen from +Z.
+    /// Sense seen from the positive side of the nearest coordinate plane.
     pub(super) ccw: bool,
     /// Length along a helix, of that in the plane.
     pub(super) steep: f32,
@@ -34,7 +34,7 @@ pub(super) struct Round {
 
 impl Round {
     /// The centre seen from where position errors of a zone are counted from.
-    fn seen(&self, zone: &Built) -> [f32; 2] {
+    fn seen(&self, zone: &Built) -> [f32; 3] {
         let centre = to_m(self.centre_nm);
         seen_from(centre, zone.reference_m.unwrap_or(centre))
     }
@@ -79,7 +79,7 @@ impl Planner {
         );
         let curable = steady.correction(&bounds) <= 1.0;
         let mut stretch = 1.0;
-        let (timing, motion, law, within) = loop {
+        let (timing, motion, law) = loop {
             let timing = timing(stretch)?;
             let motion = self.around(&timing);
             let law = zone.map(|zone| ArcLaw::new(zone, &motion));
@@ -97,12 +97,7 @@ impl Planner {
             match super::demand::longer(stretch, over.max(demand.acceleration(limit_m_s2))) {
                 Some(longer) => stretch = longer,
                 None => {
-                    break (
-                        timing,
-                        motion,
-                        law.filter(|_| numbers <= 1.0),
-                        correction <= 1.0,
-                    );
+                    break (timing, motion, law.filter(|_| numbers <= 1.0));
                 }
             }
         };
@@ -123,12 +118,10 @@ impl Planner {
                 b: 0,
             };
         }
-        segment.proven = true;
         if let (Some(zone), Some(law)) = (zone, law) {
             self.bound(segment, &bounds);
             segment.rise = law.rounded();
             correct(segment, round, zone, &motion, law.steady())?;
-            segment.proven = within && (!segment.extended || segment.extra.fits);
         }
         segment.rise.end_term_q1 = end_term(&timing);
         Ok(())
@@ -165,13 +158,13 @@ fn correct(
         return Ok(());
     };
     let extra = &mut segment.extra;
-    terms::on_arc(
-        profile,
-        motion,
-        [arm(round.u), arm(round.v)],
-        round.seen(zone),
-        extra,
-    );
+    let curve = terms::Curve {
+        u: arm(round.u),
+        v: arm(round.v),
+        rise: to_m(round.rise_nm),
+        centre: round.seen(zone),
+    };
+    terms::on_arc(profile, motion, &curve, extra);
     if !extra.within_numbers() {
         return Err(Refused::OutOfBounds(Quantity::Terms));
     }

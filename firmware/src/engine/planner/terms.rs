@@ -1,6 +1,7 @@
 //! Profile terms: from the numbers of a zone to those of the tick, and how much they ask for.
+use super::numbers::{dot, length};
 use super::timing::Motion;
-use crate::engine::extra::{Cyclic, Extra, Linear, Moving, Turning};
+use crate::engine::extra::{Cyclic, Extra, Linear, Rising, Turning};
 use crate::engine::ramp::FIRST;
 use crate::engine::sides::FINE;
 use core::f32::consts::TAU;
@@ -17,72 +18,84 @@ fn fine(metres: f32) -> i32 {
     single_to_fixed(metres * 1e9, FINE)
 }
 
-/// A row of a matrix times X and Y of a vector.
-fn by([a, b]: [f32; 2], [x, y]: [f32; 2]) -> f32 {
-    a * x + b * y
+/// What goes by the rate and by its change in a rising ramp.
+struct Pace {
+    rate: f32,
+    change: f32,
 }
 
-/// For an arc with vectors u and v (m), its centre seen from the reference point (m). Written in place, as all of these:
-/// they are large.
-pub(super) fn on_arc(
-    p: &Profile<f32>,
-    m: &Motion,
-    [u, v]: [[f32; 3]; 2],
-    centre: [f32; 2],
-    extra: &mut Extra,
-) {
-    unsteady(p, m, extra);
-    let ([ux, uy, uz], [vx, vy, vz]) = (u, v);
-    let outward = -p.radius_offset_m / super::numbers::length(u);
-    let change = m.rate * FIRST / m.ramp_s;
-    // q = u cosφ + v sinφ, q̇ = ω(−u sinφ + v cosφ), q̈ = α(−u sinφ + v cosφ) − ω²(u cosφ + v sinφ).
-    let axis = |row: [[f32; 2]; 3], u: f32, v: f32| {
-        let [place, velocity, second] = row;
-        let of = |weights: [f32; 2]| [by(weights, [ux, uy]), by(weights, [vx, vy])];
-        let ([pu, pv], [du, dv], [su, sv]) = (of(place), of(velocity), of(second));
-        let square = m.rate * m.rate;
-        Linear {
-            a: [outward * u - pu, -m.rate * dv, square * su, -change * sv].map(nm2),
-            b: [outward * v - pv, m.rate * du, square * sv, change * su].map(nm2),
+impl Pace {
+    fn of(m: &Motion) -> Self {
+        Self {
+            rate: m.rate,
+            change: m.rate * FIRST / m.ramp_s,
         }
-    };
-    let ([px, py], [dx, dy], [sx, sy]) = (p.position, p.velocity_s, p.acceleration_s2);
-    let still = Linear {
-        a: [nm2(outward * uz), 0, 0, 0],
-        b: [nm2(outward * vz), 0, 0, 0],
-    };
-    extra.linear = [
-        axis([px, dx, sx], ux, vx),
-        axis([py, dy, sy], uy, vy),
-        still,
-    ];
-    extra.constant_fine = [px, py].map(|row| fine(-by(row, centre)));
+    }
+}
+
+/// An arc or helix as the terms see it, m.
+pub(super) struct Curve {
+    /// Vectors of its plane.
+    pub(super) u: [f32; 3],
+    pub(super) v: [f32; 3],
+    /// Travel in a turn; 0 for an arc.
+    pub(super) rise: [f32; 3],
+    /// Its centre, seen from the point that errors of position are counted from.
+    pub(super) centre: [f32; 3],
+}
+
+/// For an arc or helix. Written in place, as all of these: they are large.
+pub(super) fn on_arc(p: &Profile<f32>, m: &Motion, curve: &Curve, extra: &mut Extra) {
+    unsteady(p, m, extra);
+    let (pace, Curve { u, v, rise, centre }) = (Pace::of(m), curve);
+    let outward = -p.radius_offset_m / length(*u);
     let (cos, sin) = lead(m);
-    extra.ahead =
-        [(ux, vx), (uy, vy)].map(|(u, v)| [nm2(v * cos - u * sin), nm2(-u * cos - v * sin)]);
+    for slide in 0..3 {
+        let (row, velocity, second) = (
+            p.position[slide],
+            p.velocity_s[slide],
+            p.acceleration_s2[slide],
+        );
+        let (u_k, v_k) = (u[slide], v[slide]);
+        // q = u cosφ + v sinφ, q̇ = ω(−u sinφ + v cosφ), q̈ = α(−u sinφ + v cosφ) − ω²(u cosφ + v sinφ).
+        let square = second * pace.rate * pace.rate;
+        let (along, changing) = (velocity * pace.rate, second * pace.change);
+        extra.linear[slide] = Linear {
+            a: [
+                outward * u_k - dot(row, *u),
+                -along * v_k,
+                square * u_k,
+                -changing * v_k,
+            ]
+            .map(nm2),
+            b: [
+                outward * v_k - dot(row, *v),
+                along * u_k,
+                square * v_k,
+                changing * u_k,
+            ]
+            .map(nm2),
+        };
+        // Radians of the arc's rate to turns of the rise's.
+        let per_radian = rise[slide] / TAU;
+        extra.rising[slide] = Rising {
+            place_q34: row.map(|share| single_to_fixed(-share, 34)),
+            rate: nm2(-along * per_radian),
+            change: nm2(-changing * per_radian),
+        };
+        extra.constant_fine[slide] = fine(-dot(row, *centre));
+        extra.ahead[slide] = [
+            nm2(v_k * cos - u_k * sin),
+            nm2(-u_k * cos - v_k * sin),
+            single_to_fixed(per_radian * 1e9, 0),
+        ];
+    }
     // u²/2³¹ in nm² times this over 2³² is c·u² in nm.
     const PER_NM: f32 = 4_294_967_296.0 * 1e-9;
-    extra.bow = p.bow_per_m.map(|c| single_to_fixed(-c * PER_NM, 31));
-    extra.bowed = extra.bow != [0; 2];
-    let ([[slow, _], _], [[second, _], _]) = (p.velocity_s, p.acceleration_s2);
-    let shares = [
-        -slow * m.rate,
-        -second * change,
-        second * m.rate * m.rate,
-        0.5 * outward,
-    ];
-    let [by_rate, by_change, radial, _] = shares.map(|share| single_to_fixed(share, 33));
-    extra.moving = Moving {
-        place: [px, py].map(|row| [nm2(-by(row, [ux, uy])), nm2(-by(row, [vx, vy]))]),
-        tangential: [by_rate, by_change],
-        radial,
-        outward: single_to_fixed(outward, 32),
-    };
-    let opposite = |[[a, b], [c, d]]: [[f32; 2]; 2]| a == -d && b == 0.0 && c == 0.0;
-    extra.fits = opposite(p.velocity_s)
-        && opposite(p.acceleration_s2)
-        && shares.iter().all(|share| share.abs() < 0.24)
-        && extra.within_numbers();
+    extra.bow = p
+        .bow_per_m
+        .map(|row| row.map(|c| single_to_fixed(-c * PER_NM, 31)));
+    extra.bowed = extra.bow != [[0; 3]; 3];
 }
 
 /// For a line with a span (m), its start seen from the reference point (m); `None`: there is none, and errors of position
@@ -91,30 +104,28 @@ pub(super) fn on_line(
     p: &Profile<f32>,
     m: &Motion,
     span: [f32; 3],
-    start: Option<[f32; 2]>,
+    start: Option<[f32; 3]>,
     extra: &mut Extra,
 ) {
     unsteady(p, m, extra);
-    let [sx, sy, _] = span;
-    let along = [sx, sy];
-    let change = m.rate * FIRST / m.ramp_s;
-    let axis = |place: [f32; 2], velocity: [f32; 2], second: [f32; 2]| {
-        let a = [
-            -by(place, along),
-            -m.rate * by(velocity, along),
-            0.0,
-            -change * by(second, along),
-        ];
-        Linear {
-            a: a.map(nm2),
+    let pace = Pace::of(m);
+    for slide in 0..3 {
+        let row = start.map_or([0.0; 3], |_| p.position[slide]);
+        let along = span[slide];
+        extra.linear[slide] = Linear {
+            a: [
+                -dot(row, span),
+                -pace.rate * p.velocity_s[slide] * along,
+                0.0,
+                -pace.change * p.acceleration_s2[slide] * along,
+            ]
+            .map(nm2),
             b: [0; 4],
-        }
-    };
-    let position = start.map_or([[0.0; 2]; 2], |_| p.position);
-    let ([px, py], [dx, dy], [ax, ay]) = (position, p.velocity_s, p.acceleration_s2);
-    extra.linear = [axis(px, dx, ax), axis(py, dy, ay), Linear::default()];
-    extra.constant_fine = [px, py].map(|row| fine(-by(row, start.unwrap_or_default())));
-    extra.ahead = along.map(|span| [nm2(span), 0]);
+        };
+        extra.constant_fine[slide] = fine(-dot(row, start.unwrap_or_default()));
+        // It never turns.
+        extra.ahead[slide] = [0, 0, single_to_fixed(along * 1e9, 0)];
+    }
 }
 
 /// The terms that are the same on every curve.
@@ -122,17 +133,14 @@ pub(super) fn on_line(
 fn unsteady(p: &Profile<f32>, m: &Motion, extra: &mut Extra) {
     let ticks = m.take_up_ticks as f32;
     let share = 3.75 / ticks;
-    // By the sense of X, then of Y.
-    let ([bx, by], [lx, ly]) = (p.backlash_m, p.lateral_m);
-    let sides = [[bx, -lx], [ly, by]];
     *extra = Extra::default();
     extra.turning = Turning {
         ticks: m.take_up_ticks,
         dx: single_to_fixed(2.0 / ticks, 31),
         first_x: single_to_fixed(1.0 / ticks - 1.0, 31),
         share_q30: single_to_fixed(share, 30),
-        side: sides.map(|axis| axis.map(fine)),
-        jump: sides.map(|axis| axis.map(|b| fine(b * share))),
+        side: p.play_m.map(|slide| slide.map(fine)),
+        jump: p.play_m.map(|slide| slide.map(|b| fine(b * share))),
         spike: p.spike.map(|spike| fine(spike.peak_m)),
         fade: p.spike.map(|spike| {
             if spike.peak_m == 0.0 {
@@ -147,12 +155,11 @@ fn unsteady(p: &Profile<f32>, m: &Motion, extra: &mut Extra) {
         *built = periodic(c);
         extra.periodic = extra.periodic.wrapping_add(1);
     }
-    extra.sided = sides != [[0.0; 2]; 2] || extra.turning.spike != [0; 2];
+    extra.sided = p.play_m != [[0.0; 3]; 3] || extra.turning.spike != [0; 3];
 }
 
 /// A periodic error. Over a metre of a fine pitch single precision would lose its phase: this divides integers.
 fn periodic(c: &CyclicError<f32>) -> Cyclic {
-    let axis = |value: i32| if c.axis == 1 { [0, value] } else { [value, 0] };
     // 2³² units a pitch, per nm: Q24, from a pitch in units of 2⁻³⁷ m, which every pitch from 0.1 mm on is a whole number of.
     const UNITS_PER_NM: u64 = ((1u128 << (32 + 37 + 24)) / 1_000_000_000) as u64;
     let pitch = NonZeroU64::new((c.pitch_m * (1u64 << 37) as f32) as u64);
@@ -160,9 +167,10 @@ fn periodic(c: &CyclicError<f32>) -> Cyclic {
     let whole = per_nm_q24.wrapping_add(1 << 23) >> 24;
     let rest_q24 = per_nm_q24.wrapping_sub(whole << 24) as i32;
     Cyclic {
-        amplitude: axis(nm2(-c.amplitude_m)),
-        per_nm: axis(whole as i32),
-        rest_q32: axis(rest_q24 << 8),
+        slide: c.slide,
+        amplitude: nm2(-c.amplitude_m),
+        per_nm: whole as i32,
+        rest_q32: rest_q24 << 8,
         phase: phase(c.phase_rad),
     }
 }
@@ -194,24 +202,21 @@ pub(super) fn worst_on_arc(
     p: &Profile<f32>,
     m: &Motion,
     radius: f32,
-    [cx, cy]: [f32; 2],
+    centre: [f32; 3],
 ) -> [f32; 2] {
-    let row = |matrix: [[f32; 2]; 2]| {
-        let [x, y] = matrix.map(|[a, b]| a.abs() + b.abs());
-        x.max(y)
-    };
+    let largest = |by_slide: [f32; 3]| by_slide.iter().fold(0.0f32, |most, v| most.max(v.abs()));
+    let position = largest(p.position.map(length));
+    let (velocity, second) = (largest(p.velocity_s), largest(p.acceleration_s2));
     let (rate, ramp) = (m.rate, m.rate / m.ramp_s);
     let (speed, acceleration) = (radius * rate, radius * (rate * rate + FIRST * ramp));
     let jerk = radius * (rate * rate * rate + 3.0 * FIRST * rate * ramp + 10.0 * ramp / m.ramp_s);
-    let reach = radius + cx.abs() + cy.abs();
+    let reach = radius + length(centre);
     let outward = p.radius_offset_m.abs();
-    let (position, velocity) = (row(p.position), row(p.velocity_s));
-    let second = row(p.acceleration_s2);
     let mut offset = outward + position * reach + velocity * speed + second * acceleration;
     let mut slew = outward * rate + position * speed + velocity * acceleration + second * jerk;
     // Smoothstep of degree 5: 15/8 of the mean slope.
     let steep = 1.875 / (m.take_up_ticks as f32 * m.tick_s);
-    for play in p.backlash_m.iter().chain(&p.lateral_m) {
+    for play in p.play_m.iter().flatten() {
         offset += 0.5 * play.abs();
         slew += play.abs() * steep;
     }
@@ -224,7 +229,7 @@ pub(super) fn worst_on_arc(
         offset += c.amplitude_m.abs();
         slew += c.amplitude_m.abs() * TAU / c.pitch_m * speed;
     }
-    for bow in p.bow_per_m {
+    for bow in p.bow_per_m.iter().flatten() {
         offset += bow.abs() * radius * radius;
         slew += 2.0 * bow.abs() * radius * speed;
     }
@@ -249,14 +254,14 @@ mod tests {
     fn a_periodic_error_keeps_its_phase_over_a_metre() {
         for pitch_m in [1e-4f32, 3e-4, 0.0025, 0.01, 0.37, 10.0] {
             let c = CyclicError {
-                axis: 0,
+                slide: 0,
                 amplitude_m: 1e-6,
                 pitch_m,
                 phase_rad: 0.0,
             };
             let Cyclic {
-                per_nm: [whole, _],
-                rest_q32: [rest, _],
+                per_nm: whole,
+                rest_q32: rest,
                 ..
             } = periodic(&c);
             let exact = 4.294_967_296 / f64::from(pitch_m);

@@ -1,10 +1,10 @@
 //! A stream in numbers: weights of the differentiator, bounds, and how it comes to rest.
-use crate::engine::config::whole_above;
+use super::brake::Limits;
 use giotto_shared::fixed::{mulh, mulh_add, single_to_fixed};
 use giotto_shared::law::Operator;
 
 /// A stream in the form that the tick runs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct StreamPlan {
     /// Streams planned before a stop carry an older one.
     pub(crate) epoch: u8,
@@ -16,8 +16,8 @@ pub struct StreamPlan {
     /// Largest step of a set-point on one axis, nm.
     pub(super) step_nm: u32,
     pub(super) hold_ticks: u32,
-    /// Velocity falls by 2⁻ᵏ of itself each tick when coming to rest.
-    pub(super) brake_shift: u32,
+    /// When coming to rest.
+    pub(super) limits: Limits,
     pub(super) engage_ticks: u32,
     pub(super) offset_nm: i32,
     pub(super) slew_nm: i32,
@@ -28,6 +28,9 @@ pub struct StreamPlan {
 const WEIGHT_BITS: u32 = 24;
 /// What a product of a weight and a difference lacks.
 const SCALE: i32 = 1 << (32 - WEIGHT_BITS);
+
+/// Most of the acceleration that a brake leaves to the correction.
+const ADDED_SHARE: f32 = 0.3;
 
 /// What a plan is made from.
 pub(crate) struct StreamNeeds {
@@ -40,6 +43,7 @@ pub(crate) struct StreamNeeds {
     pub(crate) longest: u32,
     pub(crate) feed_m_s: f32,
     pub(crate) acceleration_m_s2: f32,
+    pub(crate) jerk_m_s3: f32,
     pub(crate) hold_ticks: u32,
     pub(crate) engage_ticks: u32,
     /// Of the offset, and of its change per tick.
@@ -61,9 +65,14 @@ impl StreamPlan {
         if !(inner.abs() < most && outer.abs() < most) {
             return None;
         }
-        // v/2ᵏ per tick must be within the acceleration: 2ᵏ ≥ v/(a·T).
-        let ratio = n.feed_m_s / n.acceleration_m_s2 * n.rate_hz;
-        let brake_shift = u32::BITS - whole_above(ratio).saturating_sub(1).leading_zeros();
+        let tick_s = 1.0 / n.rate_hz;
+        // Where the jerk of a brake changes the second derivative adds to the commanded acceleration what the differentiator
+        // sees of that change, two thirds of it over a stride: the brake leaves room for it, a share of the limit at most. What
+        // the fourth derivative adds there passes in two strides, and comes on top.
+        let added_m_s2 = operator.second_s2.abs() / h * n.jerk_m_s3 * (2.0 / 3.0);
+        let left_m_s2 = n.acceleration_m_s2 - added_m_s2.min(ADDED_SHARE * n.acceleration_m_s2);
+        let acceleration = left_m_s2 * tick_s * tick_s * 1e9;
+        let jerk = n.jerk_m_s3 * tick_s * tick_s * tick_s * 1e9;
         let [offset_nm, slew_nm] = n.bounds_nm;
         Some(Self {
             epoch: n.epoch,
@@ -72,7 +81,7 @@ impl StreamPlan {
             outer: single_to_fixed(outer, WEIGHT_BITS),
             step_nm: single_to_fixed(n.feed_m_s / n.rate_hz * 1.05e9, 0) as u32,
             hold_ticks: n.hold_ticks,
-            brake_shift: brake_shift.min(20),
+            limits: Limits { acceleration, jerk },
             engage_ticks: n.engage_ticks,
             offset_nm,
             slew_nm,
@@ -90,6 +99,11 @@ impl StreamPlan {
         let inner = p1.wrapping_add(p3).wrapping_sub(twice).wrapping_mul(SCALE);
         let outer = p0.wrapping_add(p4).wrapping_sub(twice).wrapping_mul(SCALE);
         mulh_add(mulh(outer, self.outer), inner, self.inner)
+    }
+
+    /// Limits of acceleration and jerk, nm per tick² and per tick³.
+    pub(crate) const fn limits(&self) -> [f32; 2] {
+        [self.limits.acceleration, self.limits.jerk]
     }
 
     /// The epoch it was planned in.

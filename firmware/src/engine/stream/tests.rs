@@ -11,10 +11,13 @@ const KAPPA: [f64; 2] = [4e-4 + 1.6e-3 / 12.0, 6.0 * 1.6e-7 - 2.56e-6 / 120.0];
 
 fn plan() -> StreamPlan {
     let fourth_s4 = KAPPA[0] * KAPPA[0] / 8.0 - KAPPA[1] / 24.0;
-    let operator = Operator {
+    plan_with(Operator {
         second_s2: (-KAPPA[0] / 2.0) as f32,
         fourth_s4: fourth_s4 as f32,
-    };
+    })
+}
+
+pub(super) fn plan_with(operator: Operator<f32>) -> StreamPlan {
     StreamPlan::build(&StreamNeeds {
         epoch: 0,
         longest: PLACES as u32,
@@ -23,6 +26,7 @@ fn plan() -> StreamPlan {
         window_s: 0.015,
         feed_m_s: 1.0,
         acceleration_m_s2: 5.0,
+        jerk_m_s3: 100.0,
         hold_ticks: 5,
         engage_ticks: 100,
         bounds_nm: [20_000_000, 200_000],
@@ -39,6 +43,13 @@ fn ellipse(n: i32) -> [i32; 3] {
         (0.03 * theta.sin() * 1e9).round() as i32,
         7,
     ]
+}
+
+pub(super) fn sample_at(n: usize, position_nm: [i32; 3]) -> StreamSample {
+    StreamSample {
+        sequence: n as u16,
+        position_nm,
+    }
 }
 
 fn sample(n: i32) -> StreamSample {

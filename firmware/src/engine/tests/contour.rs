@@ -149,6 +149,7 @@ fn circle_with_entry_and_exit() {
         centre_m: [0.05, 0.0, 0.0],
         radius_m: 0.05,
         feed_m_s: 0.3,
+        plane: giotto_shared::Plane::Xy,
         direction,
         laps: 2,
         start_rad: 0.0,

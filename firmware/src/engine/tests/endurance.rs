@@ -10,7 +10,7 @@ use core::f64::consts::{PI, TAU};
 use giotto_shared::model::Cumulants;
 use giotto_shared::table::{Limits, Table, Travel, Zone};
 use giotto_shared::term::Term;
-use giotto_shared::{Axis, Direction};
+use giotto_shared::{Direction, Plane};
 
 /// SplitMix64.
 pub(super) struct Random(pub(super) u64);
@@ -51,39 +51,52 @@ fn table(random: &mut Random) -> Table {
         [46.58e-6, -5.5265e-6]
     };
     let mut terms = heapless::Vec::new();
-    let mut term = |term| {
+    let plane = Plane::ALL[(random.bits() % 3) as usize];
+    let [actuator, across] = plane.axes();
+    let all = [
+        Term::ScaleMismatch {
+            plane,
+            relative: 100e-6,
+        },
+        Term::Squareness {
+            plane,
+            shear_rad: -80e-6,
+        },
+        Term::ServoMismatch {
+            plane,
+            delta_tau_s: 100e-6,
+        },
+        Term::Backlash {
+            actuator,
+            step_m: 12e-6,
+        },
+        Term::LateralPlay {
+            actuator: across,
+            across: actuator,
+            shift_m: 7e-6,
+        },
+        Term::ReversalSpike {
+            actuator,
+            peak_m: 8e-6,
+            decay_s: 0.05,
+        },
+        Term::Cyclic {
+            actuator: across,
+            amplitude_m: 3e-6,
+            pitch_m: 0.01,
+            phase_rad: 0.5,
+        },
+        Term::Straightness {
+            actuator,
+            across,
+            curvature_per_m: 1e-4,
+        },
+    ];
+    for term in all {
         if random.once_in(2) {
             terms.push(term).unwrap();
         }
-    };
-    term(Term::ScaleMismatch { relative: 100e-6 });
-    term(Term::Squareness { shear_rad: -80e-6 });
-    term(Term::ServoMismatch {
-        delta_tau_s: 100e-6,
-    });
-    term(Term::Backlash {
-        axis: Axis::X,
-        step_m: 12e-6,
-    });
-    term(Term::LateralPlay {
-        axis: Axis::Y,
-        shift_m: 7e-6,
-    });
-    term(Term::ReversalSpike {
-        axis: Axis::X,
-        peak_m: 8e-6,
-        decay_s: 0.05,
-    });
-    term(Term::Cyclic {
-        axis: Axis::Y,
-        amplitude_m: 3e-6,
-        pitch_m: 0.01,
-        phase_rad: 0.5,
-    });
-    term(Term::Straightness {
-        axis: Axis::X,
-        curvature_per_m: 1e-4,
-    });
+    }
     let zone = Zone {
         place_m: None,
         radius_m: [0.001, 2.0],
@@ -193,6 +206,7 @@ fn program(random: &mut Random, engine: &mut Engine, config: &Config, tally: &mu
             centre_m: random.point(),
             radius_m,
             feed_m_s,
+            plane: Plane::ALL[(random.bits() % 3) as usize],
             direction,
             laps,
             start_rad,

@@ -60,6 +60,7 @@ fn deviation_from_law(
         centre_m: [0.01, -0.02, 0.5],
         radius_m,
         feed_m_s,
+        plane: giotto_shared::Plane::Xy,
         direction,
         laps: 2,
         start_rad: 0.3,

@@ -4,7 +4,7 @@ use super::{no_jump, run_out, std, table};
 use crate::engine::{CircleRun, Config, Engine, Fault, Output, Quantity, Refused, Segment, flag};
 use core::f64::consts::PI;
 use giotto_shared::term::Term;
-use giotto_shared::{Axis, Direction};
+use giotto_shared::{Actuator, Direction, Plane};
 use std::vec::Vec;
 
 const DT: f64 = 1e-3;
@@ -23,6 +23,7 @@ fn circle(feed_m_s: f64) -> CircleRun {
         centre_m,
         radius_m: 0.05,
         feed_m_s,
+        plane: giotto_shared::Plane::Xy,
         direction: Direction::Ccw,
         laps: 1,
         start_rad: PI,
@@ -440,6 +441,7 @@ fn numbers_that_are_none_and_programs_out_of_bounds_are_refused() {
             _ => table.zones[0]
                 .terms
                 .push(Term::Squareness {
+                    plane: Plane::Xy,
                     shear_rad: f32::NAN,
                 })
                 .unwrap(),
@@ -447,13 +449,15 @@ fn numbers_that_are_none_and_programs_out_of_bounds_are_refused() {
         assert!(engine.load(Some(&table)).is_err(), "{name}");
     }
     let cyclic = Term::Cyclic {
-        axis: Axis::X,
+        actuator: Actuator::X,
         amplitude_m: 1e-6,
         pitch_m: 0.01,
         phase_rad: 0.0,
     };
     let mut table = table(KAPPA[0], KAPPA[1]);
-    table.zones[0].terms.extend([cyclic; 3]);
+    table.zones[0]
+        .terms
+        .extend([cyclic; giotto_shared::law::MAX_CYCLIC + 1]);
     assert!(engine.load(Some(&table)).is_err());
 }
 

@@ -9,7 +9,7 @@ use giotto_shared::Direction;
 use giotto_shared::model::Cumulants;
 use giotto_shared::path::CircleRun;
 use giotto_shared::table::{self, Limits, Table, Travel, Zone};
-use giotto_shared::wire::{MotionRefusal, Request, TableInfo};
+use giotto_shared::wire::{MotionRefusal, Pose, PositionState, Request, TableInfo};
 use std::boxed::Box;
 use std::string::{String, ToString};
 use std::vec::Vec;
@@ -22,6 +22,8 @@ const BOARD: Board = Board {
     name: "bench",
     build: "0",
     tick_hz: 1000,
+    clock: ClockSource::Crystal,
+    reset: ResetCause::Power,
 };
 
 type Cells = RamFlash<CELLS, ERASE>;
@@ -72,6 +74,8 @@ impl Motion for Bench {
             rejected_set_points: 0,
             fault: None,
             stop_input: false,
+            position: PositionState::Known,
+            override_percent: 100,
         }
     }
 
@@ -126,6 +130,24 @@ impl Motion for Bench {
 
     fn hold(&mut self) {
         self.held += 1;
+    }
+
+    fn configure(&mut self, _: &Config) -> Result<(), MotionRefusal> {
+        Ok(())
+    }
+
+    fn pause(&mut self, _: bool) -> Result<(), MotionRefusal> {
+        Ok(())
+    }
+
+    fn set_override(&mut self, _: u8) {}
+
+    fn clear_fault(&mut self) -> Result<(), MotionRefusal> {
+        Ok(())
+    }
+
+    fn declare(&mut self, _: Pose) -> Result<(), MotionRefusal> {
+        Ok(())
     }
 
     fn subscribe(&mut self, _: u16) {}
@@ -284,6 +306,7 @@ fn circle() -> Command {
         centre_m: [0.0; 3],
         radius_m: 0.1,
         feed_m_s: 0.2,
+        plane: giotto_shared::Plane::Xy,
         direction: Direction::Ccw,
         laps: 1,
         start_rad: 0.0,

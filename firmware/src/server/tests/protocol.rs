@@ -351,15 +351,30 @@ fn a_silent_host_ends_what_waits_and_is_counted() {
     assert_eq!(desk.status().counters.link_losses, 0);
     assert_eq!(after(&mut desk, 999), 0);
     assert_eq!(after(&mut desk, 1), 1);
-    assert_eq!(after(&mut desk, 5000), 1);
+    assert_eq!(after(&mut desk, 1999), 1);
+    assert_eq!(desk.server.motion_mut().runs, 1);
+    assert_eq!(desk.server.motion_mut().state, MotionState::Running);
+    // What is not at its end two seconds later is stopped.
+    assert_eq!(after(&mut desk, 1), 1);
+    assert_eq!(desk.server.motion_mut().state, MotionState::Idle);
     assert_eq!(desk.status().counters.link_losses, 1);
-    assert!(desk.done(Command::Supervise { after_ms: 0 }));
-    assert_eq!(after(&mut desk, 1_000_000), 1);
-    assert!(matches!(desk.ask(Command::Hello), Some(Reply::Identity(_))));
+    assert!(desk.done(circle()));
+    // Heard in time, it goes on.
     assert_eq!(after(&mut desk, 1000), 2);
+    assert!(matches!(desk.ask(Command::Hello), Some(Reply::Identity(_))));
+    assert_eq!(after(&mut desk, 900), 2);
+    assert!(matches!(desk.ask(Command::Hello), Some(Reply::Identity(_))));
+    assert_eq!(after(&mut desk, 900), 2);
+    assert!(matches!(desk.ask(Command::Hello), Some(Reply::Identity(_))));
+    assert_eq!(after(&mut desk, 900), 2);
+    assert_eq!(desk.server.motion_mut().state, MotionState::Running);
+    assert!(desk.done(Command::Supervise { after_ms: 0 }));
+    assert_eq!(after(&mut desk, 1_000_000), 2);
+    assert!(matches!(desk.ask(Command::Hello), Some(Reply::Identity(_))));
+    assert_eq!(after(&mut desk, 1000), 3);
     // At rest nothing can be left alone.
     assert!(desk.done(Command::Stop));
-    assert_eq!(after(&mut desk, 10_000), 2);
+    assert_eq!(after(&mut desk, 10_000), 3);
 }
 
 proptest! {

@@ -203,12 +203,20 @@ fn words(status: &Status) -> Vec<Line<'static>> {
 mod tests {
     use super::super::watch::Event;
     use super::*;
-    use giotto_shared::wire::{Counters, MotionState, SetPoint};
+    use giotto_shared::wire::{
+        ClockSource, Counters, MotionState, PositionState, ResetCause, SetPoint,
+    };
     use ratatui::Terminal;
     use ratatui::backend::TestBackend;
 
     fn status() -> Status {
         Status {
+            position: PositionState::Known,
+            reset: ResetCause::Power,
+            clock: ClockSource::Crystal,
+            worst_tick_permille: None,
+            stack_left_bytes: 0,
+            override_percent: 100,
             motion: MotionState::Running,
             fault: None,
             stop_input: true,

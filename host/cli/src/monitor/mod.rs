@@ -59,6 +59,7 @@ impl Args {
             centre_m: [0.0; 3],
             radius_m: radius,
             feed_m_s: feed,
+            plane: giotto_shared::Plane::Xy,
             direction: self.direction,
             laps: self.laps,
             start_rad: 0.0,

@@ -44,6 +44,7 @@ pub(super) fn motion(state: MotionState) -> &'static str {
         MotionState::Running => "running",
         MotionState::Stopping => "stopping",
         MotionState::Fault => "fault",
+        MotionState::Paused => "feed hold",
     }
 }
 
@@ -66,8 +67,7 @@ impl View {
                 self.lost = Some(why);
             }
             Event::Status(status) => {
-                let moves =
-                    |s: MotionState| matches!(s, MotionState::Running | MotionState::Stopping);
+                let moves = |s: MotionState| s.is_run();
                 let before = self.status.as_ref().is_some_and(|s| moves(s.motion));
                 if moves(status.motion) && !before {
                     // Another run, another picture.

@@ -182,6 +182,7 @@ mod tests {
             centre_m: [0.0; 3],
             radius_m: 0.02,
             feed_m_s: 0.05,
+            plane: giotto_shared::Plane::Xy,
             direction: Direction::Ccw,
             laps: 2,
             start_rad: 0.0,

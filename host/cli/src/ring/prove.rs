@@ -181,17 +181,14 @@ fn run(
         radius_mm: test.radius_m * 1e3,
         feed_mm_s: test.feed_m_s * 1e3,
     })?;
-    let position_m: Vec<[f64; 2]> = recording
-        .points
-        .iter()
-        .map(|p| [p.corrected_m[0], p.corrected_m[1]])
-        .collect();
+    let position_m: Vec<[f64; 3]> = recording.points.iter().map(|p| p.corrected_m).collect();
     let path = drive(
         &plan.machine,
         &SetPoints {
             dt_s: recording.dt_s,
             position_m: &position_m,
             centre_m: test.centre_m,
+            frame: test.frame,
             started_s: 0.0,
             hold: Hold::Cubic,
         },
@@ -212,7 +209,7 @@ fn run(
         started_s: None,
         temperature_c: None,
         centre_m: None,
-        frame: giotto::campaign::Frame::default(),
+        frame: test.frame,
         setup: None,
         samples: plan.instrument.record(&test, &trace, &mut rng),
     };
@@ -294,6 +291,7 @@ mod tests {
             }
         };
         Recording {
+            stopped: false,
             dt_s,
             points: (0..((2.0 * ramp_s + cruise_s) / dt_s) as usize)
                 .map(point)

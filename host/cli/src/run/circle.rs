@@ -2,7 +2,7 @@
 use super::set_points::Record;
 use crate::{Failure, Output, port::PortArgs};
 use giotto_link::CircleRun;
-use giotto_shared::Direction;
+use giotto_shared::{Direction, Plane};
 
 /// Arguments of `giotto run circle`.
 #[derive(clap::Args, Debug)]
@@ -16,6 +16,9 @@ pub(super) struct Args {
     /// Direction.
     #[arg(long, value_enum)]
     direction: Sense,
+    /// Plane of the circle; angles run from its first axis to its second.
+    #[arg(long, value_enum, default_value_t = InPlane::Xy)]
+    plane: InPlane,
     /// Turns at full feed.
     #[arg(long, default_value_t = 1, value_name = "N")]
     laps: u32,
@@ -33,6 +36,13 @@ pub(super) struct Args {
 enum Sense {
     Ccw,
     Cw,
+}
+
+#[derive(clap::ValueEnum, Clone, Copy, Debug)]
+enum InPlane {
+    Xy,
+    Yz,
+    Zx,
 }
 
 /// Runs the command.
@@ -53,6 +63,11 @@ pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
         centre_m,
         radius_m,
         feed_m_s,
+        plane: match args.plane {
+            InPlane::Xy => Plane::Xy,
+            InPlane::Yz => Plane::Yz,
+            InPlane::Zx => Plane::Zx,
+        },
         direction,
         laps: args.laps,
         start_rad: 0.0,

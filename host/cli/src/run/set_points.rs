@@ -1,9 +1,9 @@
 //! What a run says of itself, and the file of its set-points.
+use crate::destination::{Destination, Kind};
 use crate::failure::cannot_write;
 use crate::{Failure, Output};
 use giotto_link::{Controller, Recording};
 use serde_json::{Value, json};
-use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
 
 /// What is recorded of a run.
@@ -23,13 +23,7 @@ impl Record {
         let Some(path) = &self.output else {
             return Ok(());
         };
-        let new = !path.exists();
-        let open = OpenOptions::new().append(true).create(true).open(path);
-        open.map_err(|error| cannot_write(path, &error))?;
-        if new {
-            std::fs::remove_file(path).map_err(|error| cannot_write(path, &error))?;
-        }
-        Ok(())
+        Destination::new(path, Kind::Csv, &[]).map(drop)
     }
 
     /// Writes the set-points and says what they were; `more` goes into the document.
@@ -86,7 +80,7 @@ fn offset_m(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// Writes `time_s,x_mm,y_mm,z_mm,corrected_x_mm,corrected_y_mm,corrected_z_mm`.
 fn write(path: &Path, recording: &Recording) -> Result<(), Failure> {
     let failed = |error: csv::Error| cannot_write(path, &std::io::Error::other(error));
-    let mut writer = csv::Writer::from_path(path).map_err(failed)?;
+    let mut writer = csv::Writer::from_writer(Vec::new());
     let header = [
         "time_s",
         "x_mm",
@@ -104,5 +98,8 @@ fn write(path: &Path, recording: &Recording) -> Result<(), Failure> {
             .chain(places.map(|metres| format!("{:.6}", metres * 1e3)));
         writer.write_record(row).map_err(failed)?;
     }
-    writer.flush().map_err(|error| cannot_write(path, &error))
+    let bytes = writer
+        .into_inner()
+        .map_err(|error| cannot_write(path, &std::io::Error::other(error.to_string())))?;
+    giotto::whole_file::write(path, &bytes).map_err(|error| cannot_write(path, &error))
 }

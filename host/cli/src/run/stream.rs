@@ -4,7 +4,7 @@ use super::stream_file::{Row, read};
 use crate::port::PortArgs;
 use crate::source::length;
 use crate::{Failure, Output};
-use giotto_link::{ControllerError, Pace};
+use giotto_link::ControllerError;
 use giotto_shared::wire::{MotionRefusal, Quantity, Refusal};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -31,8 +31,7 @@ const SLACK: f64 = 0.1;
 pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
     let rows = read(&args.file)?;
     args.record.ready()?;
-    // A stream does not wait: in the emulator its time must not run away from us.
-    let mut controller = args.port.connect_at(Pace::Slow, out)?;
+    let mut controller = args.port.open(out)?;
     let tick_s = 1.0 / f64::from(controller.identity().tick_hz);
     one_a_tick(&args.file, &rows, tick_s)?;
     let places_nm: Vec<[i32; 3]> = rows.iter().map(|row| row.place_nm).collect();

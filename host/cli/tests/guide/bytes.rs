@@ -8,7 +8,7 @@ use giotto_shared::wire::{
     self, Command, ExactSegment, FromController, MAX_FRAME, Reply, Request, SetPoint, SetPoints,
     Steps,
 };
-use giotto_shared::{Axis, Direction};
+use giotto_shared::{Actuator, Direction};
 use serde::Serialize;
 
 fn dump(bytes: &[u8]) -> String {
@@ -75,6 +75,7 @@ fn frames_are_those_of_the_page() {
         centre_m: [0.0; 3],
         radius_m: 0.05,
         feed_m_s: 0.1,
+        plane: giotto_shared::Plane::Xy,
         direction: Direction::Ccw,
         laps: 2,
         start_rad: 0.0,
@@ -163,6 +164,7 @@ fn the_numbers_of_requests_are_those_of_the_page() {
         centre_m: [0.0; 3],
         radius_m: 0.05,
         feed_m_s: 0.1,
+        plane: giotto_shared::Plane::Xy,
         direction: Direction::Cw,
         laps: 1,
         start_rad: 0.0,
@@ -256,7 +258,7 @@ fn the_table_is_that_of_the_page() {
     };
     zone.terms
         .push(Term::Backlash {
-            axis: Axis::X,
+            actuator: Actuator::X,
             step_m: 8e-6,
         })
         .unwrap();

@@ -1,18 +1,15 @@
 //! A page a cause, with the words that the diagnosis uses.
 use super::holds;
-use giotto::causes::{ALL, CauseModel};
-use giotto_shared::Axis;
+use giotto::causes::{ALL, CauseModel, Seat};
 
 fn block(model: &dyn CauseModel) -> String {
     let words = model.words();
-    let axis = match model.axes() {
-        [None] => "the machine as a whole".to_owned(),
-        axes => axes
-            .iter()
-            .flatten()
-            .map(|a| if *a == Axis::X { "x" } else { "y" })
-            .collect::<Vec<_>>()
-            .join(" or "),
+    let axis = match model.seat() {
+        Seat::Machine => "the machine as a whole",
+        Seat::One => "x, y or z",
+        Seat::MachineOrOne => "the machine as a whole, or x, y or z",
+        Seat::Pair => "x and y, y and z, or z and x",
+        Seat::Across => "x, y or z, and the one that shifts",
     };
     let corrected = words
         .not_compensable
@@ -46,7 +43,7 @@ fn block(model: &dyn CauseModel) -> String {
 fn each_cause_has_its_page() {
     let mut list =
         String::from("| cause | estimate | what it is | corrected |\n|---|---|---|---|\n");
-    for model in ALL {
+    for &model in ALL {
         let words = model.words();
         holds(&format!("causes/{}.md", words.id), "words", &block(model));
         let corrected = if words.not_compensable.is_none() {

@@ -9,15 +9,23 @@ mod read;
 mod tests;
 
 use super::blend::{self, Piece};
-use super::correct::{Plan, decide};
+use super::check::Trouble;
+use super::correct::{Law, Plan, Visit, decide};
+use super::mark::{self, Mark};
 use super::state::{Action, Arc};
 use super::word::{Line, Sort};
 use super::{Compensated, Fate, Options, Report, inverse::Inverse};
 use giotto::model_file::ModelFile;
 use read::{Motion, Reader};
+use std::io;
 
 /// Robots refuse arcs whose points are closer, mm.
 const LEAST_MM: f64 = 0.1;
+/// Robots refuse a via point that is seen from the start within 1° of the end: four times that is turned, and a little
+/// more for the digits of the targets.
+const LEAST_TURN_RAD: f64 = 4.1 * std::f64::consts::PI / 180.0;
+/// Robots refuse arcs that turn farther in one instruction.
+const MOST_TURN_RAD: f64 = 239.0 * std::f64::consts::PI / 180.0;
 
 /// Whether a program is RAPID: a module or a procedure, behind the head of a backup or not.
 pub fn is_rapid(program: &[u8]) -> bool {
@@ -39,6 +47,75 @@ pub fn is_rapid(program: &[u8]) -> bool {
     words
         .next()
         .is_some_and(|word| [b"MODULE".as_slice(), b"PROC", b"LOCAL"].contains(&word.as_slice()))
+}
+
+/// Rewrites the arcs of a module into `out`, with a mark that says so; see [`super::compensate_to`].
+///
+/// # Errors
+/// Those of `out`.
+pub fn compensate_to(
+    program: &[u8],
+    model: &ModelFile,
+    options: &Options,
+    mark: Option<&Mark>,
+    out: &mut dyn io::Write,
+) -> io::Result<Vec<Report>> {
+    let result = compensate(program, model, options);
+    let corrected = result
+        .arcs
+        .iter()
+        .any(|a| matches!(a.fate, Fate::Corrected { .. }));
+    let at = mark::place(&result.program);
+    match mark.filter(|_| corrected) {
+        Some(mark) => {
+            out.write_all(&result.program[..at])?;
+            out.write_all(format!("! {mark}{}", line_end(program)).as_bytes())?;
+            out.write_all(&result.program[at..])?;
+        }
+        None => out.write_all(&result.program)?,
+    }
+    Ok(result.arcs)
+}
+
+fn line_end(program: &[u8]) -> &'static str {
+    match program.iter().position(|b| *b == b'\n') {
+        Some(at) if at > 0 && program[at - 1] == b'\r' => "\r\n",
+        _ => "\n",
+    }
+}
+
+/// The instructions that a robot would refuse: MoveC with points closer than 0.1 mm, seen within 1° from the start, or
+/// round by more than 240°.
+pub(super) fn check(program: &[u8]) -> Vec<Trouble> {
+    let mut reader = Reader::default();
+    let mut list = Vec::new();
+    for (index, line) in program.split_inclusive(|b| *b == b'\n').enumerate() {
+        let points = reader.points(line);
+        reader.step(line);
+        let Some([start, via, end]) = points else {
+            continue;
+        };
+        let to = |p: [f64; 3]| [0, 1, 2].map(|i| p[i] - start[i]);
+        let (a, b) = (to(via), to(end));
+        let size = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let dot: f64 = (0..3).map(|i| a[i] * b[i]).sum();
+        let seen = (dot / (size(a) * size(b)))
+            .clamp(-1.0, 1.0)
+            .acos()
+            .to_degrees();
+        let what = match (size(a), size(b)) {
+            (v, e) if v.min(e) < LEAST_MM => {
+                Some(format!("points {:.3} mm from its start", v.min(e)))
+            }
+            _ if seen < 1.0 => Some(format!("a via point that is seen {seen:.2}° from its end")),
+            _ => None,
+        };
+        list.extend(what.map(|what| Trouble {
+            line: index + 1,
+            what: format!("MoveC with {what}"),
+        }));
+    }
+    list
 }
 
 /// Rewrites the arcs of a module.
@@ -63,21 +140,22 @@ pub fn compensate(program: &[u8], model: &ModelFile, options: &Options) -> Compe
         words: Vec::new(),
         sort: Sort::Plain,
     };
-    let plans = decide(
-        &vec![nothing; actions.len()],
-        &actions,
-        &Inverse::new(model, options),
+    let law = Law {
+        inverse: &Inverse::new(model, options),
         options,
-        LEAST_MM,
-    );
+        least_mm: LEAST_MM,
+        tail_mm: 0.0,
+    };
+    let mut visits: Vec<Visit<'_>> = actions
+        .iter()
+        .map(|action| Visit::new(0, nothing.clone(), *action, &law))
+        .collect();
+    let plans = decide(&mut visits, &law);
     let mut out = Compensated {
         program: Vec::new(),
         arcs: Vec::new(),
     };
-    let end = lines
-        .iter()
-        .find_map(|l| l.ends_with(b"\r\n").then_some("\r\n"))
-        .unwrap_or("\n");
+    let end = line_end(program);
     // Where the last rewritten arc ended, if the next one goes on from there.
     let mut from: Option<[f64; 2]> = None;
     for (i, line) in lines.iter().enumerate() {
@@ -96,15 +174,7 @@ pub fn compensate(program: &[u8], model: &ModelFile, options: &Options) -> Compe
                 );
                 out.program.extend_from_slice(&text);
                 from = pieces.last().map(|p| p.end);
-                let (radius_mm, feed_mm_s) = (arc.radius_mm, arc.feed_mm_s);
-                let delta_mm = plan.twin.delta_mm;
-                Some(Fate::Corrected {
-                    radius_mm,
-                    feed_mm_s,
-                    delta_mm,
-                    blocks: pieces.len(),
-                    joint_share: plan.joint_share(),
-                })
+                Some(plan.fate(arc, pieces.len()))
             }
             (action, plan, _) => {
                 out.program.extend_from_slice(line);
@@ -183,37 +253,80 @@ fn blocks(
         let zone = if last { motion.zone.as_str() } else { passing };
         text.extend_from_slice(&line[..indent]);
         let with = &motion.tool;
-        let code = match piece.centre {
-            Some(centre) => {
-                format!(
-                    "MoveC {},{to},{speed},{zone},{with};",
-                    target(middle(from, piece, centre))
-                )
+        let mut codes = Vec::new();
+        let turn_rad = turn(from, piece);
+        match piece.centre {
+            Some(centre) if turn_rad >= LEAST_TURN_RAD => {
+                // One instruction goes round no more than 240°.
+                let halves = if turn_rad > MOST_TURN_RAD { 2 } else { 1 };
+                let step = 0.5 * turn_rad / f64::from(halves);
+                for half in 0..halves {
+                    let via = target(turned(from, piece, centre, step * f64::from(2 * half + 1)));
+                    let (end, zone) = if half + 1 == halves {
+                        (to.clone(), zone)
+                    } else {
+                        let angle = step * f64::from(2 * half + 2);
+                        (target(turned(from, piece, centre, angle)), passing)
+                    };
+                    codes.push(format!("MoveC {via},{end},{speed},{zone},{with};"));
+                }
             }
-            None => format!("MoveL {to},{speed},{zone},{with};"),
-        };
-        text.extend_from_slice(code.as_bytes());
-        if last {
-            // A comment and the end of the line stay.
-            text.extend_from_slice(&line[motion.rest..]);
-        } else {
-            text.extend_from_slice(end.as_bytes());
+            Some(centre) => {
+                let chords = chords(piece, turn_rad, plan.twin.delta_mm);
+                for k in 1..chords {
+                    let angle = turn_rad * f64::from(k) / f64::from(chords);
+                    let place = target(turned(from, piece, centre, angle));
+                    codes.push(format!("MoveL {place},{speed},{passing},{with};"));
+                }
+                codes.push(format!("MoveL {to},{speed},{zone},{with};"));
+            }
+            None => codes.push(format!("MoveL {to},{speed},{zone},{with};")),
+        }
+        let count = codes.len();
+        for (c, code) in codes.into_iter().enumerate() {
+            if c > 0 {
+                text.extend_from_slice(&line[..indent]);
+            }
+            text.extend_from_slice(code.as_bytes());
+            if last && c + 1 == count {
+                // A comment and the end of the line stay.
+                text.extend_from_slice(&line[motion.rest..]);
+            } else {
+                text.extend_from_slice(end.as_bytes());
+            }
         }
         from = piece.end;
     }
     text
 }
 
-/// The point halfway along an arc.
-fn middle(from: [f64; 2], piece: &Piece, centre: [f64; 2]) -> [f64; 2] {
+/// Angle that an arc turns from `from`, rad.
+fn turn(from: [f64; 2], piece: &Piece) -> f64 {
+    let Some(centre) = piece.centre else {
+        return 0.0;
+    };
     let [a, b] = [from, piece.end].map(|p| [p[0] - centre[0], p[1] - centre[1]]);
     let sense = if piece.ccw { 1.0 } else { -1.0 };
-    let turned = (sense * (b[1].atan2(b[0]) - a[1].atan2(a[0]))).rem_euclid(std::f64::consts::TAU);
-    let (sin, cos) = (sense * 0.5 * turned).sin_cos();
+    (sense * (b[1].atan2(b[0]) - a[1].atan2(a[0]))).rem_euclid(std::f64::consts::TAU)
+}
+
+/// The point of an arc behind so much of a turn.
+fn turned(from: [f64; 2], piece: &Piece, centre: [f64; 2], angle_rad: f64) -> [f64; 2] {
+    let a = [from[0] - centre[0], from[1] - centre[1]];
+    let sense = if piece.ccw { 1.0 } else { -1.0 };
+    let (sin, cos) = (sense * angle_rad).sin_cos();
     [
         centre[0] + a[0] * cos - a[1] * sin,
         centre[1] + a[0] * sin + a[1] * cos,
     ]
+}
+
+/// Lines that take the place of an arc too flat for MoveC, so that they leave it by 1 % of the correction at most.
+fn chords(piece: &Piece, turn_rad: f64, delta_mm: f64) -> u32 {
+    let bulge_mm = piece.length_mm * turn_rad / 8.0;
+    let least = (bulge_mm / (0.01 * delta_mm.abs()).max(5e-4)).sqrt().ceil();
+    // Robots refuse points that are closer.
+    least.min((piece.length_mm / LEAST_MM).floor()).max(1.0) as u32
 }
 
 /// A hundredth of a micrometre, without trailing zeros.

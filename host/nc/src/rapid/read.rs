@@ -1,5 +1,5 @@
 //! Lines of a RAPID module as motions.
-use super::super::Left;
+use super::super::left::{Because, Code, Left};
 use super::super::state::{Action, Arc, FeedMode, Modes, Plane, Straight};
 use std::collections::HashMap;
 use std::f64::consts::TAU;
@@ -49,6 +49,9 @@ pub(super) struct Reader {
     speeds: HashMap<String, [String; 2]>,
     stand: Option<Stand>,
     blocked: Option<Left>,
+    /// What made the place unknown last.
+    lost: Option<Because>,
+    line: usize,
 }
 
 /// Heights that differ by less are one plane, mm.
@@ -74,9 +77,10 @@ impl Read {
 impl Reader {
     /// Takes one line.
     pub(super) fn step(&mut self, line: &[u8]) -> Read {
+        self.line += 1;
         let Ok(text) = std::str::from_utf8(code(line)) else {
             // Latin-1 outside comments: a name or a string that is none of ours.
-            self.stand = None;
+            self.lose("what stands there");
             return Read::of(Action::Other);
         };
         let trimmed = text.trim();
@@ -94,53 +98,164 @@ impl Reader {
                 Read::of(Action::Nothing)
             }
             "PROC" | "ENDPROC" | "FUNC" | "ENDFUNC" | "TRAP" | "ENDTRAP" => {
-                (self.stand, self.blocked) = (None, None);
+                (self.stand, self.blocked, self.lost) = (None, None, None);
                 Read::of(Action::Other)
             }
             "CONFL" | "CONFJ" | "SINGAREA" | "ACCSET" | "TPWRITE" | "TPERASE" => {
                 Read::of(Action::Nothing)
             }
             // The robot may stand still here and is where it was afterwards.
-            "STOP" | "WAITTIME" | "WAITDI" | "WAITDO" | "WAITROB" | "SETDO" | "SET" | "RESET"
-            | "PULSEDO" => Read::of(Action::Other),
-            "IF" | "ELSE" | "ELSEIF" | "ENDIF" | "FOR" | "ENDFOR" | "WHILE" | "ENDWHILE"
-            | "TEST" | "CASE" | "DEFAULT" | "ENDTEST" | "GOTO" | "RETURN" | "ERROR" | "UNDO" => {
-                self.blocked = Some(Left::ProgramFlow);
+            "STOP" | "WAITTIME" | "WAITDI" | "WAITDO" | "WAITROB" => Read::of(Action::Stop),
+            "SETDO" | "SET" | "RESET" | "PULSEDO" | "SETAO" | "SETGO" => Read::of(Action::Other),
+            // What follows is run at once or not at all, from where the robot stands.
+            "IF" | "TEST" | "GOTO" | "RETURN" => {
+                self.may_move(trimmed);
+                Read::of(Action::Other)
+            }
+            // Here several ways meet.
+            "ELSE" | "ELSEIF" | "ENDIF" | "FOR" | "ENDFOR" | "WHILE" | "ENDWHILE" | "CASE"
+            | "DEFAULT" | "ENDTEST" | "ERROR" | "UNDO" => {
+                self.lose("a branch or loop");
+                Read::of(Action::Other)
+            }
+            "VELSET" if trimmed[6..].trim().starts_with("100,") => {
+                self.blocked = None;
                 Read::of(Action::Other)
             }
             "VELSET" | "SPEEDREFRESH" => {
-                self.blocked = Some(Left::UnknownFeed);
+                let name = Code::Named(if first.eq_ignore_ascii_case("VelSet") {
+                    "VelSet"
+                } else {
+                    "SpeedRefresh"
+                });
+                self.blocked = Some(Left::UnknownFeed(Some(self.because(name))));
                 Read::of(Action::Other)
             }
             "MOVEL" => self.straight(trimmed),
             "MOVEC" => match self.arc(text) {
                 Ok(read) => read,
                 Err(left) => {
-                    self.stand = None;
+                    self.lose("an arc that is not plain");
                     Read::of(Action::LostArc(left))
                 }
             },
-            name if name.starts_with("MOVEC") || name.starts_with("TRIGGC") => {
-                self.stand = None;
-                Read::of(Action::LostArc(Left::Expression))
-            }
+            name => self.other(name, trimmed),
+        }
+    }
+
+    /// The three points of a plain MoveC, as far as they are known.
+    pub(super) fn points(&self, line: &[u8]) -> Option<[[f64; 3]; 3]> {
+        let text = std::str::from_utf8(code(line)).ok()?.trim();
+        let list = arguments(
+            text.get(..5)
+                .filter(|n| n.eq_ignore_ascii_case("MoveC"))
+                .map(|_| text)?,
+            "MoveC",
+        )?;
+        let start = self.stand.as_ref()?.target.place;
+        let via = self.target(list.first()?)?.place;
+        Some([start, via, self.target(list.get(1)?)?.place])
+    }
+
+    fn because(&self, code: Code) -> Because {
+        Because {
+            line: self.line,
+            code,
+        }
+    }
+
+    fn lose(&mut self, what: &'static str) {
+        (self.stand, self.lost) = (None, Some(self.because(Code::Named(what))));
+    }
+
+    /// `IF ready MoveL p1, …;` in one line moves or does not.
+    fn may_move(&mut self, text: &str) {
+        if text.ends_with(';') && !text.to_ascii_uppercase().starts_with("GOTO") {
+            self.lose("what is run on a condition");
+        }
+    }
+
+    /// Instructions that are not rewritten, but whose end may be known.
+    fn other(&mut self, name: &str, text: &str) -> Read {
+        // Words of the family, of its arcs, and where its tool stands among the arguments.
+        let straight = ["MOVELDO", "MOVELAO", "MOVELGO", "MOVELSYNC"].contains(&name);
+        let triggered = name == "TRIGGL";
+        let welded = ["ARCL", "ARCLSTART", "ARCLEND", "ARCLS", "ARCLE"].contains(&name);
+        let circle = [
+            ("MOVEC", "MoveC with a signal or a call"),
+            ("TRIGGC", "TriggC"),
+            ("ARCC", "ArcC, whose speed stands in its weld data"),
+            ("PROCC", "ProcC"),
+            ("DISPC", "DispC, whose speed stands in its bead data"),
+            ("PAINTC", "PaintC"),
+            ("CAPC", "CapC"),
+            ("SEARCHC", "SearchC"),
+        ]
+        .into_iter()
+        .find(|(family, _)| name.starts_with(family));
+        let to = |skip: usize, tool: usize, from_end: bool| {
+            let list = arguments(text, &text[..name.len()])?;
+            let tool = if from_end {
+                list.len().checked_sub(1)?
+            } else {
+                tool
+            };
+            Some(Stand {
+                target: self.target(list.get(skip)?)?,
+                tool: list.get(tool)?.clone(),
+            })
+        };
+        if let Some((_, words)) = circle {
+            // The end is the second argument.
+            let stand = if name.starts_with("ARCC") {
+                to(1, 6, false)
+            } else {
+                None
+            };
+            self.lose("an instruction that is not rewritten");
+            self.stand = stand;
+            return Read::of(Action::LostArc(Left::Dialect(words)));
+        }
+        match name {
             "MOVEJ" => {
-                let arguments = arguments(trimmed, "MoveJ");
-                self.stand = arguments.filter(|a| a.len() == 4).and_then(|a| {
-                    Some(Stand {
-                        target: self.target(&a[0])?,
-                        tool: a[3].clone(),
-                    })
-                });
+                let stand = to(0, 3, false);
+                self.lose("MoveJ to a place that only the controller knows");
+                self.stand = stand;
                 Read::of(Action::Other)
             }
-            _ if trimmed.contains(":=") && !trimmed.contains('(') => Read::of(Action::Nothing),
+            _ if straight || triggered || welded => {
+                let stand = to(0, if welded { 5 } else { 3 }, triggered);
+                let before = self.stand.take();
+                self.lose("an instruction that is not rewritten");
+                self.stand = stand;
+                self.passed(before, false, None)
+            }
+            _ if text.ends_with(':') => {
+                self.lose("a label");
+                Read::of(Action::Other)
+            }
+            _ if text.contains(":=") && !text.contains('(') => Read::of(Action::Nothing),
             // A call, or what is not known: it may move the robot.
             _ => {
-                self.stand = None;
+                self.lose("a call or an instruction that is not known");
                 Read::of(Action::Other)
             }
         }
+    }
+
+    /// A line from `before` to where the robot stands now.
+    fn passed(&self, before: Option<Stand>, bare: bool, feed_mm_s: Option<f64>) -> Read {
+        let Some(now) = &self.stand else {
+            return Read::of(Action::Other);
+        };
+        let before = before.filter(|b| b.tool == now.tool);
+        Read::of(Action::Line(Straight {
+            start: before.map_or([None; 3], |b| b.target.place.map(Some)),
+            end: now.target.place.map(Some),
+            absolute: true,
+            bare,
+            feed_mm_s,
+        }))
     }
 
     /// `CONST robtarget name := [...];` or `CONST speeddata name := [...];`
@@ -172,8 +287,22 @@ impl Reader {
     }
 
     fn target(&self, text: &str) -> Option<Target> {
+        let offset = text
+            .get(..5)
+            .filter(|head| head.eq_ignore_ascii_case("Offs("))
+            .and_then(|head| text[head.len()..].strip_suffix(')'));
         if text.starts_with('[') {
             literal_target(text)
+        } else if let Some(inside) = offset {
+            let (base, by) = inside.split_once(',')?;
+            let by: Option<Vec<f64>> = by
+                .split(',')
+                .map(|n| n.parse().ok().filter(|v: &f64| v.is_finite()))
+                .collect();
+            let by: [f64; 3] = by?.try_into().ok()?;
+            let mut target = self.targets.get(&base.to_ascii_lowercase()).cloned()?;
+            (0..3).for_each(|i| target.place[i] += by[i]);
+            Some(target)
         } else {
             self.targets.get(&text.to_ascii_lowercase()).cloned()
         }
@@ -207,31 +336,21 @@ impl Reader {
 
     fn straight(&mut self, text: &str) -> Read {
         let Some(list) = arguments(text, "MoveL").filter(|a| a.len() == 4) else {
-            self.stand = None;
+            self.lose("a line that is not plain");
             return Read::of(Action::Other);
         };
         let stops = list[2].eq_ignore_ascii_case("fine");
         let before = self.stand.take();
-        self.stand = self.target(&list[0]).map(|target| Stand {
+        let stand = self.target(&list[0]).map(|target| Stand {
             target,
             tool: list[3].clone(),
         });
-        let Some(now) = &self.stand else {
-            return Read {
-                stops,
-                ..Read::of(Action::Other)
-            };
-        };
-        let before = before.filter(|b| b.tool == now.tool);
-        let start = before.map_or([None; 3], |b| b.target.place.map(Some));
-        let action = Action::Line(Straight {
-            start,
-            end: now.target.place.map(Some),
-            absolute: true,
-        });
+        self.lose("a place that only the controller knows");
+        self.stand = stand;
+        let feed_mm_s = self.speed(&list[1]).map_or(f64::NAN, |(v, _)| v);
         Read {
             stops,
-            ..Read::of(action)
+            ..self.passed(before, true, Some(feed_mm_s))
         }
     }
 
@@ -260,14 +379,18 @@ impl Reader {
         let (Some(via), Some(end)) = (self.target(via), target) else {
             return lost(Left::Expression);
         };
+        let because = match &before {
+            Some(_) => Some(self.because(Code::Named("another tool or frame"))),
+            None => self.lost,
+        };
         let Some(Stand { target: start, .. }) = before.filter(|b| b.tool == *tool) else {
-            return lost(Left::UnknownPosition);
+            return lost(Left::UnknownPosition(because));
         };
         let Some((feed_mm_s, other_speeds)) = self.speed(speed) else {
-            return lost(Left::UnknownFeed);
+            return lost(Left::UnknownFeed(None));
         };
         if start.pose != end.pose {
-            return lost(Left::OtherAxes);
+            return lost(Left::Orientation);
         }
         let height = end.place[2];
         if [&start, &via]
@@ -295,6 +418,8 @@ impl Reader {
             radius_mm,
             sweep_rad,
             lift: None,
+            shared: [None; 4],
+            exact_stop: None,
             feed_mm_s,
             feed_word: feed_mm_s,
             modes,
@@ -330,14 +455,14 @@ fn code(line: &[u8]) -> &[u8] {
 /// The arguments of a single instruction, blanks around and inside literals taken out.
 fn arguments(text: &str, name: &str) -> Option<Vec<String>> {
     let body = text.get(name.len()..)?.strip_suffix(';')?;
-    if !body.starts_with(char::is_whitespace) || body.contains([';', '(', '"']) {
+    if !body.starts_with(char::is_whitespace) || body.contains([';', '"']) {
         return None;
     }
     let (mut depth, mut list) = (0, vec![String::new()]);
     for c in body.chars().filter(|c| !c.is_whitespace()) {
         match c {
-            '[' => depth += 1,
-            ']' => depth -= 1,
+            '[' | '(' => depth += 1,
+            ']' | ')' => depth -= 1,
             ',' if depth == 0 => {
                 list.push(String::new());
                 continue;

@@ -3,7 +3,7 @@ use super::*;
 use crate::model::Cumulants;
 use crate::table::{Field, Limits, Travel, Zone, bounds, validate::Where};
 use crate::term::Term;
-use crate::{Axis, Direction};
+use crate::{Actuator, Direction, Plane};
 use proptest::prelude::*;
 use std::vec::Vec;
 
@@ -32,36 +32,73 @@ fn table() -> Table {
     }
 }
 
-fn all_terms() -> [Term<f32>; 11] {
-    let (axis, x) = (Axis::Y, Axis::X);
-    [
+/// Every term, of every actuator, pair and plane.
+fn all_terms() -> Vec<Term<f32>> {
+    let mut terms = [
         Term::RadiusOffset { offset_m: 1e-5 },
         Term::ScaleError { relative: 1e-5 },
-        Term::ScaleMismatch { relative: 1e-5 },
-        Term::Squareness { shear_rad: 1e-5 },
-        Term::ServoMismatch { delta_tau_s: 1e-4 },
-        Term::BandwidthMismatch {
-            delta_kappa2_s2: 1e-6,
+    ]
+    .to_vec();
+    for plane in Plane::ALL {
+        let [first, second] = plane.axes();
+        terms.extend([
+            Term::ScaleMismatch {
+                plane,
+                relative: 1e-5,
+            },
+            Term::Squareness {
+                plane,
+                shear_rad: 1e-5,
+            },
+            Term::ServoMismatch {
+                plane,
+                delta_tau_s: 1e-4,
+            },
+            Term::BandwidthMismatch {
+                plane,
+                delta_kappa2_s2: 1e-6,
+            },
+        ]);
+        for (actuator, across) in [(first, second), (second, first)] {
+            terms.push(Term::LateralPlay {
+                actuator,
+                across,
+                shift_m: 1e-5,
+            });
+            terms.push(Term::Straightness {
+                actuator,
+                across,
+                curvature_per_m: 1e-4,
+            });
+        }
+    }
+    for actuator in Actuator::SLIDES {
+        terms.extend(own_terms(actuator));
+    }
+    terms
+}
+
+/// Every term of one actuator alone.
+fn own_terms(actuator: Actuator) -> [Term<f32>; 4] {
+    [
+        Term::AxisScale {
+            actuator,
+            relative: 1e-5,
         },
-        Term::Backlash { axis, step_m: 1e-5 },
-        Term::LateralPlay {
-            axis: x,
-            shift_m: 1e-5,
+        Term::Backlash {
+            actuator,
+            step_m: 1e-5,
         },
         Term::ReversalSpike {
-            axis,
+            actuator,
             peak_m: 1e-5,
             decay_s: 0.02,
         },
         Term::Cyclic {
-            axis,
+            actuator,
             amplitude_m: 1e-6,
             pitch_m: 0.01,
             phase_rad: 1.0,
-        },
-        Term::Straightness {
-            axis: x,
-            curvature_per_m: 1e-4,
         },
     ]
 }
@@ -83,7 +120,7 @@ fn golden_bytes() {
     #[rustfmt::skip]
     let expected: [u8; 64] = [
         0x47, 0x49, 0x4f, 0x54,                         // "GIOT"
-        1, 0,                                           // format 1
+        2, 0,                                           // format 2
         0, 0,                                           // flags
         64, 0, 0, 0,                                    // length
         0, 0, 0, 0,                                     // CRC (below)
@@ -113,33 +150,49 @@ fn golden_bytes() {
 }
 
 /// `zlib.crc32` of the golden image without its CRC field.
-const GOLDEN_CRC: u32 = 0xb1b3_970b;
+const GOLDEN_CRC: u32 = 0x37d9_bd46;
 /// `zlib.crc32` of `schema.txt`.
-const GOLDEN_SCHEMA: u32 = 0xb37a_9ab9;
+const GOLDEN_SCHEMA: u32 = 0xd668_0447;
 
+/// First byte of each variant, written out: a term that moves changes the meaning of every table.
 #[test]
 fn discriminants_are_pinned() {
-    let mut out = [0; 32];
-    for (index, term) in all_terms().into_iter().enumerate() {
-        assert_eq!(
-            usize::from(postcard::to_slice(&term, &mut out).unwrap()[0]),
-            index
-        );
+    fn first<T: serde::Serialize>(value: T) -> u8 {
+        postcard::to_slice(&value, &mut [0; 32]).unwrap()[0]
     }
-    let mut one = |value: &dyn Fn(&mut [u8]) -> u8| value(&mut out);
-    assert_eq!(one(&|b| postcard::to_slice(&Axis::Y, b).unwrap()[0]), 1);
-    assert_eq!(one(&|b| postcard::to_slice(&Travel::Cw, b).unwrap()[0]), 2);
+    for term in all_terms() {
+        let expected = match term {
+            Term::RadiusOffset { .. } => 0,
+            Term::ScaleError { .. } => 1,
+            Term::AxisScale { .. } => 2,
+            Term::ScaleMismatch { .. } => 3,
+            Term::Squareness { .. } => 4,
+            Term::ServoMismatch { .. } => 5,
+            Term::BandwidthMismatch { .. } => 6,
+            Term::Backlash { .. } => 7,
+            Term::LateralPlay { .. } => 8,
+            Term::ReversalSpike { .. } => 9,
+            Term::Cyclic { .. } => 10,
+            Term::Straightness { .. } => 11,
+        };
+        assert_eq!(first(term), expected, "{term:?}");
+    }
+    let actuators = Actuator::SLIDES.into_iter().chain(Actuator::JOINTS);
     assert_eq!(
-        one(&|b| postcard::to_slice(&Direction::Cw, b).unwrap()[0]),
-        1
+        actuators.map(first).collect::<Vec<_>>(),
+        [0, 1, 2, 3, 4, 5, 6, 7, 8]
     );
+    assert_eq!([Plane::Xy, Plane::Yz, Plane::Zx].map(first), [0, 1, 2]);
+    assert_eq!(first(Travel::Cw), 2);
+    assert_eq!(first(Direction::Cw), 1);
 }
 
 #[test]
 fn largest_table_fits_exactly() {
     let mut longest = zone();
     longest.place_m = Some([[-1.0; 3], [1.0; 3]]);
-    longest.terms.resize(MAX_TERMS, all_terms()[9]).unwrap();
+    let longest_term = own_terms(Actuator::Z)[3];
+    longest.terms.resize(MAX_TERMS, longest_term).unwrap();
     let mut table = table();
     table.machine = "12345678901234567890123456789012".try_into().unwrap();
     table.zones.clear();
@@ -209,7 +262,7 @@ fn each_breakage_has_its_own_error() {
         broken(&newer),
         TableError::NewerVersion {
             version: 9,
-            supported: 1
+            supported: 2
         }
     );
     // The same byte changed on the way, not by a newer giotto.
@@ -221,6 +274,14 @@ fn each_breakage_has_its_own_error() {
         })
     };
     assert_eq!(edit(4, 0), TableError::UnknownVersion { version: 0 });
+    let older = edit(4, 1);
+    assert_eq!(
+        older,
+        TableError::OlderVersion {
+            version: 1,
+            supported: 2
+        }
+    );
     assert_eq!(edit(6, 2), TableError::UnknownFlags { flags: 2 });
     assert!(matches!(
         edit(16, !good[16]),
@@ -302,6 +363,7 @@ fn no_number_of_a_term_goes_unchecked() {
     for term in all_terms() {
         let mut body = [0; 32];
         let length = postcard::to_slice(&term, &mut body).unwrap().len();
+        // The rest are the tag and a byte each for actuators and plane.
         let numbers = (length - 1) / 4;
         for number in 0..numbers {
             for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e6, -1e6] {
@@ -321,12 +383,46 @@ fn no_number_of_a_term_goes_unchecked() {
 }
 
 #[test]
+fn terms_of_joints_and_of_one_slide_twice_are_refused() {
+    let refused = |term| {
+        let mut table = table();
+        table.zones[0].terms.push(term).unwrap();
+        table.validate().unwrap_err()
+    };
+    let at = Where(Some(0));
+    for actuator in Actuator::JOINTS {
+        for term in own_terms(actuator) {
+            assert_eq!(refused(term), TableError::Joint { at, actuator });
+        }
+    }
+    let (actuator, across) = (Actuator::Z, Actuator::Z);
+    let same = TableError::SameActuator { at, actuator };
+    let (shift_m, curvature_per_m) = (1e-5, 1e-4);
+    assert_eq!(
+        refused(Term::LateralPlay {
+            actuator,
+            across,
+            shift_m
+        }),
+        same
+    );
+    assert_eq!(
+        refused(Term::Straightness {
+            actuator,
+            across,
+            curvature_per_m
+        }),
+        same
+    );
+}
+
+#[test]
 fn signature_travels_outside_the_body() {
     let mut out = [0; MAX_IMAGE_BYTES];
     let plain = encode(&table(), &mut out).unwrap();
     assert_eq!(signed_parts(&out[..plain]), None);
     let signed = attach_signature(&mut out, plain, |head, body| {
-        assert_eq!(head, [1, 0, 1, 0]);
+        assert_eq!(head, [2, 0, 1, 0]);
         assert_eq!(body.len(), plain - 16);
         [7; SIGNATURE_BYTES]
     });
@@ -343,7 +439,7 @@ proptest! {
     fn any_bytes_are_refused_or_valid(mut bytes in proptest::collection::vec(any::<u8>(), 0..400), seal: bool) {
         if seal && bytes.len() >= HEADER_BYTES {
             bytes[..4].copy_from_slice(&MAGIC);
-            bytes[4..8].copy_from_slice(&[1, 0, 0, 0]);
+            bytes[4..8].copy_from_slice(&[2, 0, 0, 0]);
             let length = bytes.len() as u32;
             bytes[8..12].copy_from_slice(&length.to_le_bytes());
             bytes[16..20].copy_from_slice(&SCHEMA_HASH.to_le_bytes());

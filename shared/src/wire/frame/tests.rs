@@ -95,6 +95,12 @@ fn largest_messages_fit() {
         generation: Some(most),
     });
     reply(Reply::Status(Status {
+        position: PositionState::Kept,
+        reset: ResetCause::Watchdog,
+        clock: ClockSource::Internal,
+        worst_tick_permille: Some(u16::MAX),
+        stack_left_bytes: most,
+        override_percent: u8::MAX,
         motion: MotionState::Fault,
         fault: Some(FaultCause::Discontinuity),
         stop_input: true,
@@ -128,6 +134,35 @@ fn largest_messages_fit() {
             link_losses: most,
         },
     }));
+    let config = MachineConfig {
+        feed_m_s: f32::MAX,
+        acceleration_m_s2: f32::MAX,
+        jerk_m_s3: f32::MAX,
+        positioning_m_s: f32::MAX,
+        offset_m: f32::MAX,
+        slew_m_s: f32::MAX,
+        stream_window_s: f32::MAX,
+        soft_nm: [[i32::MIN, i32::MAX]; 3],
+        internal_clock: true,
+    };
+    reply(Reply::Config {
+        config,
+        stored: true,
+    });
+    let why = Refusal::Motion(MotionRefusal::OutOfBounds {
+        quantity: Quantity::Override,
+        value: 1.0,
+        lo: 1.0,
+        hi: 1.0,
+    });
+    let event = Event {
+        tick: most,
+        what: What::Refused { request: 255, why },
+    };
+    reply(Reply::Events {
+        first: most,
+        events: std::iter::repeat_n(event, EVENTS).collect(),
+    });
     let point = SetPoint {
         raw_nm: [i32::MIN; 3],
         corrected_nm: [i32::MIN; 3],
@@ -146,6 +181,7 @@ fn golden_frame() {
         centre_m: [-0.29, 0.0, 0.0],
         radius_m: 0.1,
         feed_m_s: 0.5,
+        plane: crate::Plane::Xy,
         direction: Direction::Cw,
         laps: 2,
         start_rad: core::f64::consts::FRAC_PI_2,
@@ -164,7 +200,7 @@ fn golden_frame() {
         0xff, 0xb1, 0xc8, 0x94, 0x02, 0, 0,             // centre -290 mm, 0, 0 in nanometres
         0x80, 0x88, 0xde, 0xbe, 0x01,                   // radius 100 mm in half nanometres
         0, 0, 0, 0x3f,                                  // feed 0.5 m/s
-        1, 2,                                           // clockwise, two laps
+        0, 1, 2,                                        // plane XY, clockwise, two laps
         0x80, 0x80, 0x80, 0x80, 0x04,                   // from a quarter turn
     ];
     let mut accumulator = Accumulator::new();

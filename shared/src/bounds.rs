@@ -1,5 +1,6 @@
 //! What no table may ask for, whatever its own limits say: the harder bounds of the image. Each says where
-//! it comes from; a table that exceeds one is refused before it touches the flash.
+//! it comes from; a table that exceeds one is refused before it touches the flash. Bounds of one term alone are in the
+//! term's file.
 
 /// Largest correction, m. A position loop of kv = 10/s at the hardest circle of the tests (R = 100 mm,
 /// f = 300 mm/s) asks for ½ω²R/kv² = 4.5 mm; anything beyond is a wrong unit, not a correction.
@@ -29,29 +30,7 @@ pub const KAPPA2_MAX_S2: f32 = 1.0e-2;
 /// ωn = 10.5 rad/s.
 pub const KAPPA4_MAX_S4: f32 = 1.0e-3;
 
-/// Largest relative length error or mismatch of a term, m/m: 1 %.
-pub const RELATIVE_MAX: f32 = 1.0e-2;
-
-/// Largest squareness error, rad: 1 % of the arm, as [`RELATIVE_MAX`].
-pub const SHEAR_MAX_RAD: f32 = 1.0e-2;
-
-/// Largest difference of lags, s.
-pub const DELTA_TAU_MAX_S: f32 = 2.0e-2;
-
-/// Shortest and longest decay of a reversal pulse, s.
-pub const DECAY_S: [f32; 2] = [1.0e-3, 1.0];
-
-/// Shortest and longest pitch of a periodic error, m.
-pub const PITCH_M: [f32; 2] = [1.0e-4, 10.0];
-
-/// Largest |phase| of a periodic error, rad: one turn, rounded up.
-pub const PHASE_MAX_RAD: f32 = 6.3;
-
-/// Largest bow of a guide, 1/m: [`OFFSET_MAX_M`] over [`RADIUS_MAX_M`]².
-pub const CURVATURE_MAX_PER_M: f32 = OFFSET_MAX_M / (RADIUS_MAX_M * RADIUS_MAX_M);
-
 /// Farthest machine coordinate, m.
 pub const PLACE_MAX_M: f32 = 100.0;
 
 const _: () = assert!(RADIUS_MIN_M < RADIUS_MAX_M && FEED_MIN_M_S < FEED_MAX_M_S);
-const _: () = assert!(DECAY_S[0] < DECAY_S[1] && PITCH_M[0] < PITCH_M[1]);

@@ -5,7 +5,7 @@
 use serde::ser::{self, Impossible, Serialize};
 
 /// Bytes of a message, so far.
-pub(super) struct Writer<'a> {
+pub(crate) struct Writer<'a> {
     bytes: &'a mut [u8],
     length: usize,
 }
@@ -13,7 +13,7 @@ pub(super) struct Writer<'a> {
 /// A type that messages do not have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("a type that messages do not have")]
-pub(super) struct Unsupported;
+pub(crate) struct Unsupported;
 
 impl ser::Error for Unsupported {
     fn custom<T: core::fmt::Display>(_: T) -> Self {
@@ -23,13 +23,20 @@ impl ser::Error for Unsupported {
 
 type Done = Result<(), Unsupported>;
 
+/// Writes a value to the start of `bytes`; its length, or `None` if it does not fit.
+pub fn put<T: Serialize + ?Sized>(value: &T, bytes: &mut [u8]) -> Option<usize> {
+    let mut writer = Writer::new(bytes);
+    value.serialize(&mut writer).ok()?;
+    writer.length()
+}
+
 impl<'a> Writer<'a> {
-    pub(super) fn new(bytes: &'a mut [u8]) -> Self {
+    pub(crate) fn new(bytes: &'a mut [u8]) -> Self {
         Self { bytes, length: 0 }
     }
 
     /// How many there are; `None` if they did not fit.
-    pub(super) fn length(&self) -> Option<usize> {
+    pub(crate) fn length(&self) -> Option<usize> {
         (self.length <= self.bytes.len()).then_some(self.length)
     }
 

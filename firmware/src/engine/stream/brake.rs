@@ -1,0 +1,197 @@
+//! How a stream comes to rest: along the curvature it had last, within acceleration and jerk, from the velocity and the
+//! acceleration it had last, so that neither jumps.
+//!
+//! The speed falls in three pieces: the acceleration turns to that of braking at the limit of jerk, stays there, and returns
+//! to none so that it reaches it with the speed. Numbers are single precision, per tick: increments of a path, never places.
+
+/// Velocity below which there is nothing to brake, nm per tick.
+const SLOWEST: f32 = 2.0;
+/// Below this the curvature is rounding, nm per tick: the brake is some micrometres long, and straight.
+const SLOWEST_CURVED: f32 = 64.0;
+/// What is left of the acceleration for braking where the curvature takes all, as a share.
+const LEAST_SHARE: f32 = 0.3;
+
+/// Places that a brake begins from, nm: the last one, and those 1, 2, 4 and 8 ticks before it.
+pub(super) struct Before {
+    pub(super) place_nm: [[i32; 3]; 5],
+}
+
+/// Limits, nm per tick² and per tick³.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub(super) struct Limits {
+    pub(super) acceleration: f32,
+    pub(super) jerk: f32,
+}
+
+/// A brake under way.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Brake {
+    /// Ticks since it began.
+    tick: f32,
+    /// First piece: speed, acceleration and jerk at its start, and its length.
+    speed: f32,
+    acceleration: f32,
+    jerk: f32,
+    turning: f32,
+    /// Second piece: speed at its start, deceleration, and where it ends.
+    turned: f32,
+    deceleration: f32,
+    held: f32,
+    /// Third piece: jerk, and where it ends.
+    last_jerk: f32,
+    end: f32,
+    /// Direction of travel, and the one that it turns to.
+    along: [f32; 3],
+    across: [f32; 3],
+    /// rad per nm.
+    curvature: f32,
+    /// Way of the last tick, nm.
+    way: f32,
+    /// What is below a nanometre.
+    rest: [f32; 3],
+}
+
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    let ([ax, ay, az], [bx, by, bz]) = (a, b);
+    ax * bx + ay * by + az * bz
+}
+
+fn combined(a: [f32; 3], p: f32, b: [f32; 3], q: f32) -> [f32; 3] {
+    let ([ax, ay, az], [bx, by, bz]) = (a, b);
+    [ax * p + bx * q, ay * p + by * q, az * p + bz * q]
+}
+
+fn between(from: [i32; 3], to: [i32; 3]) -> [f32; 3] {
+    let ([fx, fy, fz], [tx, ty, tz]) = (from, to);
+    [
+        tx.wrapping_sub(fx) as f32,
+        ty.wrapping_sub(fy) as f32,
+        tz.wrapping_sub(fz) as f32,
+    ]
+}
+
+/// Curvature, and the direction it turns to, of places a step apart; `None`: straight, or as good as.
+fn bend(now: [i32; 3], before: [i32; 3], first: [i32; 3], step: f32) -> Option<(f32, [f32; 3])> {
+    let (late, early) = (between(before, now), between(first, before));
+    let velocity = combined(late, 0.5 / step, early, 0.5 / step);
+    let change = combined(late, 1.0 / (step * step), early, -1.0 / (step * step));
+    let square = dot(velocity, velocity);
+    if square < SLOWEST_CURVED * SLOWEST_CURVED {
+        return None;
+    }
+    let across = combined(change, 1.0, velocity, -dot(change, velocity) / square);
+    let size = libm::sqrtf(dot(across, across));
+    (size > 0.0).then(|| (size / square, combined(across, 1.0 / size, across, 0.0)))
+}
+
+impl Brake {
+    /// From the last places of a path.
+    #[inline(never)]
+    pub(super) fn begin(before: &Before, limits: Limits) -> Self {
+        let [now, one, two, four, eight] = before.place_nm;
+        let (velocity, earlier) = (between(one, now), between(two, one));
+        let speed = libm::sqrtf(dot(velocity, velocity));
+        if speed < SLOWEST {
+            return Self::default();
+        }
+        let along = combined(velocity, 1.0 / speed, velocity, 0.0);
+        let acceleration = speed - dot(earlier, along);
+        let mut brake = Self {
+            along,
+            way: speed,
+            ..Self::default()
+        };
+        let mut centripetal = 0.0;
+        if let Some((curvature, across)) = bend(now, four, eight, 4.0) {
+            // Square to where it goes now, a few ticks later.
+            let across = combined(across, 1.0, along, -dot(across, along));
+            let size = libm::sqrtf(dot(across, across));
+            if size > 0.5 {
+                brake.across = combined(across, 1.0 / size, across, 0.0);
+                brake.curvature = curvature.min(limits.acceleration / (speed * speed));
+                centripetal = brake.curvature * speed * speed;
+            }
+        }
+        let left = limits.acceleration * limits.acceleration - centripetal * centripetal;
+        let most = libm::sqrtf(left.max(0.0)).max(LEAST_SHARE * limits.acceleration);
+        brake.shape(speed, acceleration, most, limits.jerk);
+        brake
+    }
+
+    /// The three pieces.
+    fn shape(&mut self, speed: f32, acceleration: f32, most: f32, jerk: f32) {
+        let square = acceleration * acceleration;
+        if acceleration < 0.0 && jerk * speed <= 0.5 * square {
+            // Nearly at rest, its deceleration more than the limit of jerk takes back in that speed: as gently as can be.
+            self.last_jerk = 0.5 * square / speed;
+            self.end = -2.0 * speed / acceleration;
+            return;
+        }
+        // Without a second piece the speed is used up at this deceleration.
+        let deceleration = most.min(libm::sqrtf(jerk * speed + 0.5 * square));
+        let toward = if acceleration >= -deceleration {
+            -jerk
+        } else {
+            jerk
+        };
+        (self.speed, self.acceleration, self.jerk) = (speed, acceleration, toward);
+        self.turning = (acceleration + deceleration) / -toward;
+        self.deceleration = deceleration;
+        self.turned = speed + self.turning * (acceleration + 0.5 * toward * self.turning);
+        let last = (2.0 * self.turned / deceleration).min(deceleration / jerk);
+        self.last_jerk = deceleration / last;
+        self.held = self.turning + (self.turned / deceleration - 0.5 * last).max(0.0);
+        self.end = self.held + last;
+    }
+
+    /// Ticks from its beginning to rest.
+    pub(super) fn ticks(&self) -> u32 {
+        self.end as u32 + 1
+    }
+
+    /// Way in a tick, nm.
+    fn speed_at(&self, tick: f32) -> f32 {
+        if tick < self.turning {
+            self.speed + tick * (self.acceleration + 0.5 * self.jerk * tick)
+        } else if tick < self.held {
+            self.turned - self.deceleration * (tick - self.turning)
+        } else {
+            let left = (self.end - tick).max(0.0);
+            0.5 * self.last_jerk * left * left
+        }
+    }
+
+    /// From the last place to the next, nm.
+    pub(super) fn step(&mut self) -> [i32; 3] {
+        self.tick += 1.0;
+        let way = self.speed_at(self.tick).max(0.0);
+        let angle = 0.5 * self.curvature * (way + self.way);
+        self.way = way;
+        // Some hundredths of a turn at most: what these leave out is below a nanometre.
+        let (c, s) = (
+            1.0 - 0.5 * angle * angle,
+            angle * (1.0 - angle * angle * (1.0 / 6.0)),
+        );
+        (self.along, self.across) = (
+            combined(self.along, c, self.across, s),
+            combined(self.across, c, self.along, -s),
+        );
+        let mut whole = [0; 3];
+        for ((whole, rest), along) in whole.iter_mut().zip(&mut self.rest).zip(self.along) {
+            let exact = *rest + along * way;
+            *whole = exact as i32;
+            *rest = exact - *whole as f32;
+        }
+        whole
+    }
+}
+
+/// Farthest that a brake from a velocity and its change leads on one axis, nm; `speed` is that along the path. All per tick.
+pub(crate) fn farthest_nm(limits: [f32; 2], speed: f32, velocity: f32, change: f32) -> f32 {
+    let [acceleration, jerk] = limits;
+    let (velocity, change) = (velocity.abs(), change.max(0.0));
+    // While the acceleration is taken back the speed still grows.
+    let gained = velocity + 0.5 * change * change / jerk;
+    let growing = change / jerk * (velocity + change * change / (3.0 * jerk));
+    growing + gained * (0.5 * speed / acceleration + 0.5 * acceleration / jerk)
+}

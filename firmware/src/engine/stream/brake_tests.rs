@@ -1,0 +1,136 @@
+//! How streams come to rest: from any moment of lines, circles and changes of speed.
+extern crate std;
+use super::tests::{plan_with, sample_at};
+use super::*;
+use giotto_shared::law::Operator;
+use giotto_shared::path::smoothstep;
+use std::vec::Vec;
+
+const DT: f64 = 1e-3;
+const ACCELERATION: f64 = 5.0;
+const JERK: f64 = 100.0;
+
+/// Length of the path after `t` s: up to a feed within the limits in a second, then steady.
+fn length(t: f64, feed: f64) -> f64 {
+    let s = smoothstep((t / 1.2).clamp(0.0, 1.0));
+    feed * (1.2 * s.integral + (t - 1.2).max(0.0))
+}
+
+fn on_line(t: f64) -> [f64; 3] {
+    let way = length(t, 1.0);
+    [0.6 * way, -0.8 * way, 0.0]
+}
+
+fn on_circle(t: f64) -> [f64; 3] {
+    let angle = length(t, 0.5) / 0.1;
+    [0.1 * angle.cos() - 0.1, 0.0, 0.1 * angle.sin()]
+}
+
+fn nm(place: [f64; 3]) -> [i32; 3] {
+    place.map(|m| (m * 1e9).round() as i32)
+}
+
+fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|i| a[i] - b[i])
+}
+
+fn size(v: [f64; 3]) -> f64 {
+    v.iter().map(|v| v * v).sum::<f64>().sqrt()
+}
+
+/// Programmed places from the stop on, and a few before it, m; how fast it was.
+fn stopped(path: fn(f64) -> [f64; 3], at: usize, dies: bool) -> (Vec<[f64; 3]>, f64) {
+    // The paper's robot.
+    let plan = plan_with(Operator {
+        second_s2: -23.29e-6,
+        fourth_s4: 0.23e-6,
+    });
+    let mut stream: Stream = Stream::new(&plan, [0; 3], 0, true);
+    let mut out = Vec::new();
+    for n in 0..at {
+        out.push(stream.tick(Some(sample_at(n, nm(path(n as f64 * DT))))));
+    }
+    if !dies {
+        stream.stop();
+    }
+    while !stream.over() {
+        out.push(stream.tick(None));
+        assert!(out.len() < 20_000);
+    }
+    let places: Vec<[f64; 3]> = out
+        .iter()
+        .map(|o| o.nominal_nm.map(|nm| f64::from(nm) * 1e-9))
+        .collect();
+    let speed = size(difference(path(at as f64 * DT), path((at - 1) as f64 * DT))) / DT;
+    (places, speed)
+}
+
+#[test]
+fn every_stop_keeps_the_limits_and_the_distance() {
+    for (name, path) in [
+        ("line", on_line as fn(f64) -> [f64; 3]),
+        ("circle", on_circle),
+    ] {
+        for at in (20..2000).step_by(33) {
+            for dies in [false, true] {
+                let (places, speed) = stopped(path, at, dies);
+                let velocity: Vec<_> = places
+                    .windows(2)
+                    .map(|w| difference(w[1], w[0]).map(|d| d / DT))
+                    .collect();
+                let acceleration: Vec<_> = velocity
+                    .windows(2)
+                    .map(|w| difference(w[1], w[0]).map(|d| d / DT))
+                    .collect();
+                let jerk = acceleration
+                    .windows(2)
+                    .map(|w| size(difference(w[1], w[0])) / DT);
+                let what = std::format!("{name} stopped after {at} ticks, died {dies}");
+                // Rounding to nanometres: 4 nm of a second difference, 8 of a third.
+                let most = acceleration.iter().copied().map(size).fold(0.0, f64::max);
+                assert!(most < ACCELERATION + 0.01, "{what}: {most} m/s²");
+                let most = jerk.fold(0.0, f64::max);
+                // That of the curvature comes on top.
+                let bar = if name == "circle" { 1.25 } else { 1.02 };
+                assert!(most < JERK * bar + 10.0, "{what}: {most} m/s³");
+                if speed > 0.2 {
+                    let end = *places.last().unwrap();
+                    let from = path((at - 1) as f64 * DT);
+                    // A stream that died has gone on for six ticks.
+                    let bar = 1.3 * speed * speed / (2.0 * ACCELERATION)
+                        + if dies { 7.0 * DT * speed } else { 0.0 };
+                    // While it still gains speed its acceleration has to be taken back first.
+                    let steady = at as f64 * DT > 1.2;
+                    assert!(
+                        !steady || name == "circle" || size(difference(end, from)) < bar,
+                        "{what}: {} of {bar} m",
+                        size(difference(end, from))
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// On the circle until it stands, to a few micrometres.
+#[test]
+fn a_stop_follows_the_curvature() {
+    for at in [700, 1300, 1700] {
+        let (places, speed) = stopped(on_circle, at, false);
+        let off = places
+            .iter()
+            .map(|[x, y, z]| ((x + 0.1).hypot(*z) - 0.1).abs().max(y.abs()))
+            .fold(0.0, f64::max);
+        let way: f64 = places[at - 1..]
+            .windows(2)
+            .map(|w| size(difference(w[1], w[0])))
+            .sum();
+        std::println!(
+            "stop from {speed:.3} m/s: {way:.4} m, {:.2} um off",
+            off * 1e6
+        );
+        assert!(off < 10e-6, "{off}");
+        // Along the tangent it would be half a millimetre at least.
+        assert!(way * way / 0.2 > 3e-4);
+    }
+}

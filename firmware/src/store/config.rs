@@ -1,0 +1,221 @@
+//! The machine's configuration: a log in two erase units, of which the newest whole record counts.
+//!
+//! ```text
+//! record = number u32 · length u8 · version u8 · postcard · FF … · check u32        80 bytes
+//! ```
+//!
+//! A record goes into the first place that is blank, with all behind it blank too; where there is none left, into the other
+//! unit, erased first: it holds older records only. So a cut of power at any byte leaves the old configuration or the new
+//! one, whole, and no word is programmed twice between erasures.
+use super::Store;
+use embedded_storage::nor_flash::NorFlash;
+use giotto_shared::wire::{Crc32, FlashFault, MachineConfig, take};
+
+/// Length of a record.
+pub(super) const CONFIG_BYTES: usize = 80;
+/// Version of what a record holds.
+const VERSION: u8 = 1;
+const HEAD: usize = 6;
+const CHECK: usize = CONFIG_BYTES - 4;
+
+type Record = [u8; CONFIG_BYTES];
+
+fn check(record: &Record) -> [u8; 4] {
+    let body = record.get(..CHECK).unwrap_or(&[]);
+    Crc32::new()
+        .with(b"giotto config")
+        .with(body)
+        .value()
+        .to_le_bytes()
+}
+
+/// Number and content, if the record is whole and of this version.
+fn read(record: &Record) -> Option<(u32, MachineConfig)> {
+    let (number, rest) = record.split_first_chunk::<4>()?;
+    let [length, VERSION, body @ ..] = rest else {
+        return None;
+    };
+    if record.get(CHECK..)? != check(record) {
+        return None;
+    }
+    let body = body.get(..usize::from(*length))?;
+    match take::<MachineConfig>(body) {
+        Some((config, [])) => Some((u32::from_le_bytes(*number), config)),
+        _ => None,
+    }
+}
+
+fn write(number: u32, config: &MachineConfig) -> Option<Record> {
+    let mut record = [0xff; CONFIG_BYTES];
+    let body = giotto_shared::wire::put(config, record.get_mut(HEAD..CHECK)?)?;
+    *record.first_chunk_mut()? = number.to_le_bytes();
+    *record.get_mut(4)? = body as u8;
+    *record.get_mut(5)? = VERSION;
+    let check = check(&record);
+    record.get_mut(CHECK..)?.copy_from_slice(&check);
+    Some(record)
+}
+
+/// What the two units hold.
+#[derive(Clone, Copy, Debug, Default)]
+struct Found {
+    newest: Option<(u32, MachineConfig)>,
+    /// Unit of the newest record.
+    unit: usize,
+    /// First place of each unit from which on all is blank.
+    blank: [u32; 2],
+}
+
+impl<F: NorFlash> Store<F> {
+    fn places(&self) -> u32 {
+        F::ERASE_SIZE as u32 / CONFIG_BYTES as u32
+    }
+
+    #[inline(never)]
+    fn configs(&mut self, units: [u32; 2]) -> Result<Found, FlashFault> {
+        let mut found = Found::default();
+        for (unit, base) in units.into_iter().enumerate() {
+            let mut blank = 0;
+            for place in 0..self.places() {
+                let mut record = [0; CONFIG_BYTES];
+                let at = base + place * CONFIG_BYTES as u32;
+                self.flash
+                    .read(at, &mut record)
+                    .map_err(|_| FlashFault::Read)?;
+                if record == [0xff; CONFIG_BYTES] {
+                    continue;
+                }
+                blank = place + 1;
+                let newest = found.newest.map(|(number, _)| number);
+                if let Some((number, config)) = read(&record)
+                    && newest.is_none_or(|newest| number > newest)
+                {
+                    (found.newest, found.unit) = (Some((number, config)), unit);
+                }
+            }
+            if let Some(place) = found.blank.get_mut(unit) {
+                *place = blank;
+            }
+        }
+        Ok(found)
+    }
+
+    /// The configuration that is stored, if there is one that this image reads.
+    #[inline(never)]
+    pub fn config(&mut self) -> Option<MachineConfig> {
+        let units = self.layout.config?;
+        self.configs(units).ok()?.newest.map(|(_, config)| config)
+    }
+
+    /// Whether there is a place for a configuration.
+    pub const fn keeps_config(&self) -> bool {
+        self.layout.config.is_some()
+    }
+
+    /// Stores a configuration; the one before stays until this one is whole.
+    ///
+    /// # Errors
+    /// Those of the flash, among them that it does not read back.
+    #[inline(never)]
+    pub fn keep_config(&mut self, config: &MachineConfig) -> Result<(), FlashFault> {
+        let units = self.layout.config.ok_or(FlashFault::Full)?;
+        let found = self.configs(units)?;
+        let number = found.newest.map_or(0, |(number, _)| number.wrapping_add(1));
+        let record = write(number, config).ok_or(FlashFault::Program)?;
+        let mut unit = found.unit & 1;
+        let mut place = found.blank[unit];
+        if place >= self.places() {
+            unit ^= 1;
+            let base = units[unit];
+            self.flash
+                .erase(base, base + F::ERASE_SIZE as u32)
+                .map_err(|_| FlashFault::Erase)?;
+            place = 0;
+        }
+        let at = units[unit] + place * CONFIG_BYTES as u32;
+        self.flash
+            .write(at, &record)
+            .map_err(|_| FlashFault::Program)?;
+        let mut back = [0; CONFIG_BYTES];
+        self.flash
+            .read(at, &mut back)
+            .map_err(|_| FlashFault::Read)?;
+        match record.iter().zip(&back).position(|(a, b)| a != b) {
+            None => Ok(()),
+            Some(offset) => Err(FlashFault::ReadBack {
+                offset: at + offset as u32,
+            }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use crate::engine::Config;
+    use crate::store::power_cut::{PowerCut, Tear};
+    use crate::store::ram::RamFlash;
+    use crate::store::{Layout, Store};
+    use giotto_shared::table::MAX_IMAGE_BYTES;
+
+    const LAYOUT: Layout = Layout::new([0, 2048], 2048).with_config([4096, 4608]);
+    type Cells = RamFlash<5120, 512>;
+
+    fn open(cells: Cells, after: Option<u32>, tear: Tear) -> Store<PowerCut<5120, 512>> {
+        Store::open(
+            PowerCut::new(cells, after, tear),
+            LAYOUT,
+            &mut [0; MAX_IMAGE_BYTES],
+        )
+    }
+
+    fn config(feed_m_s: f32) -> MachineConfig {
+        MachineConfig {
+            feed_m_s,
+            soft_nm: [[i32::MIN, i32::MAX]; 3],
+            ..Config::robot(1000).said()
+        }
+    }
+
+    /// Power fails at every byte and erasure of the next one, torn in every way, with any number stored before.
+    #[test]
+    fn a_cut_leaves_the_old_configuration_or_the_new_one() {
+        for before in 0..16 {
+            for tear in Tear::ALL {
+                for after in 1..CONFIG_BYTES as u32 + 8 {
+                    let mut store = open(Cells::new(), None, Tear::Untouched);
+                    for n in 0..before {
+                        store.keep_config(&config(n as f32 + 1.0)).unwrap();
+                    }
+                    let cells = store.into_flash().into_cells();
+                    let mut store = open(cells, Some(after), tear);
+                    let kept = store.keep_config(&config(100.0)).is_ok();
+                    let mut store = open(store.into_flash().into_cells(), None, Tear::Untouched);
+                    let old = (before > 0).then(|| config(before as f32));
+                    let found = store.config();
+                    assert!(
+                        found == Some(config(100.0)) || (found == old && !kept),
+                        "{before} {after} {tear:?}: {found:?}"
+                    );
+                    // And it can be stored again.
+                    store.keep_config(&config(101.0)).unwrap();
+                    assert_eq!(store.config(), Some(config(101.0)));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_bit_that_rots_costs_that_record_alone() {
+        let mut store = open(Cells::new(), None, Tear::Untouched);
+        store.keep_config(&config(1.0)).unwrap();
+        store.keep_config(&config(2.0)).unwrap();
+        let mut cells = store.into_flash().into_cells();
+        cells.bytes_mut()[4096 + CONFIG_BYTES + 9] ^= 4;
+        let mut store = open(cells, None, Tear::Untouched);
+        assert_eq!(store.config(), Some(config(1.0)));
+        store.keep_config(&config(3.0)).unwrap();
+        assert_eq!(store.config(), Some(config(3.0)));
+    }
+}

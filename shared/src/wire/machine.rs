@@ -1,0 +1,50 @@
+//! The machine's limits as they are stored and said.
+use serde::{Deserialize, Serialize};
+
+/// Limits of the machine. SI, single precision.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MachineConfig {
+    /// Largest feed, m/s.
+    pub feed_m_s: f32,
+    /// Largest acceleration along the path, m/s².
+    pub acceleration_m_s2: f32,
+    /// Largest jerk along the path, m/s³.
+    pub jerk_m_s3: f32,
+    /// Feed of the way to a circle, m/s.
+    pub positioning_m_s: f32,
+    /// Largest offset of the correction on an axis, m.
+    pub offset_m: f32,
+    /// Its largest rate of change, m/s.
+    pub slew_m_s: f32,
+    /// Distance of the set-points that streams are differentiated with, s.
+    pub stream_window_s: f32,
+    /// Soft limits by axis, least and most, nm.
+    pub soft_nm: [[i32; 2]; 3],
+    /// Correct although the ticks are not counted by a crystal.
+    pub internal_clock: bool,
+}
+
+/// A number of the configuration by its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+#[allow(
+    missing_docs,
+    reason = "the message of each variant is its documentation"
+)]
+pub enum ConfigField {
+    #[error("feed")]
+    Feed,
+    #[error("acceleration")]
+    Acceleration,
+    #[error("jerk")]
+    Jerk,
+    #[error("positioning feed")]
+    Positioning,
+    #[error("offset")]
+    Offset,
+    #[error("rate of the offset")]
+    Slew,
+    #[error("window of streams")]
+    Window,
+    #[error("soft limits")]
+    Soft,
+}

@@ -1,0 +1,250 @@
+//! What a machine leaves of a contour: the moves of a program through a plant whose laws are not the host's.
+use super::grbl::{self, Move};
+use crate::machine::linear::{Average, Lag, SecondOrder};
+
+/// One axis of the plant, the same for all.
+#[derive(Clone, Copy, Debug)]
+pub enum Plant {
+    /// 1/(1 + sτ).
+    Lag(f64),
+    /// A lag behind a moving average.
+    LagAverage(f64, f64),
+    /// ωn, ζ.
+    SecondOrder(f64, f64),
+}
+
+/// Time step, s.
+const STEP_S: f64 = 2.5e-4;
+/// Acceleration along the path, mm/s².
+const ACCELERATION: f64 = 5000.0;
+/// A corner sharper than this is a stop, as a cosine.
+const TANGENT: f64 = 0.998;
+
+/// Deviation of a machine from a contour, µm, positive to the left of travel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Deviation {
+    /// Farthest to the left.
+    pub left_um: f64,
+    /// Farthest to the right, as a positive number.
+    pub right_um: f64,
+}
+
+impl Deviation {
+    /// The farthest to either side.
+    pub fn most_um(self) -> f64 {
+        self.left_um.max(self.right_um)
+    }
+}
+
+/// A stretch in a plane, mm.
+#[derive(Clone, Copy, Debug)]
+struct Stretch {
+    from: [f64; 3],
+    to: [f64; 3],
+    arc: Option<Arc>,
+    axes: [usize; 3],
+    feed: f64,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Arc {
+    centre: [f64; 2],
+    angle: f64,
+}
+
+impl Stretch {
+    fn flat(&self, p: [f64; 3]) -> [f64; 2] {
+        [p[self.axes[0]], p[self.axes[1]]]
+    }
+
+    fn length(&self) -> f64 {
+        let climb = self.to[self.axes[2]] - self.from[self.axes[2]];
+        let [a, b] = [self.flat(self.from), self.flat(self.to)];
+        let along = match self.arc {
+            Some(arc) => (a[0] - arc.centre[0]).hypot(a[1] - arc.centre[1]) * arc.angle.abs(),
+            None => (b[0] - a[0]).hypot(b[1] - a[1]),
+        };
+        along.hypot(climb)
+    }
+
+    fn at(&self, share: f64) -> [f64; 3] {
+        let mut p = [0, 1, 2].map(|i| self.from[i] + share * (self.to[i] - self.from[i]));
+        if let Some(arc) = self.arc {
+            let a = self.flat(self.from);
+            let (sin, cos) = (share * arc.angle).sin_cos();
+            let r = [a[0] - arc.centre[0], a[1] - arc.centre[1]];
+            p[self.axes[0]] = arc.centre[0] + r[0] * cos - r[1] * sin;
+            p[self.axes[1]] = arc.centre[1] + r[0] * sin + r[1] * cos;
+        }
+        p
+    }
+
+    fn direction(&self, at_end: bool) -> [f64; 2] {
+        let (p, q) = if at_end {
+            (self.at(1.0 - 1e-6), self.at(1.0))
+        } else {
+            (self.at(0.0), self.at(1e-6))
+        };
+        let (p, q) = (self.flat(p), self.flat(q));
+        let n = (q[0] - p[0]).hypot(q[1] - p[1]).max(1e-300);
+        [(q[0] - p[0]) / n, (q[1] - p[1]) / n]
+    }
+
+    /// Distance of a point in the plane, mm, positive to the left; and whether its foot lies within the stretch.
+    fn distance(&self, p: [f64; 2]) -> (f64, bool) {
+        let [a, b] = [self.flat(self.from), self.flat(self.to)];
+        match self.arc {
+            Some(arc) => {
+                let v = [p[0] - arc.centre[0], p[1] - arc.centre[1]];
+                let r = [a[0] - arc.centre[0], a[1] - arc.centre[1]];
+                let side = arc.angle.signum();
+                let turned = (side * (v[1].atan2(v[0]) - r[1].atan2(r[0])))
+                    .rem_euclid(std::f64::consts::TAU);
+                let off = side * (r[0].hypot(r[1]) - v[0].hypot(v[1]));
+                (off, turned <= arc.angle.abs())
+            }
+            None => {
+                let d = [b[0] - a[0], b[1] - a[1]];
+                let l = d[0].hypot(d[1]);
+                let v = [p[0] - a[0], p[1] - a[1]];
+                let along = (v[0] * d[0] + v[1] * d[1]) / (l * l);
+                (
+                    (d[0] * v[1] - d[1] * v[0]) / l,
+                    (0.0..=1.0).contains(&along),
+                )
+            }
+        }
+    }
+}
+
+/// The parts of a program that are run without a stop.
+fn chains(program: &str) -> Vec<Vec<Stretch>> {
+    let (moves, refused) = grbl::read(program);
+    assert_eq!(refused, None, "{program}");
+    let mut chains: Vec<Vec<Stretch>> = vec![Vec::new()];
+    let mut at = [0.0; 3];
+    for m in moves {
+        let to = m.end.map(f64::from);
+        let stretch = stretch(at, to, &m);
+        at = to;
+        if m.rapid {
+            chains.push(Vec::new());
+            continue;
+        }
+        if stretch.length() < 1e-9 {
+            continue;
+        }
+        let last = chains.last().and_then(|c| c.last());
+        let corner = last.is_some_and(|l| {
+            let (a, b) = (l.direction(true), stretch.direction(false));
+            a[0] * b[0] + a[1] * b[1] < TANGENT
+        });
+        if corner {
+            chains.push(Vec::new());
+        }
+        chains.last_mut().expect("one is there").push(stretch);
+    }
+    chains.retain(|c| !c.is_empty());
+    chains
+}
+
+fn stretch(from: [f64; 3], to: [f64; 3], m: &Move) -> Stretch {
+    let arc = (m.angle_rad != 0.0).then(|| {
+        let centre = m.centre.map(f64::from);
+        let [a, b, _] = m.plane;
+        // The angle anew from these ends, which 32 bits have rounded.
+        let angle = |p: [f64; 3]| (p[b] - centre[1]).atan2(p[a] - centre[0]);
+        let raw = angle(to) - angle(from) - f64::from(m.angle_rad);
+        let turn = std::f64::consts::TAU;
+        Arc {
+            centre,
+            angle: f64::from(m.angle_rad) + (raw + 0.5 * turn).rem_euclid(turn) - 0.5 * turn,
+        }
+    });
+    Stretch {
+        from,
+        to,
+        arc,
+        axes: m.plane,
+        feed: f64::from(m.feed_mm_min) / 60.0,
+    }
+}
+
+/// Where the plant goes along a chain, from rest to rest.
+fn driven(plant: Plant, chain: &[Stretch]) -> Vec<[f64; 3]> {
+    let feed = chain[0].feed;
+    let total: f64 = chain.iter().map(Stretch::length).sum();
+    let ramp = feed / ACCELERATION;
+    let end = total / feed + ramp;
+    let way = |t: f64| match t {
+        t if t < ramp => 0.5 * ACCELERATION * t * t,
+        t if t < end - ramp => feed * (t - 0.5 * ramp),
+        t => total - 0.5 * ACCELERATION * (end - t).max(0.0).powi(2),
+    };
+    let place = |mut s: f64| {
+        for stretch in chain {
+            let length = stretch.length();
+            if s <= length {
+                return stretch.at(s / length);
+            }
+            s -= length;
+        }
+        chain[chain.len() - 1].at(1.0)
+    };
+    let start = chain[0].at(0.0);
+    let mut axes: Vec<Box<dyn FnMut(f64) -> f64>> = start.iter().map(|p| axis(plant, *p)).collect();
+    (0..((end + 0.6) / STEP_S) as usize)
+        .map(|k| {
+            let p = place(way(k as f64 * STEP_S));
+            [0, 1, 2].map(|i| axes[i](p[i]))
+        })
+        .collect()
+}
+
+fn axis(plant: Plant, at: f64) -> Box<dyn FnMut(f64) -> f64> {
+    match plant {
+        Plant::Lag(tau) => {
+            let mut lag = Lag::new(tau, 0.0, STEP_S, at);
+            Box::new(move |u| lag.step(u))
+        }
+        Plant::LagAverage(tau, window) => {
+            let mut lag = Lag::new(tau, 0.0, STEP_S, at);
+            let mut average = Average::new(window, STEP_S, at);
+            Box::new(move |u| lag.step(average.step(u)))
+        }
+        Plant::SecondOrder(omega, zeta) => {
+            let mut second = SecondOrder::new(omega, zeta, STEP_S, at);
+            Box::new(move |u| second.step(u))
+        }
+    }
+}
+
+/// What the plant leaves of each chain of `nominal` when it is driven by `program`.
+///
+/// # Panics
+/// The programs are not run in as many chains.
+pub fn deviations(plant: Plant, program: &str, nominal: &str) -> Vec<Deviation> {
+    let (driven_chains, meant) = (chains(program), chains(nominal));
+    assert_eq!(
+        driven_chains.len(),
+        meant.len(),
+        "another stop in\n{program}"
+    );
+    let one = |(chain, meant): (&Vec<Stretch>, &Vec<Stretch>)| {
+        let mut most = Deviation::default();
+        for p in driven(plant, chain) {
+            // The nearest stretch whose foot is its own; behind both ends of the chain nothing is measured.
+            let off = meant
+                .iter()
+                .map(|s| s.distance(s.flat(p)))
+                .filter(|(_, own)| *own)
+                .map(|(off, _)| off)
+                .min_by(|a, b| a.abs().total_cmp(&b.abs()))
+                .unwrap_or(0.0);
+            most.left_um = most.left_um.max(off * 1e3);
+            most.right_um = most.right_um.max(-off * 1e3);
+        }
+        most
+    };
+    driven_chains.iter().zip(&meant).map(one).collect()
+}
