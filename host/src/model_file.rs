@@ -164,11 +164,14 @@ impl ModelFile {
     }
 
     fn fault(&self) -> Option<Fault> {
-        self.servo.fault().or_else(|| self.valid.fault()).or_else(|| {
-            let delay_s = self.delay_s?;
-            let possible = (0.0..=LONGEST_DELAY_S).contains(&delay_s);
-            Fault::unless(possible, &["delay_s"], delay_s, "a delay of 0 to 1 s")
-        })
+        self.servo
+            .fault()
+            .or_else(|| self.valid.fault())
+            .or_else(|| {
+                let delay_s = self.delay_s?;
+                let possible = (0.0..=LONGEST_DELAY_S).contains(&delay_s);
+                Fault::unless(possible, &["delay_s"], delay_s, "a delay of 0 to 1 s")
+            })
     }
 }
 
@@ -331,7 +334,10 @@ phase_rad = 0.5
             "M.toml:24:9: `effect.value` is inf; expected 0 to 1000"
         );
         let delayed = refuse("\n[servo]", "delay_s = 7.5\n[servo]");
-        assert!(delayed.ends_with("`delay_s` is 7.5; expected a delay of 0 to 1 s"), "{delayed}");
+        assert!(
+            delayed.ends_with("`delay_s` is 7.5; expected a delay of 0 to 1 s"),
+            "{delayed}"
+        );
         assert!(
             refuse("pitch_mm = 10.0", "pitch_mm = nan")
                 .starts_with("M.toml:28:12: `effect.params.pitch_mm`")

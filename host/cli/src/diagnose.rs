@@ -90,8 +90,11 @@ fn nothing_real(path: &Path, d: &Diagnosis) -> Failure {
         (Some(_), true) => "nothing was found beside circles that do not shrink with speed: ",
         (Some(_), false) => "what was found does not foretell runs left out better than before: ",
     };
-    Failure::check(format_args!("{}: not written; {why}nothing can be called real", path.display()))
-        .help(&d.recommendation.words)
+    Failure::check(format_args!(
+        "{}: not written; {why}nothing can be called real",
+        path.display()
+    ))
+    .help(&d.recommendation.words)
 }
 
 /// The diagnosis as a person reads it.
@@ -170,7 +173,10 @@ fn show(name: &str, d: &Diagnosis, extended: Option<&Path>, out: &Output) {
         out.say(format_args!("Note: {note}."));
     }
     for run in &d.left_out {
-        out.say(format_args!("Left out: {}: {} (`--keep-all` keeps it).", run.file, run.reason));
+        out.say(format_args!(
+            "Left out: {}: {} (`--keep-all` keeps it).",
+            run.file, run.reason
+        ));
     }
     for missing in &d.cannot_tell {
         out.say(format_args!("Cannot tell: {missing}."));
@@ -215,7 +221,10 @@ fn recommendation(d: &Diagnosis, extended: Option<&Path>) -> String {
     let words = &d.recommendation.words;
     match extended.filter(|_| d.model_written) {
         Some(path) => words
-            .replace("write the extended model with -o EXTENDED.toml and flash it", "flash it")
+            .replace(
+                "write the extended model with -o EXTENDED.toml and flash it",
+                "flash it",
+            )
             .replace("EXTENDED.toml", &quoted(path)),
         None => words.clone(),
     }

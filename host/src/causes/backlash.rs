@@ -55,7 +55,9 @@ impl CauseModel for Backlash {
     }
 
     fn tidy(&self, shape: &mut [f64]) {
-        shape.iter_mut().for_each(|play_m| *play_m = play_m.clamp(0.0, LARGEST_PLAY_M));
+        shape
+            .iter_mut()
+            .for_each(|play_m| *play_m = play_m.clamp(0.0, LARGEST_PLAY_M));
     }
 
     fn allows(&self, value_mm: f64) -> bool {

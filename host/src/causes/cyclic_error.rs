@@ -101,7 +101,9 @@ impl CauseModel for CyclicError {
     }
 
     fn tidy(&self, shape: &mut [f64]) {
-        shape.iter_mut().for_each(|pitch_m| *pitch_m = pitch_m.abs().clamp(PITCH_M[0], PITCH_M[1]));
+        shape
+            .iter_mut()
+            .for_each(|pitch_m| *pitch_m = pitch_m.abs().clamp(PITCH_M[0], PITCH_M[1]));
     }
 
     fn columns(&self) -> usize {

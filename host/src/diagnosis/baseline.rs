@@ -42,7 +42,9 @@ pub fn fit_lag(sizes: &[Size]) -> Response {
     let (with, without) = (cost(a_s2), cost(0.0));
     let significant = match FisherSnedecor::new(1.0, dof as f64) {
         // Sizes that are exact to the last digit leave nothing to divide by.
-        Ok(law) if with > 0.0 => (without - with) / with * dof as f64 > law.inverse_cdf(1.0 - FALSE_SERVO),
+        Ok(law) if with > 0.0 => {
+            (without - with) / with * dof as f64 > law.inverse_cdf(1.0 - FALSE_SERVO)
+        }
         Ok(_) => without > with,
         Err(_) => without > 0.0,
     };
@@ -57,12 +59,19 @@ fn radii_with_feeds(sizes: &[Size]) -> Vec<Vec<&Size>> {
     let same = |a: f64, b: f64| (a - b).abs() < 1e-6 * b.abs();
     let mut groups: Vec<Vec<&Size>> = Vec::new();
     for size in sizes {
-        match groups.iter_mut().find(|group| same(group[0].radius_m, size.radius_m)) {
+        match groups
+            .iter_mut()
+            .find(|group| same(group[0].radius_m, size.radius_m))
+        {
             Some(group) => group.push(size),
             None => groups.push(vec![size]),
         }
     }
-    groups.retain(|group| group.iter().any(|size| !same(size.omega_rad_s, group[0].omega_rad_s)));
+    groups.retain(|group| {
+        group
+            .iter()
+            .any(|size| !same(size.omega_rad_s, group[0].omega_rad_s))
+    });
     groups
 }
 
@@ -88,7 +97,11 @@ fn lowest(sizes: &[Size], groups: &[Vec<&Size>], cost: &dyn Fn(f64) -> f64) -> f
     let fastest = sizes.iter().map(|s| s.omega_rad_s).fold(0.0, f64::max);
     // A response that blows up within the measured range is no response.
     let least = -0.9 / fastest.powi(2).max(f64::MIN_POSITIVE);
-    let mut a = if down > 0.0 { (up / down).max(least) } else { 0.0 };
+    let mut a = if down > 0.0 {
+        (up / down).max(least)
+    } else {
+        0.0
+    };
     let mut step = (0.2 * a.abs()).max(1e-9);
     for _ in 0..60 {
         let (low, mid, high) = (cost(a - step), cost(a), cost(a + step));
@@ -139,8 +152,13 @@ mod tests {
                     (1..6).map(move |i| {
                         let omega_rad_s = 0.1 * f64::from(i) / radius_m;
                         let odd = f64::from((i * 7) % 3 - 1) * 0.5e-6;
-                        let error_m = radius_m * (response.gain(omega_rad_s) - 1.0) + offset_m + odd;
-                        Size { radius_m, omega_rad_s, error_m }
+                        let error_m =
+                            radius_m * (response.gain(omega_rad_s) - 1.0) + offset_m + odd;
+                        Size {
+                            radius_m,
+                            omega_rad_s,
+                            error_m,
+                        }
                     })
                 })
                 .collect()

@@ -73,7 +73,10 @@ impl Basis {
             let (column, earlier): (&mut [f64], &[f64]) = if k == 0 {
                 (first, &rest[..before.len() * samples])
             } else {
-                (&mut rest[..samples], &first[before.start * samples..before.end * samples])
+                (
+                    &mut rest[..samples],
+                    &first[before.start * samples..before.end * samples],
+                )
             };
             let length = dot(column, column).sqrt();
             let mut left = length;

@@ -53,12 +53,18 @@ pub struct Explanation {
 pub fn explain_all(survey: &Survey, start: &Start, told: Option<f64>) -> Explanation {
     let own_s = survey.lag(&start.response).tau_s;
     let first_from = Start {
-        more_lag_s: told.filter(|_| !survey.lag(&start.response).measured).map_or(0.0, |told| told - own_s),
+        more_lag_s: told
+            .filter(|_| !survey.lag(&start.response).measured)
+            .map_or(0.0, |told| told - own_s),
         ..*start
     };
     let first = explain(survey, &first_from);
     if first.lag.measured || told.is_some() || !has_place(&first) {
-        let delay = first.lag.measured.then(|| survey.inferred().then(|| of_lag(&first))).flatten();
+        let delay = first
+            .lag
+            .measured
+            .then(|| survey.inferred().then(|| of_lag(&first)))
+            .flatten();
         return Explanation {
             under: vec![(1.0, causes(&first))],
             open: !first.lag.measured && told.is_none() && has_place(&first),
@@ -67,12 +73,23 @@ pub fn explain_all(survey: &Survey, start: &Start, told: Option<f64>) -> Explana
         };
     }
     let further = FURTHER_S.par_iter().map(|further| {
-        explain(survey, &Start { more_lag_s: first_from.more_lag_s + further, ..*start })
+        explain(
+            survey,
+            &Start {
+                more_lag_s: first_from.more_lag_s + further,
+                ..*start
+            },
+        )
     });
-    let mut all: Vec<Explained> = std::iter::once(first).chain(further.collect::<Vec<_>>()).collect();
+    let mut all: Vec<Explained> = std::iter::once(first)
+        .chain(further.collect::<Vec<_>>())
+        .collect();
     let costs: Vec<f64> = all.iter().map(cost).collect();
     let least = costs.iter().copied().fold(f64::INFINITY, f64::min);
-    let weights: Vec<f64> = costs.iter().map(|cost| (-0.5 * (cost - least)).exp()).collect();
+    let weights: Vec<f64> = costs
+        .iter()
+        .map(|cost| (-0.5 * (cost - least)).exp())
+        .collect();
     let best = costs.iter().position(|cost| *cost == least).unwrap_or(0);
     let tau_s = all[best].lag.tau_s;
     let elsewhere: f64 = all
@@ -81,17 +98,32 @@ pub fn explain_all(survey: &Survey, start: &Start, told: Option<f64>) -> Explana
         .filter(|(found, _)| (found.lag.tau_s - tau_s).abs() > SAME_S)
         .map(|(_, weight)| weight)
         .sum();
-    let under = all.iter().zip(&weights).map(|(found, weight)| (*weight, causes(found))).collect();
+    let under = all
+        .iter()
+        .zip(&weights)
+        .map(|(found, weight)| (*weight, causes(found)))
+        .collect();
     let found = all.swap_remove(best);
     let delay = tangent::lag_se_s(&found)
         .filter(|se_s| *se_s < KNOWN_S && elsewhere < LEFT_TO_OTHERS && has_place(&found))
-        .map(|se_s| Delay { value: tau_s, ci95: [tau_s - 1.96 * se_s, tau_s + 1.96 * se_s] });
-    Explanation { open: delay.is_none() && has_place(&found), found, under, delay }
+        .map(|se_s| Delay {
+            value: tau_s,
+            ci95: [tau_s - 1.96 * se_s, tau_s + 1.96 * se_s],
+        });
+    Explanation {
+        open: delay.is_none() && has_place(&found),
+        found,
+        under,
+        delay,
+    }
 }
 
 fn of_lag(found: &Explained) -> Delay {
     let (value, half) = (found.lag.tau_s, 1.96 * found.lag.se_s);
-    Delay { value, ci95: [value - half, value + half] }
+    Delay {
+        value,
+        ci95: [value - half, value + half],
+    }
 }
 
 fn causes(found: &Explained) -> Vec<(Cause, Site)> {
@@ -111,7 +143,11 @@ fn item_has_place(found: &Explained, item: usize) -> bool {
     found.items[item].columns.iter().any(|&column| {
         let column = found.ledger.column(column);
         let outside = found.runs.iter().any(|run| !column.outside(run).is_empty());
-        outside || column.low().iter().any(|low| low[3..].iter().any(|x| x.abs() > 1e-12))
+        outside
+            || column
+                .low()
+                .iter()
+                .any(|low| low[3..].iter().any(|x| x.abs() > 1e-12))
     })
 }
 
@@ -123,8 +159,16 @@ fn cost(found: &Explained) -> f64 {
     let noise_m2 = found.spread.sample_m2;
     let mut cost = 0.0;
     for order in (0..=ORDERS).filter(|order| *order != 1) {
-        let columns: Vec<usize> = if order == 0 { vec![0] } else { vec![2 * order - 1, 2 * order] };
-        let sum: f64 = left.low().iter().flat_map(|low| columns.iter().map(|k| low[*k] * low[*k])).sum();
+        let columns: Vec<usize> = if order == 0 {
+            vec![0]
+        } else {
+            vec![2 * order - 1, 2 * order]
+        };
+        let sum: f64 = left
+            .low()
+            .iter()
+            .flat_map(|low| columns.iter().map(|k| low[*k] * low[*k]))
+            .sum();
         let n = runs * columns.len() as f64;
         cost += n * (sum / n).max(noise_m2).ln();
     }
@@ -136,7 +180,11 @@ fn cost(found: &Explained) -> f64 {
     let samples = left.all_samples(&found.runs);
     let colour = orders::colour(&found.runs, &samples, spread::sample_noise_m2(&samples));
     cost += count / colour * (sum / count.max(1.0)).max(f64::MIN_POSITIVE).ln();
-    cost + found.chosen.iter().map(|&item| found.items[item].price).sum::<f64>()
+    cost + found
+        .chosen
+        .iter()
+        .map(|&item| found.items[item].price)
+        .sum::<f64>()
 }
 
 impl Explanation {
@@ -146,7 +194,11 @@ impl Explanation {
         let with: f64 = self
             .under
             .iter()
-            .filter(|(_, causes)| causes.iter().any(|c| c.0 == cause && site.is_none_or(|site| c.1 == site)))
+            .filter(|(_, causes)| {
+                causes
+                    .iter()
+                    .any(|c| c.0 == cause && site.is_none_or(|site| c.1 == site))
+            })
             .map(|(weight, _)| weight)
             .sum();
         with / whole.max(f64::MIN_POSITIVE)
@@ -159,7 +211,13 @@ impl Explanation {
                 matches!(self.found.items[item].kind, Kind::Cause { cause, .. } if cause == finding.cause)
             });
             if known && self.under.len() > 1 {
-                finding.probability *= self.share_of(finding.cause, finding.axis.and(finding.effects.first()).map(|effect| effect.site()));
+                finding.probability *= self.share_of(
+                    finding.cause,
+                    finding
+                        .axis
+                        .and(finding.effects.first())
+                        .map(|effect| effect.site()),
+                );
             }
             let placed = self.found.chosen.iter().any(|&item| {
                 matches!(self.found.items[item].kind, Kind::Cause { cause, .. } if cause == finding.cause)

@@ -330,7 +330,10 @@ fn enter(found: &mut Explained, start: &Start, kinds: &[Kind]) {
 
 /// Whether the rates of turn can tell f⁴/R³ from f²/R and a static error of each radius: two more rates than radii.
 fn shows_fourth_order(views: &[RunView]) -> bool {
-    let mut circles: Vec<[f64; 2]> = views.iter().map(|view| [view.radius_m, view.omega_rad_s]).collect();
+    let mut circles: Vec<[f64; 2]> = views
+        .iter()
+        .map(|view| [view.radius_m, view.omega_rad_s])
+        .collect();
     circles.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     let same = |a: f64, b: f64| (a - b).abs() < 0.02 * b.abs();
     circles.dedup_by(|a, b| same(a[0], b[0]) && same(a[1], b[1]));
@@ -345,14 +348,24 @@ fn bar_impossible(found: &mut Explained, weights: &[f64], barred: &mut Vec<usize
         refit(found, weights);
         let columns = columns_of(&found.nuisance, &found.items, &found.chosen);
         let amount = |item: usize| {
-            let at = columns.iter().position(|column| *column == found.items[item].columns[0]);
-            at.and_then(|at| found.solution.coefficients.get(at)).copied().unwrap_or(0.0)
+            let at = columns
+                .iter()
+                .position(|column| *column == found.items[item].columns[0]);
+            at.and_then(|at| found.solution.coefficients.get(at))
+                .copied()
+                .unwrap_or(0.0)
         };
-        let impossible = found.chosen.iter().copied().find(|&item| match &found.items[item].kind {
-            // A phase takes the sign of an amplitude.
-            Kind::Cause { cause, .. } => cause.model().columns() == 1 && !cause.model().allows(amount(item)),
-            Kind::Pattern(_) => false,
-        });
+        let impossible = found
+            .chosen
+            .iter()
+            .copied()
+            .find(|&item| match &found.items[item].kind {
+                // A phase takes the sign of an amplitude.
+                Kind::Cause { cause, .. } => {
+                    cause.model().columns() == 1 && !cause.model().allows(amount(item))
+                }
+                Kind::Pattern(_) => false,
+            });
         let Some(item) = impossible else { break };
         found.chosen.retain(|&other| other != item);
         barred.push(item);

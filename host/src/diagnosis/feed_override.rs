@@ -23,7 +23,9 @@ pub fn find(campaign: &Campaign) -> Option<f64> {
     }
     ratios.sort_by(f64::total_cmp);
     let middle = ratios[ratios.len() / 2];
-    let agree = ratios.iter().filter(|ratio| (*ratio / middle - 1.0).abs() < TOLERANCE);
+    let agree = ratios
+        .iter()
+        .filter(|ratio| (*ratio / middle - 1.0).abs() < TOLERANCE);
     let common = agree.count() as f64 >= MOST * ratios.len() as f64;
     (common && (middle - 1.0).abs() > CLOCK).then_some(middle)
 }

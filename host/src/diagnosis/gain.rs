@@ -104,7 +104,9 @@ fn fitted(found: &Explained, weights: &[f64], set: &[usize]) -> Option<(Response
     }
     // A servo is claimed only where the circles show one: beside f⁴/R³ it is what that needs.
     let alone = found.nuisance.len() == 1 && !set.iter().any(|&item| is_fourth_order(found, item));
-    let own = columns.iter().position(|column| *column == found.nuisance[0]);
+    let own = columns
+        .iter()
+        .position(|column| *column == found.nuisance[0]);
     if let (true, Some(own)) = (alone, own)
         && response.a_s2.abs() < CLEAR * solution.covariance[(own, own)].sqrt()
     {
@@ -137,7 +139,11 @@ fn fitted(found: &Explained, weights: &[f64], set: &[usize]) -> Option<(Response
         ));
     }
     effects.extend(found.teeth.iter().filter_map(super::verdict::teeth_effect));
-    let fastest = found.runs.iter().map(|run| run.view.omega_rad_s).fold(0.0, f64::max);
+    let fastest = found
+        .runs
+        .iter()
+        .map(|run| run.view.omega_rad_s)
+        .fold(0.0, f64::max);
     let (w2, a, b) = (fastest * fastest, response.a_s2, response.b_s4);
     // A response that would blow up within the measured range is no response.
     if 1.0 + a * w2 + b * w2 * w2 < 0.1 {
@@ -150,7 +156,13 @@ fn fitted(found: &Explained, weights: &[f64], set: &[usize]) -> Option<(Response
 const CLEAR: f64 = 3.0;
 
 fn is_fourth_order(found: &Explained, item: usize) -> bool {
-    matches!(found.items[item].kind, Kind::Cause { cause: Cause::HigherOrderDynamics, .. })
+    matches!(
+        found.items[item].kind,
+        Kind::Cause {
+            cause: Cause::HigherOrderDynamics,
+            ..
+        }
+    )
 }
 
 /// Measures the gain. `start` is the baseline if a model was given; else kv is fitted in each fold.
@@ -161,7 +173,11 @@ pub fn measure(
     clamp: Option<Clamp>,
     seed: u64,
 ) -> Gain {
-    let circles: Vec<[f64; 2]> = campaign.runs.iter().map(|run| [run.radius_m, run.feed_m_s]).collect();
+    let circles: Vec<[f64; 2]> = campaign
+        .runs
+        .iter()
+        .map(|run| [run.radius_m, run.feed_m_s])
+        .collect();
     let [radii, feeds] = veto::folds(&circles);
     let count = [radii.len(), feeds.len()];
     let folds = [radii, feeds].concat();
@@ -252,8 +268,7 @@ fn fold(
     let baseline = given
         .cloned()
         .unwrap_or_else(|| machine(&lag_only, &[], None));
-    let nothing_new =
-        clamp.is_none() && found.teeth.is_empty() && !found.stated().any(|_| true);
+    let nothing_new = clamp.is_none() && found.teeth.is_empty() && !found.stated().any(|_| true);
     let extended =
         fitted(found, &weights, set)
             .filter(|_| !nothing_new)
@@ -335,7 +350,11 @@ fn at_samples(machine: &Machine, test: &CircleTest, run: &Run) -> Vec<f64> {
     );
     let angle = |index: usize| {
         let [x, y] = turn.position_m[index];
-        if samples.angle_inferred { turn.angle_rad[index] } else { y.atan2(x) }
+        if samples.angle_inferred {
+            turn.angle_rad[index]
+        } else {
+            y.atan2(x)
+        }
     };
     let mut places: Vec<[f64; 2]> = (0..turn.deviation_m.len())
         .map(|index| [angle(index).rem_euclid(TAU), turn.deviation_m[index]])
@@ -345,12 +364,21 @@ fn at_samples(machine: &Machine, test: &CircleTest, run: &Run) -> Vec<f64> {
         let at = theta.rem_euclid(TAU);
         let next = places.partition_point(|place| place[0] <= at);
         let count = places.len();
-        let ([before, from], [after, to]) = (places[(next + count - 1) % count], places[next % count]);
+        let ([before, from], [after, to]) =
+            (places[(next + count - 1) % count], places[next % count]);
         let span = (after - before).rem_euclid(TAU);
-        let share = if span > 0.0 { (at - before).rem_euclid(TAU) / span } else { 0.0 };
+        let share = if span > 0.0 {
+            (at - before).rem_euclid(TAU) / span
+        } else {
+            0.0
+        };
         from + share.min(1.0) * (to - from)
     };
-    samples.angle_rad.iter().map(|theta| between(*theta)).collect()
+    samples
+        .angle_rad
+        .iter()
+        .map(|theta| between(*theta))
+        .collect()
 }
 
 /// β1, β2 by least squares on the sizes, β0 of each radius free where it was run at two speeds or more.
@@ -369,7 +397,8 @@ fn beta_of(sizes: &[Size]) -> [f64; 2] {
             .filter(|s| (s.radius_m - radius_m).abs() < 1e-9 * radius_m)
             .map(row)
             .collect();
-        let mean: [f64; 3] = std::array::from_fn(|k| own.iter().map(|row| row[k]).sum::<f64>() / own.len() as f64);
+        let mean: [f64; 3] =
+            std::array::from_fn(|k| own.iter().map(|row| row[k]).sum::<f64>() / own.len() as f64);
         for row in own {
             let [x, y, e]: [f64; 3] = std::array::from_fn(|k| row[k] - mean[k]);
             xx += x * x;

@@ -47,7 +47,9 @@ pub fn find(runs: &[Prepared], profiles: &[[f64; PLACES]], sizes: &[f64]) -> Opt
     }
     let laws = Laws::new(runs)?;
     let failed = failed_at(&laws, profiles);
-    by_profile(&failed).or_else(|| by_place(&failed)).or_else(|| by_size(&laws, sizes))
+    by_profile(&failed)
+        .or_else(|| by_place(&failed))
+        .or_else(|| by_size(&laws, sizes))
 }
 
 /// What each run fails at each place to be as the others foretell, m.
@@ -79,11 +81,16 @@ fn by_place(failed: &[[f64; PLACES]]) -> Option<Spoilt> {
     let floor = median(&mut scales.clone());
     let worst = |run: &[f64; PLACES]| {
         let by = |place: usize| run[place].abs() / scales[place].max(floor).max(f64::MIN_POSITIVE);
-        (0..PLACES).map(|place| (by(place), place)).fold((0.0, 0), |a, b| if b.0 > a.0 { b } else { a })
+        (0..PLACES)
+            .map(|place| (by(place), place))
+            .fold((0.0, 0), |a, b| if b.0 > a.0 { b } else { a })
     };
     let all: Vec<(f64, usize)> = failed.iter().map(worst).collect();
     let run = (0..all.len()).max_by(|a, b| all[*a].0.total_cmp(&all[*b].0))?;
-    let next = (0..all.len()).filter(|other| *other != run).map(|other| all[other].0).fold(0.0, f64::max);
+    let next = (0..all.len())
+        .filter(|other| *other != run)
+        .map(|other| all[other].0)
+        .fold(0.0, f64::max);
     let (ratio, place) = all[run];
     (ratio > OF_PLACE && ratio > OF_OTHERS * next).then(|| Spoilt {
         run,
@@ -94,9 +101,13 @@ fn by_place(failed: &[[f64; PLACES]]) -> Option<Spoilt> {
 }
 
 fn by_profile(failed: &[[f64; PLACES]]) -> Option<Spoilt> {
-    let energies: Vec<f64> = failed.iter().map(|run| run.iter().map(|x| x * x).sum()).collect();
+    let energies: Vec<f64> = failed
+        .iter()
+        .map(|run| run.iter().map(|x| x * x).sum())
+        .collect();
     let (run, ratio) = stands_out(&energies, OF_MEDIAN, OF_NEXT)?;
-    let place = (0..PLACES).max_by(|a, b| failed[run][*a].abs().total_cmp(&failed[run][*b].abs()))?;
+    let place =
+        (0..PLACES).max_by(|a, b| failed[run][*a].abs().total_cmp(&failed[run][*b].abs()))?;
     Some(Spoilt {
         run,
         ratio,
@@ -157,7 +168,10 @@ impl Laws {
             for _ in 0..2 {
                 for earlier in &columns {
                     let along: f64 = earlier.iter().zip(&column).map(|(a, b)| a * b).sum();
-                    column.iter_mut().zip(earlier).for_each(|(c, e)| *c -= along * e);
+                    column
+                        .iter_mut()
+                        .zip(earlier)
+                        .for_each(|(c, e)| *c -= along * e);
                 }
             }
             let left = norm(&column);
@@ -167,7 +181,12 @@ impl Laws {
             }
         }
         let left = (0..runs.len())
-            .map(|run| 1.0 - columns.iter().map(|column| column[run].powi(2)).sum::<f64>())
+            .map(|run| {
+                1.0 - columns
+                    .iter()
+                    .map(|column| column[run].powi(2))
+                    .sum::<f64>()
+            })
             .collect();
         let basis = DMatrix::from_fn(runs.len(), columns.len(), |i, j| columns[j][i]);
         Some(Self { basis, left })
@@ -211,12 +230,21 @@ mod tests {
 
     #[test]
     fn one_stands_out_only_if_it_is_alone() {
-        let mut energies: Vec<f64> = (0..20).map(|i| 1.0 + 0.1 * f64::from((i * 7) % 5)).collect();
+        let mut energies: Vec<f64> = (0..20)
+            .map(|i| 1.0 + 0.1 * f64::from((i * 7) % 5))
+            .collect();
         assert_eq!(stands_out(&energies, 9.0, 3.0), None);
         energies[4] = 40.0;
-        assert_eq!(stands_out(&energies, 9.0, 3.0).map(|found| found.0), Some(4));
+        assert_eq!(
+            stands_out(&energies, 9.0, 3.0).map(|found| found.0),
+            Some(4)
+        );
         energies[11] = 30.0;
-        assert_eq!(stands_out(&energies, 9.0, 3.0), None, "two are a kind of their own");
+        assert_eq!(
+            stands_out(&energies, 9.0, 3.0),
+            None,
+            "two are a kind of their own"
+        );
     }
 
     #[test]
@@ -226,7 +254,11 @@ mod tests {
             for (place, value) in run.iter_mut().enumerate() {
                 let scatter = ((i * 31 + place * 17) % 13) as f64 / 6.0 - 1.0;
                 // A step that no run foretells of another sits at place 5.
-                *value = if place == 5 { 20.0 * scatter } else { 0.5 * scatter };
+                *value = if place == 5 {
+                    20.0 * scatter
+                } else {
+                    0.5 * scatter
+                };
             }
         }
         assert_eq!(by_place(&failed), None);

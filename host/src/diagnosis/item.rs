@@ -140,7 +140,11 @@ mod tests {
     #[test]
     fn few_runs_ask_for_more() {
         assert_eq!(scarcity(USUAL_RUNS), 1.0);
-        assert_eq!(scarcity(500), 1.0, "many do not ask for less than was calibrated");
+        assert_eq!(
+            scarcity(500),
+            1.0,
+            "many do not ask for less than was calibrated"
+        );
         // t² for the 12 degrees of freedom of 18 runs against 52: by the tables of Student's t, 5.2² over 4.0².
         let few = scarcity(18);
         assert!((1.55..1.85).contains(&few), "{few}");

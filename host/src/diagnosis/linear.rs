@@ -164,7 +164,11 @@ pub fn residual_variance(columns: &[Vec<f64>], values: &[f64]) -> f64 {
 /// What the columns make of `values` by least squares.
 pub fn fitted_values(columns: &[Vec<f64>], values: &[f64]) -> Vec<f64> {
     let (left, _) = left_of(columns, values);
-    values.iter().zip(&left).map(|(value, left)| value - left).collect()
+    values
+        .iter()
+        .zip(&left)
+        .map(|(value, left)| value - left)
+        .collect()
 }
 
 /// What the columns leave of `values`, by Gram–Schmidt, and how many of them are independent.

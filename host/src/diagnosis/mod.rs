@@ -197,16 +197,37 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
         Durations::Clamped(clamp) if !knows_clamp(&baseline.known) => Some(clamp),
         _ => None,
     };
-    let ground = Footing::of(&session.campaign, &durations, baseline.start.repeatability_m);
+    let ground = Footing::of(
+        &session.campaign,
+        &durations,
+        baseline.start.repeatability_m,
+    );
     let mut explanation = explain_all(&survey, &baseline.start, baseline.delay_s);
     let ties = verdict::ties(&explanation.found);
     explanation.found.tied = ties.iter().map(|(item, _)| *item).collect();
-    let proof = prove(&seen, &mut explanation.found, &baseline, clamp, &ground, options.seed);
+    let proof = prove(
+        &seen,
+        &mut explanation.found,
+        &baseline,
+        clamp,
+        &ground,
+        options.seed,
+    );
     let found = &explanation.found;
-    let stated = state(&explanation, &session.campaign, clamp, &durations, &ground, proof.as_ref());
+    let stated = state(
+        &explanation,
+        &session.campaign,
+        clamp,
+        &durations,
+        &ground,
+        proof.as_ref(),
+    );
     let mut cannot_tell = ground.cannot_tell;
     cannot_tell.extend(explanation.words());
-    cannot_tell.extend(ties.iter().map(|(item, other)| tie_words(found, *item, *other)));
+    cannot_tell.extend(
+        ties.iter()
+            .map(|(item, other)| tie_words(found, *item, *other)),
+    );
     let in_sample = misfit::rms_um(found);
     let (heldout_base, heldout_extended) = proof.as_ref().map_or((in_sample, in_sample), |gain| {
         (gain.baseline_rms_um, gain.extended_rms_um)
@@ -221,7 +242,9 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
     let delay_s = survey.inferred().then_some(found.lag.tau_s.max(0.0));
     let model = gain::extended_model(&session.campaign, found, effects, delay_s);
     let mut picture = picture::draw(&session.campaign, &seen, found);
-    picture.iter_mut().for_each(|run| run.index = session.places[run.index]);
+    picture
+        .iter_mut()
+        .for_each(|run| run.index = session.places[run.index]);
     let mut diagnosis = Diagnosis {
         noise_um: found.spread.noise_m() * 1e6,
         spread_um: found.spread.order_m2[0].sqrt() * 1e6,
@@ -338,7 +361,11 @@ fn spoilt_of(campaign: &Campaign, survey: &Survey, options: &Options) -> Option<
 }
 
 fn sizes(campaign: &Campaign, feed_m_s: impl Fn(&crate::campaign::Run) -> f64) -> Vec<Size> {
-    campaign.runs.iter().map(|run| Size::of(run, feed_m_s(run))).collect()
+    campaign
+        .runs
+        .iter()
+        .map(|run| Size::of(run, feed_m_s(run)))
+        .collect()
 }
 
 /// The simulation as it stands.
@@ -443,7 +470,8 @@ fn prove(
         return None;
     }
     veto::apply(found);
-    let measure = |found: &Explained| gain::measure(seen, found, baseline.given.as_ref(), clamp, seed);
+    let measure =
+        |found: &Explained| gain::measure(seen, found, baseline.given.as_ref(), clamp, seed);
     let mut gain = measure(found);
     // The simulation in the time domain has the last word, where the closed forms were too sure.
     while gain.percent < 0.0 {
@@ -499,7 +527,10 @@ fn state(
             unexplained: Unexplained::default(),
         };
     }
-    let mut findings = verdict::findings(found, clamp.map(|clamp| (clamp, clamp_energy_m2(campaign, found))));
+    let mut findings = verdict::findings(
+        found,
+        clamp.map(|clamp| (clamp, clamp_energy_m2(campaign, found))),
+    );
     explanation.doubt(&mut findings);
     status::settle(
         &mut findings,
@@ -508,7 +539,9 @@ fn state(
             proven: proof.is_some_and(|gain| gain.ci95_percent[0] > 0.0),
         },
     );
-    findings.retain(|finding| finding.probability > status::TIE && finding.cause.model().allows(finding.estimate.value));
+    findings.retain(|finding| {
+        finding.probability > status::TIE && finding.cause.model().allows(finding.estimate.value)
+    });
     let unexplained = if footing.measured_scatter {
         let mut unexplained = unexplained::describe(found, durations);
         omnibus::report(&mut unexplained, &omnibus::test(found));
@@ -516,7 +549,10 @@ fn state(
     } else {
         Unexplained::default()
     };
-    Stated { findings, unexplained }
+    Stated {
+        findings,
+        unexplained,
+    }
 }
 
 /// What the slower feed of a clamp explains, m².

@@ -72,7 +72,10 @@ pub fn test(found: &Explained) -> Vec<Leftover> {
         })
         .collect();
     let mut out = Vec::new();
-    let whole: Vec<&Left> = all.iter().filter(|run| !run.waves.of_order.is_empty()).collect();
+    let whole: Vec<&Left> = all
+        .iter()
+        .filter(|run| !run.waves.of_order.is_empty())
+        .collect();
     if whole.len() >= FEWEST_RUNS {
         out.extend(by_order(found, &whole));
     }
@@ -116,7 +119,10 @@ fn growth(whole: &[&Left], own: usize) -> Vec<f64> {
             .map(|run| square(run.waves.of_order.get(order)).max(1e-30).ln())
             .collect();
         let middle = median(&mut logs.clone());
-        levels.iter_mut().zip(&logs).for_each(|(level, log)| *level += (log - middle) / orders.len() as f64);
+        levels
+            .iter_mut()
+            .zip(&logs)
+            .for_each(|(level, log)| *level += (log - middle) / orders.len() as f64);
     }
     let columns: [Vec<f64>; 3] = [
         vec![1.0; whole.len()],
@@ -158,27 +164,52 @@ struct Hit {
 
 fn by_order(found: &Explained, whole: &[&Left]) -> Vec<Leftover> {
     let noise_m2 = found.spread.noise_m2;
-    let highest = whole.iter().map(|run| run.waves.of_order.len()).min().unwrap_or(0);
+    let highest = whole
+        .iter()
+        .map(|run| run.waves.of_order.len())
+        .min()
+        .unwrap_or(0);
     let turns = whole.iter().any(|run| run.lag_rad != 0.0);
     let senses: &[bool] = if turns { &[true, false] } else { &[true] };
-    let ways: &[bool] = if whole.iter().any(|run| run.sign != whole[0].sign) { &[false, true] } else { &[false] };
+    let ways: &[bool] = if whole.iter().any(|run| run.sign != whole[0].sign) {
+        &[false, true]
+    } else {
+        &[false]
+    };
     let mut hits: Vec<Hit> = Vec::new();
     for order in 2..highest {
         let low = order <= ORDERS;
-        let grown = if low { growth(whole, order) } else { Vec::new() };
+        let grown = if low {
+            growth(whole, order)
+        } else {
+            Vec::new()
+        };
         let levels: Vec<f64> = whole
             .iter()
             .enumerate()
-            .map(|(i, run)| if low { grown[i].exp() } else { level_beside(run, order, noise_m2) })
+            .map(|(i, run)| {
+                if low {
+                    grown[i].exp()
+                } else {
+                    level_beside(run, order, noise_m2)
+                }
+            })
             .collect();
-        let orders = if low { ORDERS - 1 } else { highest.saturating_sub(ORDERS + 1).max(1) };
+        let orders = if low {
+            ORDERS - 1
+        } else {
+            highest.saturating_sub(ORDERS + 1).max(1)
+        };
         let tests = orders as f64 * senses.len() as f64 * ways.len() as f64 * LAWS;
         for &machine in senses {
             for &odd in ways {
                 for a in EXPONENTS.0 {
                     for b in EXPONENTS.1 {
                         let hit = one(whole, &levels, order, odd, machine, (a, b));
-                        let hit = Hit { chance: hit.chance * tests, ..hit };
+                        let hit = Hit {
+                            chance: hit.chance * tests,
+                            ..hit
+                        };
                         if hit.chance < FALSE_ALARM && is_material(found, whole, &hit) {
                             hits.push(hit);
                         }
@@ -189,7 +220,12 @@ fn by_order(found: &Explained, whole: &[&Left]) -> Vec<Leftover> {
     }
     hits.sort_by(|a, b| a.chance.total_cmp(&b.chance));
     let mut seen: Vec<usize> = Vec::new();
-    hits.retain(|hit| !seen.contains(&hit.order) && { seen.push(hit.order); true });
+    hits.retain(|hit| {
+        !seen.contains(&hit.order) && {
+            seen.push(hit.order);
+            true
+        }
+    });
     hits.iter().map(leftover).collect()
 }
 
@@ -199,11 +235,22 @@ fn size(run: &Left, (a, b): (i32, i32), odd: bool) -> f64 {
 
 /// Explained part of an order under one law, against the levels; those of low orders are relative, and what is left of
 /// the order itself gives their scale.
-fn one(whole: &[&Left], levels: &[f64], order: usize, odd: bool, machine: bool, law: (i32, i32)) -> Hit {
+fn one(
+    whole: &[&Left],
+    levels: &[f64],
+    order: usize,
+    odd: bool,
+    machine: bool,
+    law: (i32, i32),
+) -> Hit {
     let (mut pull, mut own, mut total) = ([0.0; 2], 0.0, 0.0);
     for (run, level) in whole.iter().zip(levels) {
         let [re, im] = run.waves.of_order[order];
-        let turn = if machine { order as f64 * run.sign * run.lag_rad } else { 0.0 };
+        let turn = if machine {
+            order as f64 * run.sign * run.lag_rad
+        } else {
+            0.0
+        };
         let (sin, cos) = turn.sin_cos();
         let s = size(run, law, odd);
         pull[0] += s * (re * cos - im * sin) / level;
@@ -214,13 +261,18 @@ fn one(whole: &[&Left], levels: &[f64], order: usize, odd: bool, machine: bool, 
     let explained = (pull[0] * pull[0] + pull[1] * pull[1]) / own.max(f64::MIN_POSITIVE);
     let dof = whole.len() as f64 - 1.0;
     // Both parts of z: F(2, 2·dof), whose tail is in closed form.
-    let ratio = explained / (total - explained).max(1e-12 * total).max(f64::MIN_POSITIVE);
+    let ratio = explained
+        / (total - explained)
+            .max(1e-12 * total)
+            .max(f64::MIN_POSITIVE);
     let against_rest = (1.0 + ratio).powf(-dof);
     let chance = if order <= ORDERS {
         against_rest
     } else {
         // The levels are medians of few and scatter themselves.
-        (-explained / LEVELS_SCATTER).exp().max(against_rest.powf(SHARED))
+        (-explained / LEVELS_SCATTER)
+            .exp()
+            .max(against_rest.powf(SHARED))
     };
     let amount = pull[0].hypot(pull[1]) / own.max(f64::MIN_POSITIVE);
     let (mut energy, mut samples) = (0.0, 0.0);
@@ -228,7 +280,14 @@ fn one(whole: &[&Left], levels: &[f64], order: usize, odd: bool, machine: bool, 
         energy += 0.5 * run.samples * (amount * size(run, law, odd)).powi(2);
         samples += run.samples;
     }
-    Hit { order, odd, machine, law, chance, rms_m: (energy / samples).sqrt() }
+    Hit {
+        order,
+        odd,
+        machine,
+        law,
+        chance,
+        rms_m: (energy / samples).sqrt(),
+    }
 }
 
 /// By how much a sum of squares over levels that are medians of a dozen waves exceeds one over true levels.
@@ -238,21 +297,34 @@ const SHARED: f64 = 0.5;
 
 /// Whether it is of interest in the runs where it is loudest.
 fn is_material(found: &Explained, whole: &[&Left], hit: &Hit) -> bool {
-    let mut sizes: Vec<(f64, f64)> = whole.iter().map(|run| (size(run, hit.law, hit.odd).powi(2), run.form_m2)).collect();
+    let mut sizes: Vec<(f64, f64)> = whole
+        .iter()
+        .map(|run| (size(run, hit.law, hit.odd).powi(2), run.form_m2))
+        .collect();
     let mean = sizes.iter().map(|s| s.0).sum::<f64>() / sizes.len() as f64;
     sizes.sort_by(|a, b| b.0.total_cmp(&a.0));
     let loudest = &sizes[..(sizes.len() / 6).max(1)];
     let count = loudest.len() as f64;
-    let loud_m2 = hit.rms_m.powi(2) * loudest.iter().map(|s| s.0).sum::<f64>() / count / mean.max(f64::MIN_POSITIVE);
+    let loud_m2 = hit.rms_m.powi(2) * loudest.iter().map(|s| s.0).sum::<f64>()
+        / count
+        / mean.max(f64::MIN_POSITIVE);
     let form_m2 = loudest.iter().map(|s| s.1).sum::<f64>() / count;
     loud_m2 > OF_NOISE.powi(2) * found.spread.sample_m2 && loud_m2 > OF_FORM.powi(2) * form_m2
 }
 
 fn leftover(hit: &Hit) -> Leftover {
     let (a, b) = hit.law;
-    let ways = if hit.odd { "flips with the direction" } else { "the same both ways" };
+    let ways = if hit.odd {
+        "flips with the direction"
+    } else {
+        "the same both ways"
+    };
     let rms_um = hit.rms_m * 1e6;
-    let turning = if hit.machine { "" } else { ", by the clock rather than the machine's place" };
+    let turning = if hit.machine {
+        ""
+    } else {
+        ", by the clock rather than the machine's place"
+    };
     Leftover {
         signature: Signature {
             harmonic: Some(hit.order),
@@ -273,12 +345,20 @@ fn leftover(hit: &Hit) -> Leftover {
 /// Adds what the test has found to what the patterns say.
 pub fn report(unexplained: &mut super::finding::Unexplained, leftovers: &[Leftover]) {
     const MOST: usize = 4;
-    let Some(first) = leftovers.first() else { return };
+    let Some(first) = leftovers.first() else {
+        return;
+    };
     if !unexplained.present {
-        unexplained.signature = Signature { words: Vec::new(), ..first.signature.clone() };
+        unexplained.signature = Signature {
+            words: Vec::new(),
+            ..first.signature.clone()
+        };
     }
     unexplained.present = true;
-    let words = leftovers.iter().take(MOST).flat_map(|left| left.signature.words.clone());
+    let words = leftovers
+        .iter()
+        .take(MOST)
+        .flat_map(|left| left.signature.words.clone());
     unexplained.signature.words.extend(words);
     let squares: f64 = leftovers.iter().map(|left| left.rms_um.powi(2)).sum();
     unexplained.rms_um = unexplained.rms_um.hypot(squares.sqrt());

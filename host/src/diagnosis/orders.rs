@@ -34,12 +34,17 @@ pub fn resolved(run: &Prepared) -> usize {
 
 /// The waves of each run; `samples` holds what is left of it.
 pub fn waves(runs: &[Prepared], samples: &[Vec<f64>]) -> Vec<Waves> {
-    runs.par_iter().zip(samples).map(|(run, samples)| of_run(run, samples)).collect()
+    runs.par_iter()
+        .zip(samples)
+        .map(|(run, samples)| of_run(run, samples))
+        .collect()
 }
 
 fn of_run(run: &Prepared, samples: &[f64]) -> Waves {
     if !is_whole(run) {
-        return Waves { of_order: Vec::new() };
+        return Waves {
+            of_order: Vec::new(),
+        };
     }
     let highest = resolved(run);
     let mut sums = vec![[0.0; 2]; highest + 1];

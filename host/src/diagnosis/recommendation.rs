@@ -79,14 +79,20 @@ pub fn of(d: &Diagnosis) -> Recommendation {
     if !d.findings.iter().any(|f| f.compensable) {
         return say(
             Action::Adjust,
-            format!("{} ({:.1} µm rms of the circles' error, {:.0} % of the misfit)", first.remedy, first.rms_um, first.share_percent),
+            format!(
+                "{} ({:.1} µm rms of the circles' error, {:.0} % of the misfit)",
+                first.remedy, first.rms_um, first.share_percent
+            ),
             None,
         );
     }
     if !proven {
         return say(
             Action::Adjust,
-            format!("{}; the extended model is not proven on runs left out, so there is nothing to flash", first.remedy),
+            format!(
+                "{}; the extended model is not proven on runs left out, so there is nothing to flash",
+                first.remedy
+            ),
             None,
         );
     }
@@ -98,7 +104,9 @@ pub fn of(d: &Diagnosis) -> Recommendation {
     };
     say(
         Action::Flash,
-        format!("write the extended model with -o EXTENDED.toml and flash it: `giotto flash EXTENDED.toml --port PORT`{expected}"),
+        format!(
+            "write the extended model with -o EXTENDED.toml and flash it: `giotto flash EXTENDED.toml --port PORT`{expected}"
+        ),
         Some("giotto flash EXTENDED.toml --port PORT"),
     )
 }
@@ -137,8 +145,17 @@ mod tests {
             folds: [3, 4],
         };
         assert!(is_proven(&gain));
-        assert!(!is_proven(&Gain { ci95_percent: [-1.0, 60.0], ..gain.clone() }));
-        assert!(!is_proven(&Gain { beta_rms_um: 0.9, ..gain.clone() }));
-        assert!(!is_proven(&Gain { no_model_rms_um: 0.9, ..gain }));
+        assert!(!is_proven(&Gain {
+            ci95_percent: [-1.0, 60.0],
+            ..gain.clone()
+        }));
+        assert!(!is_proven(&Gain {
+            beta_rms_um: 0.9,
+            ..gain.clone()
+        }));
+        assert!(!is_proven(&Gain {
+            no_model_rms_um: 0.9,
+            ..gain
+        }));
     }
 }

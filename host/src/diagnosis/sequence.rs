@@ -19,10 +19,14 @@ pub fn test(found: &Explained, sizes_m: &[f64]) -> Vec<Leftover> {
     if sizes_m.len() < FEWEST_RUNS {
         return Vec::new();
     }
-    [swing(found, sizes_m, false), swing(found, sizes_m, true), of_a_radius(found, sizes_m)]
-        .into_iter()
-        .flatten()
-        .collect()
+    [
+        swing(found, sizes_m, false),
+        swing(found, sizes_m, true),
+        of_a_radius(found, sizes_m),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
 }
 
 /// Sizes on one scale, the far ones brought in.
@@ -31,7 +35,10 @@ fn calm(values: &[f64]) -> Vec<f64> {
     let mut off: Vec<f64> = values.iter().map(|value| (value - middle).abs()).collect();
     // The median of |N(0, σ)| is 0.6745σ.
     let most = LARGEST * median(&mut off) / 0.6745;
-    values.iter().map(|value| (value - middle).clamp(-most, most)).collect()
+    values
+        .iter()
+        .map(|value| (value - middle).clamp(-most, most))
+        .collect()
 }
 
 /// Degrees of freedom that the model of the sizes takes from what is left: one for each column fitted, at most.
@@ -42,8 +49,18 @@ fn taken(found: &Explained) -> f64 {
 /// A swing over the time of the campaign, of the size or of its share of the radius.
 fn swing(found: &Explained, sizes_m: &[f64], of_radius: bool) -> Option<Leftover> {
     let runs = &found.runs;
-    let scale = |index: usize| if of_radius { runs[index].view.radius_m / 0.15 } else { 1.0 };
-    let values: Vec<f64> = sizes_m.iter().enumerate().map(|(index, size)| size / scale(index)).collect();
+    let scale = |index: usize| {
+        if of_radius {
+            runs[index].view.radius_m / 0.15
+        } else {
+            1.0
+        }
+    };
+    let values: Vec<f64> = sizes_m
+        .iter()
+        .enumerate()
+        .map(|(index, size)| size / scale(index))
+        .collect();
     let values = calm(&values);
     let n = values.len();
     let dof = n as f64 - 3.0 - taken(found);
@@ -62,7 +79,11 @@ fn swing(found: &Explained, sizes_m: &[f64], of_radius: bool) -> Option<Leftover
                 (0..n).map(|index| turn(index).sin()).collect(),
             ];
             let fitted = linear::fitted_values(&columns, &values);
-            let left: f64 = values.iter().zip(&fitted).map(|(a, b)| (a - b).powi(2)).sum();
+            let left: f64 = values
+                .iter()
+                .zip(&fitted)
+                .map(|(a, b)| (a - b).powi(2))
+                .sum();
             (0.5 * half as f64, left)
         })
         .min_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -71,7 +92,13 @@ fn swing(found: &Explained, sizes_m: &[f64], of_radius: bool) -> Option<Leftover
     (chance < FALSE_ALARM && rms_m > OF_NOISE * found.spread.sample_m2.sqrt()).then(|| {
         let law = if of_radius { ", ∝ R" } else { "" };
         let when = format!("swings {cycles:.1} times over the campaign");
-        leftover(rms_m, chance, when.clone(), f64::from(u8::from(of_radius)), format!("the size {when}{law}"))
+        leftover(
+            rms_m,
+            chance,
+            when.clone(),
+            f64::from(u8::from(of_radius)),
+            format!("the size {when}{law}"),
+        )
     })
 }
 
@@ -88,8 +115,12 @@ fn of_a_radius(found: &Explained, sizes_m: &[f64]) -> Option<Leftover> {
     let mean = values.iter().sum::<f64>() / n;
     let total: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
     let of = |radius: f64| -> Vec<f64> {
-        let here = |index: &usize| (found.runs[*index].view.radius_m - radius).abs() < 1e-6 * radius;
-        (0..values.len()).filter(here).map(|index| values[index]).collect()
+        let here =
+            |index: &usize| (found.runs[*index].view.radius_m - radius).abs() < 1e-6 * radius;
+        (0..values.len())
+            .filter(here)
+            .map(|index| values[index])
+            .collect()
     };
     let between: f64 = radii
         .iter()
@@ -99,8 +130,12 @@ fn of_a_radius(found: &Explained, sizes_m: &[f64]) -> Option<Leftover> {
             own.len() as f64 * off * off
         })
         .sum();
-    let (k, dof) = ((radii.len() - 1) as f64, n - radii.len() as f64 - taken(found));
-    let f = between / k / ((total - between).max(1e-12 * total).max(f64::MIN_POSITIVE) / dof.max(1.0));
+    let (k, dof) = (
+        (radii.len() - 1) as f64,
+        n - radii.len() as f64 - taken(found),
+    );
+    let f =
+        between / k / ((total - between).max(1e-12 * total).max(f64::MIN_POSITIVE) / dof.max(1.0));
     let law = statrs::distribution::FisherSnedecor::new(k, dof.max(1.0)).ok()?;
     let chance = statrs::distribution::ContinuousCDF::sf(&law, f);
     let rms_m = (between / n).sqrt();
@@ -110,7 +145,13 @@ fn of_a_radius(found: &Explained, sizes_m: &[f64]) -> Option<Leftover> {
     })
 }
 
-fn leftover(rms_m: f64, chance: f64, when: String, radius_exponent: f64, words: String) -> Leftover {
+fn leftover(
+    rms_m: f64,
+    chance: f64,
+    when: String,
+    radius_exponent: f64,
+    words: String,
+) -> Leftover {
     let rms_um = rms_m * 1e6;
     Leftover {
         signature: Signature {
@@ -119,7 +160,9 @@ fn leftover(rms_m: f64, chance: f64, when: String, radius_exponent: f64, words: 
             feed_exponent: Some(0.0),
             radius_exponent: Some(radius_exponent),
             when: (!when.is_empty()).then_some(when),
-            words: vec![format!("{words} ({rms_um:.2} µm rms): chance {chance:.1e} by noise")],
+            words: vec![format!(
+                "{words} ({rms_um:.2} µm rms): chance {chance:.1e} by noise"
+            )],
             ..Signature::default()
         },
         rms_um,

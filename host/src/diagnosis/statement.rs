@@ -24,7 +24,8 @@ fn on(run: &Prepared, size_m: f64) -> Largest {
 }
 
 fn largest_of(all: impl Iterator<Item = Largest>) -> Largest {
-    all.max_by(|a, b| a.max.total_cmp(&b.max)).unwrap_or_default()
+    all.max_by(|a, b| a.max.total_cmp(&b.max))
+        .unwrap_or_default()
 }
 
 /// The largest deviation that a chosen explanation makes in the campaign.
@@ -60,7 +61,13 @@ pub fn of_slower_feed(found: &Explained) -> Largest {
 pub fn of_tone(found: &Explained, tone: &Tone) -> Largest {
     let acceleration = |run: &Prepared| run.view.feed_m_s.powi(2) / run.view.radius_m;
     let count = found.runs.len().max(1) as f64;
-    let rms = (found.runs.iter().map(|run| acceleration(run).powi(2)).sum::<f64>() / count).sqrt();
+    let rms = (found
+        .runs
+        .iter()
+        .map(|run| acceleration(run).powi(2))
+        .sum::<f64>()
+        / count)
+        .sqrt();
     largest_of(found.runs.iter().map(|run| {
         let share = match tone.amplitude {
             Amplitude::Constant => 1.0,
@@ -72,6 +79,9 @@ pub fn of_tone(found: &Explained, tone: &Tone) -> Largest {
 
 /// The height of teeth, on the slowest circle.
 pub fn of_teeth(found: &Explained, teeth: &Teeth) -> Largest {
-    let slowest = found.runs.iter().min_by(|a, b| a.view.feed_m_s.total_cmp(&b.view.feed_m_s));
+    let slowest = found
+        .runs
+        .iter()
+        .min_by(|a, b| a.view.feed_m_s.total_cmp(&b.view.feed_m_s));
     slowest.map_or_else(Largest::default, |run| on(run, teeth.height_m))
 }

@@ -96,7 +96,9 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
         let half = 2.0 * clamp.se_m_s2 * 1e3;
         let ci95 = [value - half, value + half];
         let effect = Effect::new(Cause::FeedClamp, Site::Machine, value, ci95, []);
-        let finding = effect.ok().map(|effect| plain(effect, HIGHEST, share(energy), rms(energy)));
+        let finding = effect
+            .ok()
+            .map(|effect| plain(effect, HIGHEST, share(energy), rms(energy)));
         out.extend(finding.map(|finding| Finding {
             effect_um: statement::of_slower_feed(found),
             ..finding
@@ -423,7 +425,9 @@ pub fn ties(found: &Explained) -> Vec<(usize, Cause)> {
             };
             let mut swapped = found.chosen.clone();
             swapped[at] = index;
-            other != cause && !found.chosen.contains(&index) && worth(&swapped).is_some_and(|worth| worth > best - EVEN)
+            other != cause
+                && !found.chosen.contains(&index)
+                && worth(&swapped).is_some_and(|worth| worth > best - EVEN)
         })?;
         match found.items[other].kind {
             Kind::Cause { cause, .. } => Some((own, cause)),

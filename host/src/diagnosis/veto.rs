@@ -98,7 +98,12 @@ pub fn apply(found: &mut Explained) -> Vec<usize> {
         let now = failed_m2(found, &folds, &found.chosen);
         let better = found
             .stated()
-            .map(|item| (failed_m2(found, &folds, &without(&found.chosen, item)), item))
+            .map(|item| {
+                (
+                    failed_m2(found, &folds, &without(&found.chosen, item)),
+                    item,
+                )
+            })
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .filter(|(failed, _)| *failed < now * (1.0 - ROUNDING));
         let Some((_, item)) = better else { break };
@@ -130,7 +135,14 @@ mod tests {
     #[test]
     fn runs_go_out_by_radius_and_by_feed() {
         let runs = [[0.1, 0.2], [0.1, 0.4], [0.3, 0.2]];
-        assert_eq!(folds(&runs), [vec![vec![0, 1], vec![2]], vec![vec![0, 2], vec![1]]]);
-        assert_eq!(folds(&runs[..2])[0], Vec::<Vec<usize>>::new(), "one radius cannot go out");
+        assert_eq!(
+            folds(&runs),
+            [vec![vec![0, 1], vec![2]], vec![vec![0, 2], vec![1]]]
+        );
+        assert_eq!(
+            folds(&runs[..2])[0],
+            Vec::<Vec<usize>>::new(),
+            "one radius cannot go out"
+        );
     }
 }
