@@ -69,6 +69,7 @@ fn measure(path: &Path) -> Result<(), Box<dyn Error>> {
             started_s: None,
             temperature_c: None,
             centre_m: None,
+            even_angles: false,
             plane: None,
             setup: None,
             machine: None,

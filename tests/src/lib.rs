@@ -1,7 +1,7 @@
 //! Machines and helpers for the cross-crate tests.
 //!
 //! [`machine`] and [`arm`] move in the time domain and share nothing with the simulation under test; [`effects`]
-//! hides known errors in it, scaled to a wanted misfit; [`files`] writes such campaigns with their truth;
+//! hides known errors in them, scaled to a wanted misfit; [`nuisance`] does what real campaigns suffer from; [`files`] writes such campaigns with their truth;
 //! [`command`] runs the real binary; [`study`] judges what `diagnose` makes of them. [`fuzz`] takes any bytes, [`noise`] makes
 //! them. [`nc`] makes up programs for machines and judges what `giotto compensate` makes of them.
 pub mod arm;

@@ -29,7 +29,7 @@ impl<'a> Interrupt<'a> {
         segments: &'a mut Segments,
         points: &'a mut Points,
     ) -> Option<Self> {
-        let (start, planned) = bench::planned(true, rise_m);
+        let (start, planned) = bench::planned(&bench::DEAREST, rise_m);
         let (mut segments_in, segments_out) = segments.split();
         let (points_in, points_out) = points.split();
         segments_in.enqueue(Job::Segment(planned?)).ok()?;

@@ -22,9 +22,35 @@ const CUMULANTS: Cumulants<f32> = Cumulants {
     kappa4_s4: -5.5265e-6,
 };
 
-/// Eight profile terms, the dearest there are for the tick: periodic errors and reversal pulses of all three slides, a bow,
-/// and one that goes with the rate (those that are linear cost the same for one as for all).
+/// Eight profile terms such as a diagnosis finds: all that is linear, play and reversal pulses of two slides, a periodic error.
 pub const TERMS: [Term<f32>; 8] = [
+    Term::Squareness {
+        plane: Plane::Zx,
+        shear_rad: 80e-6,
+    },
+    Term::ServoMismatch {
+        plane: Plane::Xy,
+        delta_tau_s: 100e-6,
+    },
+    Term::BandwidthMismatch {
+        plane: Plane::Yz,
+        delta_kappa2_s2: 5e-6,
+    },
+    Term::Backlash {
+        actuator: Actuator::X,
+        step_m: 10e-6,
+    },
+    Term::Backlash {
+        actuator: Actuator::Z,
+        step_m: 12e-6,
+    },
+    spike(Actuator::X, 8e-6),
+    spike(Actuator::Z, 6e-6),
+    cyclic(Actuator::Z, 2e-6),
+];
+
+/// The dearest eight for a tick: periodic errors and pulses of all slides, a bow, and one that goes with the rate.
+pub const DEAREST: [Term<f32>; 8] = [
     Term::ServoMismatch {
         plane: Plane::Zx,
         delta_tau_s: 100e-6,
@@ -59,12 +85,8 @@ const fn cyclic(actuator: Actuator, amplitude_m: f32) -> Term<f32> {
     }
 }
 
-fn table(extended: bool) -> Table {
-    let terms = if extended {
-        TERMS.iter().copied().collect()
-    } else {
-        heapless::Vec::new()
-    };
+fn table(terms: &[Term<f32>]) -> Table {
+    let terms = terms.iter().copied().collect();
     let zone = Zone {
         place_m: None,
         radius_m: [0.001, 1.0],
@@ -85,7 +107,7 @@ fn table(extended: bool) -> Table {
 }
 
 /// Where the arc of [`Arc`] starts, and its plan.
-pub(crate) fn planned(extended: bool, rise_m: f64) -> ([i32; 3], Option<Planned>) {
+pub(crate) fn planned(terms: &[Term<f32>], rise_m: f64) -> ([i32; 3], Option<Planned>) {
     let config = Config::robot(1000);
     let normal = [0.0, 0.5, 1.0];
     // cos and sin of −0.3 rad along two vectors of the plane: X, and the normal crossed with it.
@@ -104,7 +126,7 @@ pub(crate) fn planned(extended: bool, rise_m: f64) -> ([i32; 3], Option<Planned>
         feed_m_s: FEED_M_S,
     };
     let mut planned = Planned::default();
-    let done = planner.set_table(Some(&table(extended))).is_ok()
+    let done = planner.set_table(Some(&table(terms))).is_ok()
         && arc
             .exact(start)
             .is_ok_and(|exact| planner.segment(&exact, &mut planned).is_ok());
@@ -119,11 +141,11 @@ pub struct Arc {
 }
 
 impl Arc {
-    /// One and a half turns with the β model alone, or with [`TERMS`] as well. Each axis reverses at constant feed, and X
+    /// One and a half turns with the β model and these terms. Each axis reverses at constant feed, and X
     /// in the rising ramp too. With a rise (m) it is a helix.
-    pub fn new(extended: bool, rise_m: f64) -> Self {
+    pub fn new(terms: &[Term<f32>], rise_m: f64) -> Self {
         let mut queue = heapless::spsc::Queue::new();
-        let (start, planned) = planned(extended, rise_m);
+        let (start, planned) = planned(terms, rise_m);
         // Whether there is one is looked at in `sound`; the queue is empty.
         let _ = planned.map(|planned| queue.enqueue(planned));
         Self {
@@ -160,7 +182,7 @@ impl Streamed {
     /// At rest at the start; `None` if the configuration were wrong.
     pub fn new() -> Option<Self> {
         let mut planner = Planner::new(&Config::robot(1000), position(0));
-        planner.set_table(Some(&table(false))).ok()?;
+        planner.set_table(Some(&table(&[]))).ok()?;
         let plan = planner.stream(1.0, PLACES).ok()?;
         Some(Self {
             stream: Stream::new(&plan, position(0), 0, false),

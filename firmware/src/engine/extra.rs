@@ -85,8 +85,12 @@ impl Extra {
     /// Indicators of the sense of X, Y and Z.
     #[inline(always)]
     pub(crate) fn ahead_at(&self, c: i32, s: i32) -> [i32; 3] {
-        self.ahead
-            .map(|[by_c, by_s, always]| mulh_add(mulh_add(always, by_c, c), by_s, s))
+        let [[xc, xs, x], [yc, ys, y], [zc, zs, z]] = self.ahead;
+        [
+            mulh_add(mulh_add(x, xc, c), xs, s),
+            mulh_add(mulh_add(y, yc, c), ys, s),
+            mulh_add(mulh_add(z, zc, c), zs, s),
+        ]
     }
 
     /// Adds periodic errors at a position, and bow at a distance from the centre, nm.
@@ -105,11 +109,15 @@ impl Extra {
             cyclic.add(sincos, place, &mut offset);
         }
         if self.bowed {
-            for (arm, bow) in arm().iter().zip(&self.bow) {
-                let square = mulh(*arm, *arm).wrapping_mul(2);
-                for (offset, bow) in offset.iter_mut().zip(bow) {
-                    *offset = mulh_add(*offset, square, *bow);
-                }
+            let ([ax, ay, az], [bx, by, bz]) = (arm(), &self.bow);
+            for (arm, [x, y, z]) in [(ax, bx), (ay, by), (az, bz)] {
+                let square = mulh(arm, arm).wrapping_mul(2);
+                let [ox, oy, oz] = offset;
+                offset = [
+                    mulh_add(ox, square, *x),
+                    mulh_add(oy, square, *y),
+                    mulh_add(oz, square, *z),
+                ];
             }
         }
         offset
@@ -141,11 +149,11 @@ impl Linear {
     /// Offset on an arc in a ramp (`rate` and `rate2` are W and W² in Q31, `turning` w⁴ in Q31 with the sign of the ramp), nm.
     #[inline(always)]
     pub(crate) fn on_arc(&self, rate: i32, rate2: i32, turning: i32, c: i32, s: i32) -> i32 {
-        let at = |[k0, k1, k2, k3]: [i32; 4]| {
-            let slow = mulh_add(mulh(k1, rate), k2, rate2);
-            k0.wrapping_add(mulh_add(slow, k3, turning).wrapping_mul(2))
-        };
-        mulh_add(mulh(at(self.a), c), at(self.b), s)
+        let ([a0, a1, a2, a3], [b0, b1, b2, b3]) = (self.a, self.b);
+        let a = mulh_add(mulh_add(mulh(a1, rate), a2, rate2), a3, turning);
+        let b = mulh_add(mulh_add(mulh(b1, rate), b2, rate2), b3, turning);
+        let (a, b) = (a.wrapping_mul(2), b.wrapping_mul(2));
+        mulh_add(mulh(a0.wrapping_add(a), c), b0.wrapping_add(b), s)
     }
 
     /// Offset on a line, nm, without the constant.

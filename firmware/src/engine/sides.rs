@@ -18,8 +18,6 @@ pub(crate) struct Sides {
     side: [Side; 3],
     /// Offset of X, Y and Z by the sides and by what is constant, in [`FINE`] nm.
     base: [i32; 3],
-    /// The same when all sides are settled: X backward adds 1 to the place, Y backward 2, Z backward 4.
-    settled: [[i32; 3]; 8],
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -38,6 +36,8 @@ struct Side {
     /// What a turn adds per tick to the pulse, and to the offset of X, Y and Z, at w² = 1 (Q31).
     rise: i32,
     jump: [i32; 3],
+    /// Offset of X, Y and Z by this slide alone once it has turned.
+    settled: [i32; 3],
     /// The slide has moved: its sense is known.
     known: bool,
 }
@@ -47,8 +47,9 @@ impl Sides {
     /// the segment begins with.
     pub(crate) fn begin(&mut self, extra: &Extra, ahead: [i32; 3]) {
         let t = &extra.turning;
-        let by_slide = ahead.into_iter().zip(extra.ahead).zip(t.fade).zip(t.jump);
-        for (side, (((ahead, weights), fade), jump)) in self.side.iter_mut().zip(by_slide) {
+        let by_slide = ahead.into_iter().zip(extra.ahead).zip(t.fade);
+        let by_slide = by_slide.zip(t.jump.into_iter().zip(t.side));
+        for (side, (((ahead, weights), fade), (jump, by))) in self.side.iter_mut().zip(by_slide) {
             let moves = weights.iter().any(|nm| nm.unsigned_abs() > DEAD_NM as u32);
             if !side.known && moves {
                 (side.known, side.mask) = (true, if ahead >= 0 { 0 } else { -1 });
@@ -60,24 +61,32 @@ impl Sides {
             };
             side.fade = fade;
             side.jump = jump.map(|jump| jump ^ side.mask);
+            let sense = if side.known { sense(side.mask) } else { 0 };
+            side.settled = by.map(|by| mulh(by, sense));
         }
-        self.settled = [0, 1, 2, 3, 4, 5, 6, 7].map(|place: i32| {
-            let backward = |bit: i32| sense(if place & bit == 0 { 0 } else { -1 });
-            let senses = [backward(1), backward(2), backward(4)];
-            self.offset(extra, senses)
-        });
-        self.base = self.offset(extra, self.side.map(|side| side.sense(t.dx)));
-    }
-
-    /// Offset of X, Y and Z at these senses (Q31), as far as they are known.
-    fn offset(&self, extra: &Extra, senses: [i32; 3]) -> [i32; 3] {
-        let mut offset = extra.constant_fine;
-        for ((side, by), sense) in self.side.iter().zip(extra.turning.side).zip(senses) {
-            for (o, by) in offset.iter_mut().zip(by) {
-                *o = mulh_add(*o, by, if side.known { sense } else { 0 });
+        self.settle(extra);
+        for (side, by) in self.side.iter().zip(t.side) {
+            // Where the last segment ended in a turn, the offset stands between the sides.
+            if side.known && side.left != 0 {
+                let now = side.sense(t.dx);
+                for ((base, by), settled) in self.base.iter_mut().zip(by).zip(side.settled) {
+                    *base = mulh_add(base.wrapping_sub(settled), by, now);
+                }
             }
         }
-        offset
+    }
+
+    /// No slide turns any more: what rounding of the turns left is set right.
+    #[inline(always)]
+    fn settle(&mut self, extra: &Extra) {
+        let [x, y, z] = &self.side;
+        let ([cx, cy, cz], [xx, xy, xz]) = (extra.constant_fine, x.settled);
+        let ([yx, yy, yz], [zx, zy, zz]) = (y.settled, z.settled);
+        self.base = [
+            cx.wrapping_add(xx).wrapping_add(yx).wrapping_add(zx),
+            cy.wrapping_add(xy).wrapping_add(yy).wrapping_add(zy),
+            cz.wrapping_add(xz).wrapping_add(yz).wrapping_add(zz),
+        ];
     }
 
     /// Offset of X, Y and Z as it stands, nm.
@@ -99,8 +108,7 @@ impl Sides {
         ended |= y.tick(extra, 1, ahead_y, &mut self.base);
         ended |= z.tick(extra, 2, ahead_z, &mut self.base);
         if ended && (x.left | y.left | z.left) == 0 {
-            let place = (x.mask & 1) | (y.mask & 2) | (z.mask & 4);
-            self.base = self.settled[(place & 7) as usize];
+            self.settle(extra);
         }
         self.standing()
     }
@@ -128,7 +136,10 @@ impl Side {
         // The slide lags behind its new sense: the correction goes ahead with it. What is left of the last pulse goes.
         let height = t.spike[slide] ^ self.mask;
         self.rise = mulh(height.wrapping_sub(self.pulse), t.share_q30).wrapping_mul(4);
-        self.jump = t.jump[slide].map(|jump| jump ^ self.mask);
+        let [jx, jy, jz] = t.jump[slide];
+        self.jump = [jx ^ self.mask, jy ^ self.mask, jz ^ self.mask];
+        let [sx, sy, sz] = self.settled;
+        self.settled = [sx.wrapping_neg(), sy.wrapping_neg(), sz.wrapping_neg()];
         (self.left, self.x) = (t.ticks, t.first_x);
     }
 
@@ -139,9 +150,12 @@ impl Side {
         self.x = x.wrapping_add(dx);
         let w = mulh(x, x).wrapping_mul(2) ^ i32::MAX;
         let w2_q31 = mulh(w, w).wrapping_mul(2);
-        for (base, jump) in base.iter_mut().zip(self.jump) {
-            *base = mulh_add(*base, jump, w2_q31);
-        }
+        let ([bx, by, bz], [jx, jy, jz]) = (*base, self.jump);
+        *base = [
+            mulh_add(bx, jx, w2_q31),
+            mulh_add(by, jy, w2_q31),
+            mulh_add(bz, jz, w2_q31),
+        ];
         self.pulse = mulh_add(self.pulse, self.rise, w2_q31);
         self.left = self.left.wrapping_sub(1);
         self.left == 0

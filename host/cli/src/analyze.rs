@@ -172,6 +172,17 @@ fn show_runs(report: &Report, out: Output) {
     runs.show(out);
 }
 
+/// Pairs in order of radius and feed.
+fn by_circle(report: &Report) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..report.iso230_4.len()).collect();
+    let of = |at: usize| &report.iso230_4[at];
+    order.sort_by(|&a, &b| {
+        let by_radius = of(a).radius_m.total_cmp(&of(b).radius_m);
+        by_radius.then(of(a).feed_m_s.total_cmp(&of(b).feed_m_s))
+    });
+    order
+}
+
 /// The figures in order of radius and feed, with their expanded uncertainties.
 fn show_iso(report: &Report, budgets: &[Iso230Budget], out: Output) {
     out.say("ISO 230-4, µm, each with its expanded uncertainty (k = 2)");
@@ -182,14 +193,7 @@ fn show_iso(report: &Report, budgets: &[Iso230Budget], out: Output) {
         0,
         2,
     );
-    let mut order: Vec<usize> = (0..report.iso230_4.len()).collect();
-    let key = |at: &usize| (report.iso230_4[*at].radius_m, report.iso230_4[*at].feed_m_s);
-    order.sort_by(|a, b| {
-        key(a)
-            .partial_cmp(&key(b))
-            .unwrap_or(std::cmp::Ordering::Equal)
-    });
-    for at in order {
+    for at in by_circle(report) {
         let row = &report.iso230_4[at];
         let figures = tolerance::figures(row, &budgets[at]).map(|figure| {
             figure.map_or_else(
@@ -218,7 +222,8 @@ fn show_tolerance(report: &Report, budgets: &[Iso230Budget], tolerance_m: f64, o
         "R mm", "f mm/s", "G cw", "G ccw", "G(b)", "F max", "F min", "D",
     ];
     let mut grid = Grid::new(&header, 0, 2);
-    for (row, held) in report.iso230_4.iter().zip(&held) {
+    for at in by_circle(report) {
+        let (row, held) = (&report.iso230_4[at], &held[at]);
         let words = held.verdicts.map(|v| {
             match v {
                 Some(Verdict::Pass) => "pass",

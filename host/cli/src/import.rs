@@ -1,27 +1,38 @@
-//! `giotto import`: foreign measurements into a campaign.
+//! `giotto import`: foreign measurements into a campaign, one by one or a whole session.
 use super::choice::one_of;
 use super::source::{Foreign, Progress, tell};
 use super::{Failure, Output};
-use giotto::campaign::import::{self, Added, Laps, Options};
+use giotto::campaign::import::batch::{self, Said};
+use giotto::campaign::import::{self, Added, Laps, Options, Reason};
 use giotto::campaign::{Direction, Note};
 use serde::Serialize;
 use std::f64::consts::TAU;
-use std::path::PathBuf;
+use std::io::{BufRead, IsTerminal, Write};
+use std::path::{Path, PathBuf};
 
 /// Arguments of `giotto import`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// Files of measurements; each becomes a run.
-    #[arg(required = true)]
+    /// Files of measurements, or folders of them; each file becomes a run, one that goes both ways two.
+    #[arg(required_unless_present = "manifest")]
     files: Vec<PathBuf>,
     /// Directory of the campaign; made if missing.
     #[arg(short, long, value_name = "CAMPAIGN")]
     output: PathBuf,
+    /// What the names of the files say, as in '{radius}_{feed}_{direction}'; {} stands for anything.
+    #[arg(long, value_name = "PATTERN")]
+    name: Option<String>,
+    /// A CSV that lists files, with columns file, radius_mm, feed_mm_s, direction, plane, setup …
+    #[arg(long, value_name = "CSV")]
+    manifest: Option<PathBuf>,
     #[command(flatten)]
     foreign: Foreign,
     /// Laps that become runs.
     #[arg(long, value_parser = one_of(Laps::ALL), default_value = "first")]
     laps: Laps,
+    /// Set-up that the runs belong to; runs of one set-up share their centre offset.
+    #[arg(long, value_name = "NAME")]
+    setup: Option<String>,
     /// Start of the run since the campaign began.
     #[arg(long, value_name = "S")]
     started: Option<f64>,
@@ -36,7 +47,7 @@ pub struct Args {
     machine: Option<String>,
 }
 
-fn centre(text: &str) -> Result<[f64; 3], String> {
+pub(super) fn centre(text: &str) -> Result<[f64; 3], String> {
     let parts: Option<Vec<f64>> = text
         .split(',')
         .map(|p| p.trim().parse().ok().filter(|v: &f64| v.is_finite()))
@@ -48,29 +59,26 @@ fn centre(text: &str) -> Result<[f64; 3], String> {
 
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
-    let Some(options) = args.foreign.options() else {
-        let words = "radius and feed of the programmed circle are missing";
-        return Err(Failure::usage(words).help("add --radius MM --feed MM_S --direction ccw|cw"));
-    };
-    let options = Options {
-        started_s: args.started,
-        temperature_c: args.temperature,
-        centre_m: args.centre.map(|c| c.map(|mm| mm * 1e-3)),
-        machine: args.machine,
-        laps: args.laps,
-        ..options
-    };
-    let bar = Progress::new(out, &args.files);
-    let added = import::add(&args.files, &args.output, &options, &|path, bytes| {
-        bar.tell(path, bytes)
-    })?;
+    let jobs = jobs(&args, out)?;
+    let files: Vec<PathBuf> = jobs.iter().map(|(file, _)| file.clone()).collect();
+    let bar = Progress::new(out, &files);
+    let added = import::add_each(&jobs, &args.output, &|path, bytes| bar.tell(path, bytes))?;
     bar.done();
-    added.iter().for_each(|a| tell(a, &options, out));
+    let options = |a: &Added| {
+        jobs.iter()
+            .find(|(file, _)| *file == a.source)
+            .map(|(_, o)| o)
+    };
+    for a in &added {
+        if let Some(options) = options(a) {
+            tell(a, options, out);
+        }
+    }
     if out.json {
-        let runs = added.iter().map(|a| Entry::of(a, &options)).collect();
+        let entry = |a: &Added| options(a).map(|o| Entry::of(a, o));
         return out.document(&Document {
             campaign: args.output.display().to_string(),
-            runs,
+            runs: added.iter().filter_map(entry).collect(),
         });
     }
     let folder = args.output.display();
@@ -85,6 +93,93 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     }
     out.note(format_args!("next: giotto analyze {folder}"));
     Ok(())
+}
+
+/// The files with what is said of each, by the list, by their names, by the options, by who is asked.
+fn jobs(args: &Args, out: Output) -> Result<Vec<(PathBuf, Options)>, Failure> {
+    let mut files: Vec<(PathBuf, Said)> = match &args.manifest {
+        Some(list) => batch::by_list(list)?,
+        None => Vec::new(),
+    };
+    let given = batch::files(&args.files)?;
+    files.extend(given.into_iter().map(|file| (file, Said::default())));
+    let mut jobs = Vec::with_capacity(files.len());
+    let mut asked = Said::default();
+    for (file, mut said) in files {
+        if let Some(pattern) = &args.name {
+            let named = batch::by_name(pattern, &file)?;
+            said = Said {
+                radius_m: said.radius_m.or(named.radius_m),
+                feed_m_s: said.feed_m_s.or(named.feed_m_s),
+                direction: said.direction.or(named.direction),
+                start_angle_rad: said.start_angle_rad.or(named.start_angle_rad),
+                started_s: said.started_s.or(named.started_s),
+                temperature_c: said.temperature_c.or(named.temperature_c),
+                plane: said.plane.or(named.plane),
+                setup: said.setup.or(named.setup),
+            };
+        }
+        let mm = |m: f64| m * 1e3;
+        let radius = said.radius_m.map(mm).or(args.foreign.radius);
+        let feed = said.feed_m_s.map(mm).or(args.foreign.feed);
+        let mut need = |value: Option<f64>, what: &str, kept: fn(&mut Said) -> &mut Option<f64>| {
+            let before = *kept(&mut asked);
+            match value {
+                Some(value) => Ok(value),
+                None => ask(&file, what, before, out).inspect(|v| *kept(&mut asked) = Some(*v)),
+            }
+        };
+        let radius = need(radius, "radius in mm", |said| &mut said.radius_m)?;
+        let feed = need(feed, "feed in mm/s", |said| &mut said.feed_m_s)?;
+        let direction = said.direction.or(args.foreign.direction);
+        let options = Options {
+            started_s: args.started,
+            temperature_c: args.temperature,
+            centre_m: args.centre.map(|c| c.map(|mm| mm * 1e-3)),
+            setup: args.setup.clone(),
+            machine: args.machine.clone(),
+            laps: args.laps,
+            ..args.foreign.with(radius, feed, direction)
+        };
+        jobs.push((file, said.over(&options)));
+    }
+    Ok(jobs)
+}
+
+/// Asks on a terminal for what is missing, the last answer as the usual one; elsewhere it is a wrong usage.
+fn ask(file: &Path, what: &str, usual: Option<f64>, out: Output) -> Result<f64, Failure> {
+    let missing = || {
+        let words = format!("{}: the programmed {what} is missing", file.display());
+        let help = match batch::pattern_of(file) {
+            Some(pattern) => format!("its name may say it: --name '{pattern}'"),
+            None => {
+                "add --radius MM --feed MM_S --direction ccw|cw, or --manifest LIST.csv".to_owned()
+            }
+        };
+        Failure::usage(words).help(help)
+    };
+    let stdin = std::io::stdin();
+    if out.json || out.non_interactive || !stdin.is_terminal() || !std::io::stderr().is_terminal() {
+        return Err(missing());
+    }
+    loop {
+        let usual_text = usual.map_or_else(String::new, |v| format!(" [{v}]"));
+        eprint!("{}: programmed {what}{usual_text}? ", file.display());
+        // A terminal that takes no words takes no answer either.
+        let _ = std::io::stderr().flush();
+        let mut line = String::new();
+        if stdin.lock().read_line(&mut line).unwrap_or(0) == 0 {
+            return Err(missing());
+        }
+        let answer = match (line.trim(), usual) {
+            ("", Some(usual)) => Some(usual),
+            (text, _) => super::source::length(&text.replace(',', ".")).ok(),
+        };
+        match answer {
+            Some(answer) => return Ok(answer),
+            None => eprintln!("expected a number above 0, up to 100000"),
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -103,6 +198,9 @@ struct Entry {
     lap: usize,
     laps: usize,
     rows_left_out: (usize, usize),
+    left_out: Vec<LeftOut>,
+    plane: Option<&'static str>,
+    start_angle_deg: Option<f64>,
     direction: Direction,
     arc_deg: Option<f64>,
     tilt_deg: Option<f64>,
@@ -110,6 +208,23 @@ struct Entry {
     target_radius_mm: Option<f64>,
     measured_feed_mm_s: Option<f64>,
     notes: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct LeftOut {
+    rows: usize,
+    reason: String,
+    lines: Option<(usize, usize)>,
+}
+
+impl LeftOut {
+    fn of(reason: &Reason) -> Self {
+        Self {
+            rows: reason.rows,
+            reason: reason.why.clone(),
+            lines: reason.lines,
+        }
+    }
 }
 
 impl Entry {
@@ -124,6 +239,9 @@ impl Entry {
             lap: added.lap.0,
             laps: added.lap.1,
             rows_left_out: added.left_out,
+            left_out: added.reasons.iter().map(LeftOut::of).collect(),
+            plane: added.plane.map(|plane| plane.name()),
+            start_angle_deg: added.start_angle_rad.map(f64::to_degrees),
             direction: added.direction,
             arc_deg: added.arc_rad.map(f64::to_degrees),
             tilt_deg: plane.map(|p| p.tilt_rad.to_degrees()),

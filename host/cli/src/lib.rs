@@ -3,6 +3,7 @@
 
 mod analyze;
 mod bypass;
+mod campaign_edit;
 mod choice;
 mod compare;
 mod compensate;
@@ -63,6 +64,8 @@ struct Cli {
 enum Command {
     /// Foreign measurements into a campaign.
     Import(import::Args),
+    /// List, change and remove the runs of a campaign.
+    Campaign(campaign_edit::Args),
     /// Least-squares circle, radius size error, out-of-roundness, harmonics, ISO 230-4 of each run.
     Analyze(analyze::Args),
     /// The radius model of the paper: stepwise partial F, intervals, prediction of other radii.
@@ -112,6 +115,7 @@ enum Command {
 fn dispatch(command: Command, out: Output) -> Result<(), Failure> {
     match command {
         Command::Import(args) => import::run(args, out),
+        Command::Campaign(args) => campaign_edit::run(args, out),
         Command::Analyze(args) => analyze::run(args, out),
         Command::Fit(args) => fit::run(args, out),
         Command::Simulate(args) => simulate::run(args, out),

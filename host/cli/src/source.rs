@@ -1,8 +1,8 @@
 //! A campaign, or a foreign file where a campaign stands.
 use super::choice::one_of;
 use super::{Failure, Output};
-use giotto::campaign::import::{self, Added, Format, Laps, Options};
-use giotto::campaign::{Campaign, Direction, Manifest};
+use giotto::campaign::import::{self, Added, Format, Laps, Options, Reason};
+use giotto::campaign::{Campaign, Direction, Manifest, Plane};
 use std::path::{Path, PathBuf};
 
 /// Heading of these options; given one by one, since a heading for the struct would go on behind it.
@@ -13,19 +13,25 @@ const FOREIGN: &str = "What a foreign file does not say of itself";
 pub struct Foreign {
     /// Programmed radius.
     #[arg(long, help_heading = FOREIGN, value_name = "MM", value_parser = length)]
-    radius: Option<f64>,
+    pub(super) radius: Option<f64>,
     /// Programmed feed.
     #[arg(long, help_heading = FOREIGN, value_name = "MM_S", value_parser = length)]
-    feed: Option<f64>,
+    pub(super) feed: Option<f64>,
     /// Direction of travel; positions tell it themselves.
     #[arg(long, help_heading = FOREIGN, value_parser = direction, value_name = "ccw|cw")]
-    direction: Option<Direction>,
+    pub(super) direction: Option<Direction>,
     /// Layout of the file.
     #[arg(long, help_heading = FOREIGN, value_parser = one_of(Format::ALL), default_value = "auto")]
     format: Option<Format>,
     /// Columns by name, - for one to skip, as in time_s,-,x_mm,y_mm.
-    #[arg(long, help_heading = FOREIGN, value_name = "NAMES")]
+    #[arg(long, help_heading = FOREIGN, value_name = "NAMES", allow_hyphen_values = true)]
     columns: Option<String>,
+    /// Lengths without angles: evenly spaced readings over one turn.
+    #[arg(long, help_heading = FOREIGN, value_parser = ["even"], value_name = "even")]
+    angles: Option<String>,
+    /// Plane of the circle, for files that do not tell it.
+    #[arg(long, help_heading = FOREIGN, value_parser = plane, value_name = "xy|yz|zx")]
+    plane: Option<Plane>,
     /// Polar angle of the first sample, for deviations over time.
     #[arg(long, help_heading = FOREIGN, value_name = "DEG", allow_negative_numbers = true)]
     start_angle: Option<f64>,
@@ -55,24 +61,37 @@ pub(super) fn direction(text: &str) -> Result<Direction, String> {
     }
 }
 
+pub(super) fn plane(text: &str) -> Result<Plane, String> {
+    let lower = text.to_lowercase();
+    let letters = |p: &Plane| lower == p.name() || lower.chars().rev().eq(p.name().chars());
+    let found = Plane::ALL.into_iter().find(letters);
+    found.ok_or_else(|| "expected xy, yz or zx".to_owned())
+}
+
 impl Foreign {
     /// The options of an import, if radius and feed were given.
     pub(super) fn options(&self) -> Option<Options> {
-        Some(Options {
-            radius_m: self.radius? * 1e-3,
-            feed_m_s: self.feed? * 1e-3,
-            direction: self.direction,
+        Some(self.with(self.radius?, self.feed?, self.direction))
+    }
+
+    /// The options of an import with radius (mm), feed (mm/s) and direction.
+    pub(super) fn with(&self, radius: f64, feed: f64, direction: Option<Direction>) -> Options {
+        Options {
+            radius_m: radius * 1e-3,
+            feed_m_s: feed * 1e-3,
+            direction,
             format: self.format.unwrap_or(Format::Auto),
             columns: self.columns.clone(),
             start_angle_rad: self.start_angle.map(f64::to_radians),
             started_s: None,
             temperature_c: None,
             centre_m: None,
-            plane: None,
+            even_angles: self.angles.is_some(),
+            plane: self.plane,
             setup: None,
             machine: None,
             laps: Laps::First,
-        })
+        }
     }
 }
 
@@ -168,13 +187,19 @@ pub(super) fn tell(added: &Added, options: &Options, out: Output) {
     if added.lap.1 > 1 {
         text += &format!(", lap {} of {}", added.lap.0, added.lap.1);
     }
+    if added.pass.1 > 1 {
+        text += &format!(", direction {} of {}", added.pass.0, added.pass.1);
+    }
     match added.left_out {
         (0, 0) => {}
         (before, after) => {
             text += &format!(", {before} rows before the circle and {after} after it left out")
         }
     }
-    if options.direction.is_none() {
+    if !added.reasons.is_empty() {
+        text += &format!(" ({})", reasons(&added.reasons));
+    }
+    if options.direction != Some(added.direction) {
         text += if added.direction == Direction::Ccw {
             ", counter-clockwise"
         } else {
@@ -193,4 +218,18 @@ pub(super) fn tell(added: &Added, options: &Options, out: Output) {
     }
     out.note(text);
     added.notes.iter().for_each(|note| out.note(note));
+}
+
+/// `12 rows off the circle, 30 rows: the machine stood still (lines 5 to 34)`.
+fn reasons(reasons: &[Reason]) -> String {
+    let one = |r: &Reason| {
+        let lines = r
+            .lines
+            .map_or_else(String::new, |(from, to)| match to - from {
+                0 => format!(", line {from}"),
+                _ => format!(", lines {from} to {to}"),
+            });
+        format!("{}: {}{lines}", r.rows, r.why)
+    };
+    reasons.iter().map(one).collect::<Vec<_>>().join("; ")
 }

@@ -58,7 +58,7 @@ fn the_drift_and_the_step_are_found_and_kept() {
         (per_month - 0.4e-3).abs() < 0.08e-3,
         "{per_month} mm a month"
     );
-    let step = of("cause:squareness:");
+    let step = of("cause:squareness:x y");
     assert_eq!(step["trend"]["change"]["kind"], "step");
     assert_eq!(step["trend"]["change"]["at"], 13);
     let said = step["words"][0].as_str().unwrap();
@@ -68,7 +68,7 @@ fn the_drift_and_the_step_are_found_and_kept() {
         let id = s["id"].as_str().unwrap();
         if ![
             "cause:backlash:x",
-            "cause:squareness:",
+            "cause:squareness:x y",
             "figure:g",
             "figure:g_b",
         ]

@@ -37,7 +37,7 @@ const DRIVER: &str = r##"<script>
   check("both directions", lines(".CCW") > 0 && lines(".CW") > 0);
   let before = paths();
   $("magnification").value = "50"; change($("magnification"));
-  check("magnification", paths() !== before && document.querySelector("#polar").textContent.includes("× 50"));
+  check("magnification", paths() !== before && $("shown").textContent.includes("× 50;"));
   before = paths();
   $("circle").selectedIndex = ($("circle").selectedIndex + 1) % $("circle").length; change($("circle"));
   check("another circle", $("circle").length < 2 || paths() !== before);

@@ -6,8 +6,8 @@
 //! joint, is for `transition` to say. An arc's own blocks carry the change at its start; after its end the
 //! following arc does, or a run-out along the following line, whose block then starts from a point farther along
 //! it and is not touched. From standstill the machine falls behind only as it gets going, and the step is longer.
-//! Where nothing may follow (a stop, a corner, increments), the offset ends inside the arc with an overshoot of
-//! equal area, and up to 40 % of δ remains at that point. Pairs of arcs (biarcs) follow the step with a common
+//! Where nothing may follow (a stop, a corner, increments, a word that acts where it stands), the offset ends inside the
+//! arc, and what remains at that point is said. Pairs of arcs (biarcs) follow the step with a common
 //! tangent at every joint.
 use super::state::{Arc, sub};
 use super::transition::Transition;
@@ -47,34 +47,27 @@ pub(super) enum Exit {
     Inside {
         /// Way, mm.
         length_mm: f64,
+        /// How.
+        shape: Transition,
+        /// Largest error that it leaves, mm.
+        remaining_mm: f64,
         /// A last stretch on the programmed circle, mm, so that the arc ends in its own G-code.
         tail_mm: f64,
     },
 }
 
-/// Largest |g″|·L² of the step with overshoot: what it adds to the curvature, in Δ/L².
-pub(super) const INSIDE_CURVATURE: f64 = 36.0;
-
 impl Exit {
     /// Way inside the arc, mm.
     pub(super) fn inside_mm(self) -> f64 {
-        if let Self::Inside { length_mm, tail_mm } = self {
+        if let Self::Inside {
+            length_mm, tail_mm, ..
+        } = self
+        {
             length_mm + tail_mm
         } else {
             0.0
         }
     }
-}
-
-/// Smooth step and its slope at u, 0…1.
-fn step(u: f64) -> [f64; 2] {
-    [u * u * (3.0 - 2.0 * u), 6.0 * u * (1.0 - u)]
-}
-
-/// Step with an overshoot: 15u²(1 − u)² has the area ½ that the step lacks.
-fn step_of_equal_area(u: f64) -> [f64; 2] {
-    let ([rise, slope], v) = (step(u), u * (1.0 - u));
-    [rise + 15.0 * v * v, slope + 30.0 * v * (1.0 - 2.0 * u)]
 }
 
 /// One block of the corrected path.
@@ -96,9 +89,6 @@ pub(super) struct Piece {
 /// An arc that bulges by less, mm, is written as a line: half the last digit of a program, and far from where the f32 of
 /// small controllers takes a flat arc for a full circle.
 const STRAIGHT_MM: f64 = 2e-5;
-
-/// Biarcs to a step with overshoot.
-const INSIDE_BIARCS: usize = 4;
 
 /// The corrected path of `arc` with radius R + δ.
 pub(super) fn pieces(arc: &Arc, delta_mm: f64, entry: Entry, exit: Exit) -> Vec<Piece> {
@@ -156,21 +146,24 @@ pub(super) fn pieces(arc: &Arc, delta_mm: f64, entry: Entry, exit: Exit) -> Vec<
     last = next;
     match exit {
         Exit::Held => {}
-        Exit::Inside { length_mm, tail_mm } => {
+        Exit::Inside {
+            length_mm,
+            shape,
+            tail_mm,
+            ..
+        } => {
             // The programmed end may lie off the circle by the program's rounding; it stays.
             let [x, y] = sub(arc.end, arc.centre);
             let end_mm = x.hypot(y) - arc.radius_mm;
-            let (step_rad, tail_rad) = (length_mm / arc.radius_mm, tail_mm / arc.radius_mm);
-            for k in (0..INSIDE_BIARCS).rev() {
-                let u = k as f64 / INSIDE_BIARCS as f64;
-                let [g, slope] = step_of_equal_area(u);
-                let behind = tail_rad + u * step_rad;
+            let fall = end_mm - delta_mm;
+            for (u, g, slope) in shape.nodes() {
+                let behind = (tail_mm + (1.0 - u) * length_mm) / arc.radius_mm;
                 let mut next = node(
                     total - behind,
-                    end_mm + (delta_mm - end_mm) * g,
-                    -(delta_mm - end_mm) * slope / length_mm,
+                    delta_mm + fall * g,
+                    fall * slope / length_mm,
                 );
-                if k == 0 && tail_mm == 0.0 {
+                if u >= 1.0 && tail_mm == 0.0 {
                     next.0 = arc.end;
                 }
                 biarc(&mut list, last, next, 1.0 - behind / total);

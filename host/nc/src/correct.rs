@@ -1,7 +1,8 @@
 //! Which arcs are corrected, and how they meet their neighbours.
-use super::blend::{Entry, Exit, INSIDE_CURVATURE, Piece, pieces};
+use super::blend::{Entry, Exit, Piece, pieces};
 use super::inverse::{Inverse, Twin};
 use super::state::{Action, Arc, Plane, Straight};
+use super::steps::{Meeting, Side, Step};
 use super::transition::Transition;
 use super::word::{Line, Sort};
 use super::{Fate, Left, Options};
@@ -21,9 +22,6 @@ pub(super) struct Plan {
     pub(super) exit: Exit,
 }
 
-/// What an offset that ends inside its arc leaves of itself at the end (`blend`).
-const INSIDE_SHARE: f64 = 0.4;
-
 impl Plan {
     /// Largest share of the correction that remains as an error at a joint of the arc; what is not known counts as nothing.
     pub(super) fn joint_share(&self) -> f64 {
@@ -31,7 +29,7 @@ impl Plan {
         let exit = match self.exit {
             Exit::Held => 0.0,
             Exit::RunOut { remaining_mm, .. } => share(remaining_mm),
-            Exit::Inside { .. } => INSIDE_SHARE,
+            Exit::Inside { remaining_mm, .. } => share(remaining_mm),
         };
         share(self.entry.remaining_mm).max(exit)
     }
@@ -47,8 +45,6 @@ impl Plan {
     }
 }
 
-/// Length of the step from standstill in units of σ·f: a lag has (1 − exp(−t/σ))².
-const START_RESPONSES: f64 = 3.0;
 /// A line keeps at least this much of its length behind a run-out, mm.
 const LINE_LEFT_MM: f64 = 0.1;
 
@@ -156,16 +152,32 @@ impl Room<'_, '_> {
         })
     }
 
+    /// Curvature, 1/mm, and offset, mm, of an arc to the left; in the units of a feed.
+    fn left(arc: &Arc, delta_mm: f64, feed_mm_s: f64) -> (f64, f64) {
+        let side = arc.sweep_rad.signum();
+        let faster = arc.feed_mm_s / feed_mm_s;
+        // What a joint asks for goes with the acceleration across.
+        (side * faster * faster / arc.radius_mm, -side * delta_mm)
+    }
+
+    fn step(&self, f: f64, before: (f64, f64), behind: (f64, f64), side: Side) -> Step {
+        self.law.inverse.step(&Meeting {
+            feed_mm_s: f,
+            curvature: [before.0, behind.0],
+            offset_mm: [before.1, behind.1],
+            side,
+        })
+    }
+
     fn entry(&self, i: usize, arc: &Arc, twin: Twin) -> Entry {
-        let (f, a) = (arc.feed_mm_s, self.law.options.acceleration_mm_s2);
-        let curvature = 1.0 / arc.radius_mm;
-        match self.neighbour(i, arc, false) {
+        let f = arc.feed_mm_s;
+        let own = Self::left(arc, twin.delta_mm, f);
+        let straight = (0.0, 0.0);
+        let (from_mm, held, step) = match self.neighbour(i, arc, false) {
             Neighbour::Corrected(before, other) => {
                 // The same offset in space is outward of one and inward of the other where the turn changes.
-                let side = (before.sweep_rad * arc.sweep_rad).signum();
-                let from_mm = other.delta_mm * side;
-                let rise = twin.delta_mm - from_mm;
-                if rise.abs() < SAME_OFFSET_MM {
+                let from_mm = other.delta_mm * (before.sweep_rad * arc.sweep_rad).signum();
+                if (twin.delta_mm - from_mm).abs() < SAME_OFFSET_MM {
                     return Entry {
                         from_mm,
                         length_mm: 0.0,
@@ -174,57 +186,39 @@ impl Room<'_, '_> {
                         held: true,
                     };
                 }
-                // What the joint asks for anew: the acceleration across, in units of this arc's.
-                let slower = before.feed_mm_s / f;
-                let step = curvature - side * slower * slower / before.radius_mm;
-                Entry {
-                    from_mm,
-                    held: true,
-                    ..self.step(f, rise, step)
-                }
+                let before = Self::left(before, other.delta_mm, f);
+                (from_mm, true, self.step(f, before, own, Side::Behind))
             }
-            Neighbour::Line { .. } | Neighbour::OtherArc => self.step(f, twin.delta_mm, curvature),
-            Neighbour::Rest => {
-                let least = START_RESPONSES * f * self.law.inverse.response_s() + f * f / (2.0 * a);
-                let shape = Transition::SMOOTH;
-                let gentle = f * (shape.curvature() * twin.delta_mm.abs() / a).sqrt();
-                Entry {
-                    from_mm: 0.0,
-                    length_mm: gentle.max(least),
-                    shape,
-                    remaining_mm: 0.0,
-                    held: false,
-                }
+            Neighbour::Line { .. } | Neighbour::OtherArc => {
+                (0.0, false, self.step(f, straight, own, Side::Behind))
             }
-        }
-    }
-
-    /// Length and shape of a step of so much, mm, where the curvature changes by so much, 1/mm: as the machine answers,
-    /// or longer where that would ask for more acceleration than is allowed.
-    fn step(&self, f: f64, rise_mm: f64, curvature: f64) -> Entry {
-        let a = self.law.options.acceleration_mm_s2;
-        let step = self.law.inverse.step(f, rise_mm, curvature, a);
+            Neighbour::Rest => (0.0, false, self.step(f, (own.0, 0.0), own, Side::FromRest)),
+        };
         Entry {
-            from_mm: 0.0,
+            from_mm,
             length_mm: step.length_mm,
             shape: step.shape,
             remaining_mm: step.remaining_mm,
-            held: false,
+            held,
         }
     }
 
     fn exit(&self, i: usize, arc: &Arc, twin: Twin) -> Exit {
-        let (f, a) = (arc.feed_mm_s, self.law.options.acceleration_mm_s2);
-        let response_mm = f * self.law.inverse.response_s();
-        let gentle = |curvature: f64| f * (curvature * twin.delta_mm.abs() / a).sqrt();
-        let inside = Exit::Inside {
-            length_mm: gentle(INSIDE_CURVATURE).max(0.25 * response_mm),
-            tail_mm: self.law.tail_mm,
+        let f = arc.feed_mm_s;
+        let own = Self::left(arc, twin.delta_mm, f);
+        let inside = |curvature: f64, side: Side| {
+            let step = self.step(f, own, (curvature, 0.0), side);
+            Exit::Inside {
+                length_mm: step.length_mm,
+                shape: step.shape,
+                remaining_mm: step.remaining_mm,
+                tail_mm: self.law.tail_mm,
+            }
         };
         match self.neighbour(i, arc, true) {
             Neighbour::Corrected(..) => Exit::Held,
             Neighbour::Line { line, along, clean } => {
-                let step = self.step(f, twin.delta_mm, 1.0 / arc.radius_mm);
+                let step = self.step(f, own, (0.0, 0.0), Side::Behind);
                 let [first, second, third] = arc.plane.axes();
                 let long = |s: f64, e: f64, t: f64, u: f64| {
                     (e - s).hypot(u - t) > step.length_mm + LINE_LEFT_MM
@@ -251,15 +245,11 @@ impl Room<'_, '_> {
                         along,
                     }
                 } else {
-                    inside
+                    inside(0.0, Side::Before)
                 }
             }
-            Neighbour::OtherArc => inside,
-            Neighbour::Rest => Exit::Inside {
-                length_mm: (gentle(INSIDE_CURVATURE).max(0.25 * response_mm))
-                    .max(f * f / (2.0 * a)),
-                tail_mm: self.law.tail_mm,
-            },
+            Neighbour::OtherArc => inside(0.0, Side::Before),
+            Neighbour::Rest => inside(own.0, Side::ToRest),
         }
     }
 

@@ -17,7 +17,7 @@ pub(super) fn push_number(out: &mut Vec<u8>, value: f64, decimals: usize) {
     let decimals = decimals.min(9);
     let power = POWERS[decimals];
     let scaled = (value.abs() * power as f64).round();
-    if !(scaled < 1e15) {
+    if scaled.is_nan() || scaled >= 1e15 {
         // Too many digits for the short way.
         let text = format!("{value:.decimals$}");
         out.extend_from_slice(text.as_bytes());

@@ -1,6 +1,6 @@
 //! The circle to program so that the machine makes the wanted one.
-use super::chain::{Response, cumulants, element};
-use super::steps::{Step, Steps};
+use super::chain::{Response, element};
+use super::steps::{Meeting, Step, Steps};
 use super::{Keep, Left, Options};
 use giotto::model_file::{ModelFile, Servo};
 use giotto_shared::model::RadiusModel;
@@ -37,19 +37,13 @@ impl Inverse {
             keep: options.keep,
             omega_max: OMEGA_MARGIN * model.valid.feed_mm_s[1] / model.valid.radius_mm[0],
             max_offset_mm: options.max_offset_mm,
-            steps: Steps::new(Response::of(&model.servo)),
+            steps: Steps::new(Response::of(&model.servo), options.acceleration_mm_s2),
         }
     }
 
-    /// Time over which the machine averages its command, s: √|κ2|, or its own time where that is longer.
-    pub(super) fn response_s(&self) -> f64 {
-        let sigma = cumulants(&self.servo).kappa2_s2.abs().sqrt();
-        sigma.max(self.steps.unit_s())
-    }
-
-    /// The step of a correction behind a joint; see [`Steps::step`].
-    pub(super) fn step(&self, feed_mm_s: f64, rise_mm: f64, curvature: f64, a: f64) -> Step {
-        self.steps.step(feed_mm_s, rise_mm, curvature, a)
+    /// The step of a correction at a joint; see [`Steps::step`].
+    pub(super) fn step(&self, meeting: &Meeting) -> Step {
+        self.steps.step(meeting)
     }
 
     /// Circle to program for a wanted one of radius and feed in mm and mm/s.

@@ -1,6 +1,6 @@
 //! Steps behind joints, each shape worked out once.
 use super::chain::{Chain, Response};
-use super::transition::{Joint, Transition};
+use super::transition::{Corner, Joint, Pace, Transition};
 use std::cell::RefCell;
 use std::collections::HashMap;
 
@@ -15,20 +15,56 @@ pub(super) struct Step {
 
 /// A step longer than this many base lengths answers slowly enough to be taken as smooth.
 const LONGEST: f64 = 4.0;
-/// Steps come in lengths that differ by a part in so many, and share a shape where their heights do.
+/// Steps come in lengths that differ by a part in so many, and share a shape where their curvatures and heights do.
 const LENGTH_GRAIN: f64 = 64.0;
-const HEIGHT_GRAIN: f64 = 1024.0;
+const CURVATURE_GRAIN: f64 = 32.0;
+const HEIGHT_GRAIN: f64 = 256.0;
 /// More shapes than a program has arcs of different size are thrown away at once.
-const MOST_SHAPES: usize = 4096;
+const MOST_SHAPES: usize = 16_384;
 
-/// Shape and largest error in units, by length and height.
-type Shapes = HashMap<(i32, i32), (Transition, f64)>;
+/// What decides about a shape, rounded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct Key {
+    length: i32,
+    lead: bool,
+    ramp: i32,
+    curvature: [i32; 2],
+    height: [i32; 2],
+}
+
+/// Shape and largest error in units.
+type Shapes = HashMap<Key, (Transition, f64)>;
+
+/// Two stretches that meet, in mm; curvatures and offsets are positive to the left.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Meeting {
+    pub(super) feed_mm_s: f64,
+    /// 1/mm, before the joint and behind it.
+    pub(super) curvature: [f64; 2],
+    /// Of the command from the path, mm.
+    pub(super) offset_mm: [f64; 2],
+    pub(super) side: Side,
+}
+
+/// Where the step is made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Side {
+    /// Behind the joint, passed at speed.
+    Behind,
+    /// Behind the joint, from rest in it.
+    FromRest,
+    /// Before the joint, passed at speed.
+    Before,
+    /// Before the joint, to rest in it.
+    ToRest,
+}
 
 /// The steps of one machine.
 #[derive(Debug)]
 pub(super) struct Steps {
     response: Option<Response>,
     base: f64,
+    acceleration_mm_s2: f64,
     shapes: RefCell<Shapes>,
 }
 
@@ -39,14 +75,18 @@ pub(super) fn base_length(chain: Chain) -> f64 {
         Chain::FeedForward { .. } => 1.6,
         // The offset swings back as far as the machine swings over.
         Chain::SecondOrder { zeta } => {
+            let k = 1e-2;
+            let kappa2 = 4.0 * zeta * zeta - 2.0;
+            let kappa2 = if kappa2.abs() < 1e-3 { 1e-3 } else { kappa2 };
+            let corner = Corner {
+                curvature: [0.0, k],
+                offset: [0.0, -0.5 * kappa2 * k],
+                lead: 0.0,
+                pace: Pace::Through,
+            };
             let errors = [2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0].map(|length| {
-                let joint = Joint::new(chain, length);
-                let rise = 2.0 * zeta * zeta - 1.0;
-                let rise = if rise.abs() < 1e-3 { 1e-3 } else { rise };
-                (
-                    length,
-                    joint.remaining(joint.best(rise, nodes(chain)), rise),
-                )
+                let joint = Joint::new(chain, corner, length);
+                (length, joint.remaining(joint.best(nodes(chain))))
             });
             let least = errors.iter().map(|e| e.1).fold(f64::INFINITY, f64::min);
             errors
@@ -58,18 +98,18 @@ pub(super) fn base_length(chain: Chain) -> f64 {
 }
 
 /// Free nodes of a step.
-const fn nodes(chain: Chain) -> usize {
+pub(super) const fn nodes(chain: Chain) -> usize {
     match chain {
-        Chain::LagAverage { .. } => 1,
-        Chain::SecondOrder { .. } | Chain::FeedForward { .. } => 2,
+        Chain::LagAverage { .. } | Chain::SecondOrder { .. } | Chain::FeedForward { .. } => 2,
     }
 }
 
 impl Steps {
-    pub(super) fn new(response: Option<Response>) -> Self {
+    pub(super) fn new(response: Option<Response>, acceleration_mm_s2: f64) -> Self {
         Self {
             response,
             base: response.map_or(0.0, |r| base_length(r.chain)),
+            acceleration_mm_s2,
             shapes: RefCell::default(),
         }
     }
@@ -79,32 +119,31 @@ impl Steps {
         self.response.map_or(0.0, |r| r.unit_s)
     }
 
-    /// The step of `rise_mm` at `feed_mm_s` where the curvature changes by so much, 1/mm, within an acceleration.
-    pub(super) fn step(
-        &self,
-        feed_mm_s: f64,
-        rise_mm: f64,
-        curvature: f64,
-        acceleration_mm_s2: f64,
-    ) -> Step {
+    /// The step of a meeting, within the acceleration that is allowed.
+    pub(super) fn step(&self, meeting: &Meeting) -> Step {
+        let rise_mm = (meeting.offset_mm[1] - meeting.offset_mm[0]).abs();
         let gentle_mm = |shape: Transition| {
-            feed_mm_s * (shape.curvature() * rise_mm.abs() / acceleration_mm_s2).sqrt()
+            meeting.feed_mm_s * (shape.curvature() * rise_mm / self.acceleration_mm_s2).sqrt()
         };
-        let unit_mm = feed_mm_s * self.unit_s();
-        let across_mm = unit_mm * unit_mm * curvature;
-        let height = rise_mm / across_mm;
-        let (Some(response), true) = (self.response, height.is_finite() && height != 0.0) else {
+        let unit_mm = meeting.feed_mm_s * self.unit_s();
+        let (Some(response), true) = (self.response, unit_mm > 0.0 && rise_mm > 0.0) else {
             return Step {
                 length_mm: gentle_mm(Transition::SMOOTH),
                 shape: Transition::SMOOTH,
                 remaining_mm: 0.0,
             };
         };
-        let longest = LONGEST * self.base;
+        let base = match meeting.side {
+            Side::Behind => self.base,
+            // The machine falls behind as it gets going.
+            Side::FromRest => 1.6 * self.base,
+            Side::Before | Side::ToRest => 0.6 * self.base,
+        };
+        let longest = LONGEST * base;
         // Up to the next length that there is.
         let coarse = |length: f64| ((length.ln() * LENGTH_GRAIN).ceil() / LENGTH_GRAIN).exp();
-        let mut length = coarse(self.base);
-        let (mut shape, mut left) = self.shape(response.chain, length, height);
+        let mut length = coarse(base);
+        let (mut shape, mut left) = self.shape(response.chain, meeting, unit_mm, length);
         // A longer step is a flatter one; a few rounds find where both agree.
         for _ in 0..4 {
             let gentle = gentle_mm(shape) / unit_mm;
@@ -112,35 +151,107 @@ impl Steps {
                 break;
             }
             length = coarse(gentle.min(longest));
-            (shape, left) = self.shape(response.chain, length, height);
+            (shape, left) = self.shape(response.chain, meeting, unit_mm, length);
         }
-        let needed = gentle_mm(shape) / unit_mm;
-        if needed > length * 1.05 {
+        if gentle_mm(shape) / unit_mm > length * 1.05 {
             length = (gentle_mm(Transition::SMOOTH) / unit_mm).max(longest);
             shape = Transition::SMOOTH;
-            left = Joint::new(response.chain, length.min(8.0 * longest)).remaining(shape, height);
+            let corner = self.corner(meeting, unit_mm, length);
+            left = Joint::new(response.chain, corner, length.min(64.0)).remaining(shape);
         }
         Step {
             length_mm: length * unit_mm,
             shape,
-            remaining_mm: left * across_mm.abs(),
+            remaining_mm: left * unit_mm,
         }
     }
 
-    fn shape(&self, chain: Chain, length: f64, height: f64) -> (Transition, f64) {
-        let grain = |v: f64, grain: f64| (v.abs().ln() * grain).round() as i32;
-        let rounded = grain(height, HEIGHT_GRAIN);
-        let key = (
-            grain(length, LENGTH_GRAIN),
-            2 * rounded + i32::from(height < 0.0),
-        );
+    /// A meeting in units.
+    fn corner(&self, meeting: &Meeting, unit_mm: f64, length: f64) -> Corner {
+        let ramp = meeting.feed_mm_s / self.acceleration_mm_s2 / self.unit_s();
+        let (lead, pace) = match meeting.side {
+            Side::Behind => (0.0, Pace::Through),
+            Side::FromRest => (0.0, Pace::From(ramp)),
+            Side::Before => (length, Pace::Through),
+            Side::ToRest => (length, Pace::To(ramp)),
+        };
+        Corner {
+            curvature: meeting.curvature.map(|k| k * unit_mm),
+            offset: meeting.offset_mm.map(|o| o / unit_mm),
+            lead,
+            pace,
+        }
+    }
+
+    fn shape(
+        &self,
+        chain: Chain,
+        meeting: &Meeting,
+        unit_mm: f64,
+        length: f64,
+    ) -> (Transition, f64) {
+        let grain = |v: f64, grain: f64| {
+            if v == 0.0 {
+                return 0;
+            }
+            // Odd to the left, even to the right; 0 is straight on.
+            let steps = (v.abs().ln() * grain).round() as i32 + 100_000;
+            2 * steps + i32::from(v > 0.0)
+        };
+        let back = |n: i32, grain: f64| {
+            if n == 0 {
+                return 0.0;
+            }
+            let size = (f64::from(n / 2 - 100_000) / grain).exp();
+            if n % 2 == 1 { size } else { -size }
+        };
+        let exact = self.corner(meeting, unit_mm, length);
+        let (ramp, lead) = match exact.pace {
+            Pace::Through => (0.0, exact.lead > 0.0),
+            Pace::From(ramp) | Pace::To(ramp) => (ramp, exact.lead > 0.0),
+        };
+        let greatest = exact
+            .curvature
+            .iter()
+            .fold(0.0, |m, k| f64::max(m, k.abs()));
+        let key = Key {
+            length: grain(length, LENGTH_GRAIN),
+            lead,
+            ramp: grain(ramp, 8.0),
+            curvature: exact.curvature.map(|k| grain(k, CURVATURE_GRAIN)),
+            // In units of what the curvature asks for.
+            height: exact.offset.map(|o| grain(o / greatest, HEIGHT_GRAIN)),
+        };
         if let Some(found) = self.shapes.borrow().get(&key) {
             return *found;
         }
-        let height = (f64::from(rounded) / HEIGHT_GRAIN).exp().copysign(height);
-        let joint = Joint::new(chain, length);
-        let shape = joint.best(height, nodes(chain));
-        let found = (shape, joint.remaining(shape, height));
+        let curvature = key.curvature.map(|k| back(k, CURVATURE_GRAIN));
+        let rounded = curvature
+            .iter()
+            .fold(0.0, |m, k: &f64| f64::max(m, k.abs()));
+        let ramp = back(key.ramp, 8.0);
+        let corner = Corner {
+            curvature,
+            offset: key.height.map(|h| back(h, HEIGHT_GRAIN) * rounded),
+            lead: exact.lead,
+            pace: match exact.pace {
+                Pace::Through => Pace::Through,
+                Pace::From(_) => Pace::From(ramp),
+                Pace::To(_) => Pace::To(ramp),
+            },
+        };
+        let joint = Joint::new(chain, corner, length);
+        let count = match meeting.side {
+            Side::Behind | Side::FromRest => nodes(chain),
+            // A freer shape swings farther than the acceleration allows.
+            Side::Before | Side::ToRest => 1,
+        };
+        let shape = joint.best(count);
+        // Curvatures are rounded; what remains goes with the true ones.
+        let found = (
+            shape,
+            joint.remaining(shape) * greatest / rounded.max(f64::MIN_POSITIVE),
+        );
         let mut shapes = self.shapes.borrow_mut();
         if shapes.len() >= MOST_SHAPES {
             shapes.clear();

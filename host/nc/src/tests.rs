@@ -384,15 +384,15 @@ fn halves_of_a_circle_share_their_offset() {
     let [
         Fate::Corrected {
             delta_mm,
-            blocks: 5,
+            blocks: 7,
             ..
         },
-        Fate::Corrected { blocks: 10, .. },
+        Fate::Corrected { blocks: 6, .. },
     ] = fates[..]
     else {
         panic!("{fates:?}")
     };
-    let first = &arcs(&text)[4];
+    let first = &arcs(&text)[6];
     assert!((first.end[0] + 20.0 + delta_mm).abs() < 1e-5, "{text}");
     let last = arcs(&text).last().unwrap().end;
     assert_eq!(last, [20.0, 0.0]);

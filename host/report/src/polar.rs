@@ -48,8 +48,13 @@ fn tenths(profile: &[Option<f64>]) -> Vec<Option<f64>> {
         .collect()
 }
 
-/// The JSON, safe inside a `<script>` element.
-pub fn json(campaign: &Campaign, d: &Diagnosis, alone: &Alone) -> String {
+/// The JSON, safe inside a `<script>` element. `worst` is the radius and feed of the circle whose form is worst, m and m/s.
+pub fn json(
+    campaign: &Campaign,
+    d: &Diagnosis,
+    alone: &Alone,
+    worst: Option<(f64, f64)>,
+) -> String {
     let picture: &[RunPicture] = &d.picture;
     let boxes = || d.findings.iter().zip(&alone.profiles);
     let mut circles: Vec<(f64, f64, Circle)> = Vec::new();
@@ -92,36 +97,18 @@ pub fn json(campaign: &Campaign, d: &Diagnosis, alone: &Alone) -> String {
         }
     }
     circles.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let keys: Vec<(f64, f64)> = circles.iter().map(|c| (c.0, c.1)).collect();
     let circles: Vec<Circle> = circles.into_iter().map(|c| c.2).collect();
-    let form = |circle: &Circle| {
-        circle
-            .runs
-            .iter()
-            .map(|run| range(&run.measured))
-            .fold(0.0, f64::max)
-    };
-    let worst = (0..circles.len())
-        .max_by(|a, b| form(&circles[*a]).total_cmp(&form(&circles[*b])))
-        .unwrap_or(0);
+    let worst = worst
+        .and_then(|(radius_m, feed_m_s)| keys.iter().position(|key| *key == (radius_m, feed_m_s)));
     let named = boxes().filter(|(_, runs)| runs.is_some());
     let data = Data {
         causes: named.map(|(f, _)| super::verdict::title(f)).collect(),
         circles,
-        worst,
+        worst: worst.unwrap_or(0),
     };
     // Numbers and strings always serialise; `<` would let a name end the script.
     serde_json::to_string(&data)
         .unwrap_or_else(|_| "null".into())
         .replace('<', "\\u003c")
-}
-
-/// Largest less smallest value of a profile.
-fn range(profile: &[Option<f64>]) -> f64 {
-    let [low, high] = profile
-        .iter()
-        .flatten()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| {
-            [l.min(*v), h.max(*v)]
-        });
-    (high - low).max(0.0)
 }

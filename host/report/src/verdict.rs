@@ -1,6 +1,6 @@
 //! The verdict in three sentences: how the worst circle looks, why, and what to do.
 use super::number::{fixed, plain};
-use giotto::analysis::Report;
+use giotto::analysis::{Report, RunAnalysis};
 use giotto::causes::Cause;
 use giotto::diagnosis::{Diagnosis, Estimate, Finding};
 use giotto::units::{self, Shown};
@@ -30,12 +30,15 @@ pub fn title(finding: &Finding) -> String {
     format!("{}{}", finding.cause.model().words().name, axis(finding))
 }
 
+/// The run whose form is worst.
+pub fn worst(report: &Report) -> Option<&RunAnalysis> {
+    let runs = report.runs.iter();
+    runs.max_by(|a, b| a.out_of_roundness_m.total_cmp(&b.out_of_roundness_m))
+}
+
 /// The circle whose form is worst, and how far off all circles are in size.
 fn misfit(report: Option<&Report>) -> String {
-    let worst = report.and_then(|report| {
-        let runs = report.runs.iter();
-        runs.max_by(|a, b| a.out_of_roundness_m.total_cmp(&b.out_of_roundness_m))
-    });
+    let worst = report.and_then(worst);
     let Some(worst) = worst else {
         return "No circle goes through these samples.".to_string();
     };

@@ -126,7 +126,15 @@ impl View {
             seed: d.seed,
             hash: super::hash::of(campaign),
             baseline: d.baseline.name.clone(),
-            polar: super::polar::json(campaign, d, &alone),
+            polar: super::polar::json(
+                campaign,
+                d,
+                &alone,
+                report
+                    .as_ref()
+                    .and_then(verdict::worst)
+                    .map(|run| (run.radius_m, run.feed_m_s)),
+            ),
         }
     }
 }

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `points` | polar samples as points of the plane, walked in parallel |
 //! | `run` | one run: least-squares circle, harmonics, noise |
+//! | `size` | the size of a circle that was not seen evenly |
 //! | `harmonics` | least-squares Fourier coefficients at any spacing |
 //! | `iso230` | G, G(b), F, D of a pair of runs |
 //! | `parity` | even and odd part of a pair |
@@ -20,6 +21,7 @@ mod parity;
 mod points;
 mod report;
 mod run;
+mod size;
 #[cfg(test)]
 mod tests;
 pub mod tolerance;

@@ -125,10 +125,12 @@ pub fn of_files(manifest: &Manifest, progress: impl Fn() + Sync) -> Result<Repor
             )
         })?;
         if let Some(frame) = loaded.location {
-            analysis.centre_m = [
-                frame.origin_m[0] + analysis.centre_m[0],
-                frame.origin_m[1] + analysis.centre_m[1],
-            ];
+            // The axes of the nearest coordinate plane, in its order.
+            let normal = loaded.run.frame.normal();
+            let across = (0..3).max_by(|a, b| normal[*a].total_cmp(&normal[*b]));
+            let axes = [[1, 2], [2, 0], [0, 1]][across.unwrap_or(2)];
+            let [a, b] = analysis.centre_m;
+            analysis.centre_m = [frame.origin_m[axes[0]] + a, frame.origin_m[axes[1]] + b];
         }
         let samples = &mut loaded.run.samples;
         let kept = Kept::of(

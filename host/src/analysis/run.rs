@@ -1,6 +1,7 @@
 //! One run by itself.
 use super::harmonics::{self, Harmonic};
 use super::points::Polar;
+use super::size;
 use crate::campaign::{self, Direction, Run};
 use giotto_shared::circle::{self, CircleError, Merge};
 use std::f64::consts::TAU;
@@ -26,10 +27,11 @@ pub struct RunAnalysis {
     pub centre_m: [f64; 2],
     /// The same about the centre that the instrument measured from, m.
     pub set_up_m: [f64; 2],
-    /// Radius of the least-squares circle minus programmed radius, m.
+    /// Radius of the least-squares circle minus programmed radius, m. On an arc, or where samples are missing or lie unevenly,
+    /// the mean radius of the whole circle with its form, as far as the samples tell.
     pub radius_error_m: f64,
-    /// Standard error of `radius_error_m` within this run, m, for samples as correlated as these are. It says
-    /// nothing of the spread between runs.
+    /// Standard error of `radius_error_m` within this run, m, for samples as correlated as these are, and for the form that was
+    /// not seen. It says nothing of the spread between runs.
     pub radius_error_se_m: f64,
     /// Largest minus smallest distance from the least-squares centre, m (G of ISO 230-4).
     pub out_of_roundness_m: f64,
@@ -136,6 +138,15 @@ pub fn of_run(run: &Run, turn_s: Option<f64>) -> Result<RunAnalysis, CircleError
         sums
     });
     let turn_s = turn_s.or_else(|| run.turn_s());
+    let noise_m = campaign::sample_noise(&samples.deviation_m);
+    let se_m = radius_se(&fit, &seen, form.len(), samples.deviation_m.len() as f64);
+    // Form that was not seen evenly passes for size.
+    let unseen = if arc_rad.is_some() || size::uneven(&samples.angle_rad) {
+        size::correction(&points, |a, v| distance(a, v) - radius, noise_m)
+    } else {
+        None
+    };
+    let (shift_m, se_m) = unseen.map_or((0.0, se_m), |c| (c.value_m, c.se_m));
     Ok(RunAnalysis {
         file: run.file.clone(),
         radius_m: run.radius_m,
@@ -144,11 +155,11 @@ pub fn of_run(run: &Run, turn_s: Option<f64>) -> Result<RunAnalysis, CircleError
         measured_feed_m_s: turn_s.map(|t| TAU * run.radius_m / t),
         centre_m: centre,
         set_up_m: centre,
-        radius_error_m: radius - run.radius_m,
-        radius_error_se_m: radius_se(&fit, &seen, form.len(), samples.deviation_m.len() as f64),
+        radius_error_m: radius + shift_m - run.radius_m,
+        radius_error_se_m: se_m,
         out_of_roundness_m: seen.distance[1] - seen.distance[0],
         harmonics: form.into_iter().filter(|h| h.order >= 2).collect(),
-        noise_m: campaign::sample_noise(&samples.deviation_m),
+        noise_m,
         deviation_range_m: seen.deviation,
         arc_rad,
         samples: samples.deviation_m.len(),

@@ -4,8 +4,9 @@
 use super::CampaignError;
 use rayon::prelude::*;
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{Cursor, Read, Seek, SeekFrom};
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 /// Bytes parsed by one task. Blocks begin at the same bytes whatever the number of threads, and so do sums over them.
 /// A block and its numbers stay in the cache of a core until they are taken.
@@ -17,10 +18,26 @@ const LARGE: u64 = 4 << 20;
 /// A line longer than this is no row of numbers.
 const LONGEST_LINE: usize = BLOCK * BLOCKS;
 
+/// Where bytes come from.
+#[derive(Debug)]
+enum Bytes {
+    File(File),
+    Memory(Cursor<Arc<[u8]>>),
+}
+
+impl Read for Bytes {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        match self {
+            Self::File(file) => file.read(buffer),
+            Self::Memory(text) => text.read(buffer),
+        }
+    }
+}
+
 /// A file from some byte on.
 #[derive(Debug)]
 pub(super) struct Text {
-    file: std::io::Take<File>,
+    file: std::io::Take<Bytes>,
     /// Bytes already read, of which the first `skip` were used.
     buffer: Vec<u8>,
     skip: usize,
@@ -51,7 +68,7 @@ impl Text {
             size as usize + 1
         };
         let mut buffer = Vec::with_capacity(head);
-        let mut file = file.take(u64::MAX);
+        let mut file = Bytes::File(file).take(u64::MAX);
         file.by_ref().take(head as u64).read_to_end(&mut buffer)?;
         Ok(Self {
             file,
@@ -67,12 +84,26 @@ impl Text {
         let size = file.metadata()?.len().min(to);
         file.seek(SeekFrom::Start(from))?;
         Ok(Self {
-            file: file.take(to.saturating_sub(from)),
+            file: Bytes::File(file).take(to.saturating_sub(from)),
             buffer: Vec::new(),
             skip: 0,
             at: from,
             size,
         })
+    }
+
+    /// The bytes `from` to `to` of a text in memory.
+    pub(super) fn of_memory(text: Arc<[u8]>, from: u64, to: u64) -> Self {
+        let size = (text.len() as u64).min(to);
+        let mut cursor = Cursor::new(text);
+        cursor.set_position(from);
+        Self {
+            file: Bytes::Memory(cursor).take(to.saturating_sub(from)),
+            buffer: Vec::new(),
+            skip: 0,
+            at: from,
+            size,
+        }
     }
 
     /// What was read and not skipped.

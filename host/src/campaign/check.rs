@@ -24,7 +24,7 @@ const SHORTEST_TURN: f64 = 0.79;
 /// A turn longer than this many programmed ones is a wrong unit: controllers slow down by less.
 const LONGEST_TURN: f64 = 30.0;
 /// Largest hole in a turn, degrees.
-const LARGEST_GAP_DEG: f64 = 36.0;
+pub(super) const LARGEST_GAP_DEG: f64 = 36.0;
 /// Noise below which two equal files may be two runs of a simulation without noise, m.
 const SMALLEST_NOISE_M: f64 = 0.15e-6;
 
@@ -158,6 +158,46 @@ pub(super) fn deviation(
     Ok(noise_m)
 }
 
+/// Deviations that span less than any instrument resolves are millimetres called micrometres: refused where the file is
+/// foreign, noted where a campaign says so.
+pub(super) fn called_um(
+    entry: &Entry,
+    deviation: &[f64],
+    noise_m: f64,
+    field: usize,
+    is_radius: bool,
+    notes: &mut Vec<Note>,
+) -> Result<(), CampaignError> {
+    const SPAN_M: f64 = 1e-6;
+    const NOISE_M: [f64; 2] = [0.05e-9, 20e-9];
+    const STEP_M: f64 = 1.1e-9;
+    let [lowest, highest] = bounds(deviation);
+    let small = highest - lowest < SPAN_M && highest.max(-lowest) < SPAN_M;
+    if is_radius || !small || !(NOISE_M[0]..NOISE_M[1]).contains(&noise_m) {
+        return Ok(());
+    }
+    // Micrometres have one or two decimals; these have more.
+    let steps = deviation.windows(2).map(|w| (w[1] - w[0]).abs());
+    let finest = steps
+        .filter(|step| *step > 0.0)
+        .fold(f64::INFINITY, f64::min);
+    if finest > STEP_M {
+        return Ok(());
+    }
+    let problem = Problem::CalledMicrometres {
+        span_um: ((highest - lowest) * 1e9).round() / 1e3,
+        noise_nm: (noise_m * 1e11).round() / 1e2,
+    };
+    if entry.slice.is_some() {
+        return Err(err(entry, 0, field, problem));
+    }
+    notes.push(Note {
+        at: entry.row(0),
+        text: problem.to_string(),
+    });
+    Ok(())
+}
+
 /// Readings that stay where none lies further out stand at the end of the instrument's range.
 fn at_limit(
     entry: &Entry,
@@ -254,11 +294,15 @@ pub(super) fn duration(
     if ratio < 0.97 {
         notes.push(fast(entry, ratio));
     }
+    Ok(laps(entry, turn_s, deviation))
+}
+
+/// How many laps readings hold that last `lasts_s` and repeat themselves; nothing where they are one turn.
+pub(super) fn laps(entry: &Entry, lasts_s: f64, deviation: &[f64]) -> Option<u32> {
+    let ratio = lasts_s * entry.feed_m_s / (TAU * entry.radius_m);
     let laps = ratio.round();
-    if laps >= 2.0 && (ratio / laps - 1.0).abs() < 0.03 && repeats(deviation, laps as usize) {
-        return Ok(Some(laps as u32));
-    }
-    Ok(None)
+    let several = laps >= 2.0 && (ratio / laps - 1.0).abs() < 0.03;
+    (several && repeats(deviation, laps as usize)).then_some(laps as u32)
 }
 
 /// The refusal for a file of several laps.

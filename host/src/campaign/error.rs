@@ -124,6 +124,8 @@ pub enum Problem {
         declared: &'static str,
         normal: [f64; 3],
     },
+    #[error("no run \"{file}\"; expected one of {}", runs.join(", "))]
+    UnknownRun { file: String, runs: Vec<String> },
     #[error("the campaign lists no runs; expected at least one [[run]]")]
     NoRuns,
     #[error("run \"{file}\" is listed twice (first in line {first}); expected each run once")]
@@ -243,17 +245,41 @@ pub enum Problem {
     )]
     OutOfInstrumentRange { value_um: f64, rows: usize },
     #[error(
+        "the first and the last reading are {apart_um} µm apart where a whole turn would close; expected evenly spaced readings of one turn"
+    )]
+    Open { apart_um: f64 },
+    #[error(
+        "the same value, {value_um} µm, over {rows} rows in a row while the machine went on; expected readings of their own"
+    )]
+    Held { value_um: f64, rows: usize },
+    #[error(
+        "the deviations span {span_um} µm with {noise_nm} nm of noise, finer than an instrument reads: they look like millimetres called µm; expected micrometres"
+    )]
+    CalledMicrometres { span_um: f64, noise_nm: f64 },
+    #[error(
         "holds the same measurement as \"{other}\", noise and all; expected a file of its own for each run"
     )]
     DuplicateData { other: String },
 
     // Foreign files.
     #[error(
-        "first line \"{found}\" belongs to no known layout (asked for: {wanted}); expected a giotto CSV, a header naming x and y or deviation with units, Leica, SpatialAnalyzer, RTDE or KFLOP"
+        "first line \"{found}\" belongs to no known layout (asked for: {wanted}){}; expected a giotto CSV, a header naming x and y or deviation with units, Leica, SpatialAnalyzer, RTDE, RSI, EGM, Motive, Vicon, ROS, halscope or KFLOP",
+        listed(names)
     )]
-    UnknownFormat { found: String, wanted: String },
+    UnknownFormat {
+        found: String,
+        wanted: String,
+        /// Names of its columns, if it has any.
+        names: Vec<String>,
+        /// What `--columns` could be.
+        example: Option<String>,
+    },
     #[error("{reason}")]
-    Columns { reason: String },
+    Columns {
+        reason: String,
+        /// What `--columns` could be.
+        example: Option<String>,
+    },
     #[error("not the XML of a Ballbar 20 file: {reason}")]
     Xml { reason: String },
     #[error("a Ballbar 20 file holds results, its samples cannot be read; expected samples")]
@@ -275,6 +301,17 @@ pub enum Problem {
     )]
     DirectionUnknown,
 
+    #[error("no file of measurements in it; expected .csv, .txt, .log, .tsv, .dat or .xml")]
+    EmptyFolder,
+    #[error("\"{name}\" does not fit the pattern \"{pattern}\"; expected {expected}")]
+    NamePattern {
+        name: String,
+        pattern: String,
+        expected: String,
+    },
+    #[error("{found}; expected {expected}")]
+    List { found: String, expected: String },
+
     // Writing.
     #[error(
         "run {index} of the campaign has file name \"{file}\" already used; expected each name once"
@@ -283,6 +320,16 @@ pub enum Problem {
 }
 
 const SHAPES: &str = "`time_s,deviation_um`, `angle_deg,deviation_um`, `time_s,x_mm,y_mm[,z_mm]` or `x_mm,y_mm[,z_mm]` (`deviation_mm` and `radius_mm` serve as well)";
+
+/// The columns that do not make a circular test.
+fn listed(names: &[String]) -> String {
+    if names.is_empty() {
+        String::new()
+    } else {
+        let names: Vec<&str> = names.iter().map(|n| n.trim()).collect();
+        format!(": no circular test in the columns {}", names.join(", "))
+    }
+}
 
 impl CampaignError {
     /// A problem at a place.
@@ -313,7 +360,24 @@ impl CampaignError {
     }
 
     /// What to do next, one sentence.
-    pub fn help(&self) -> &'static str {
+    pub fn help(&self) -> String {
+        let (Problem::UnknownFormat { example, .. } | Problem::Columns { example, .. }) =
+            &*self.problem
+        else {
+            return self.usual_help().to_owned();
+        };
+        let Some(example) = example else {
+            return "for example --columns time_s,-,x_mm,y_mm (- skips one); a file of text is expected"
+                .to_owned();
+        };
+        let columns = example.split(',').count();
+        if columns == 1 {
+            return format!("name its column: --columns {example} --angles even");
+        }
+        format!("name its {columns} columns, for example --columns {example} (- skips one)")
+    }
+
+    fn usual_help(&self) -> &'static str {
         use Problem as P;
         match *self.problem {
             P::Missing { .. } | P::IsDirectory { .. } | P::Io { .. } => "check the path",
@@ -331,6 +395,7 @@ impl CampaignError {
             | P::OtherPlane { .. }
             | P::UnknownDirection { .. } => "correct this line of campaign.toml",
             P::MissingKey { .. } | P::UnknownKey { .. } => "correct the key in campaign.toml",
+            P::UnknownRun { .. } => "see `giotto campaign list CAMPAIGN`",
             P::NoRuns => "add a run with `giotto import`",
             P::DuplicateRun { .. } | P::DuplicateName { .. } => {
                 "remove one of the two, or give the second its own file"
@@ -361,12 +426,21 @@ impl CampaignError {
             P::Implausible { .. } | P::WrongRadius { .. } => {
                 "correct the unit in the header, or `radius_mm`"
             }
+            P::Open { .. } => "export the whole turn, or give the angles in a column of their own",
+            P::Held { .. } => "measure the run again; the instrument lost its target",
+            P::CalledMicrometres { .. } => {
+                "correct the header to deviation_mm, or name the columns: --columns angle_deg,deviation_mm"
+            }
             P::NoCircle { .. } => "check which file this is",
             P::OutOfInstrumentRange { .. } => {
                 "set the instrument up again; the readings beyond its range are lost"
             }
-            P::UnknownFormat { .. } => "name the columns: --columns time_s,x_mm,y_mm (- skips one)",
-            P::Columns { .. } => "for example --columns time_s,-,x_mm,y_mm",
+            P::EmptyFolder => "give the files themselves",
+            P::NamePattern { .. } => {
+                "for example --name '{radius}_{feed}_{direction}'; {} stands for anything"
+            }
+            P::List { .. } => "correct this line of the list",
+            P::UnknownFormat { .. } | P::Columns { .. } => "name the columns with --columns",
             P::Xml { .. } => "export the results from Ballbar 20 again",
             P::ResultsOnly => {
                 "set its results beside giotto's: giotto analyze CAMPAIGN --ballbar FILE.b5r"

@@ -99,8 +99,16 @@ impl Manifest {
                 },
             ));
         }
+        Self::parse(&file, text)
+    }
+
+    /// A campaign by the text of the `campaign.toml` at `file`.
+    ///
+    /// # Errors
+    /// As [`Manifest::open`].
+    pub fn parse(file: &Path, text: &str) -> Result<Self, CampaignError> {
         Source {
-            file: &file,
+            file,
             text,
             notes: Vec::new(),
         }

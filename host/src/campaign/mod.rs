@@ -11,14 +11,18 @@
 //! | `clock`, `thinned` | time stamps and other rows, seen once and forgotten |
 //! | `lanes` | sums and bounds of long columns, fast |
 //! | `samples` | columns → one turn of polar samples |
+//! | `steady` | how long a turn takes without its start, stop and pauses |
+//! | `strays` | dust and held values |
 //! | `check` | whether numbers can be what the campaign says they are |
 //! | `read`, `write` | whole campaigns; run by run where memory counts |
+//! | `edit` | changes of runs, checked |
 //! | `import` | foreign files |
 //! | `error` | everything a campaign is refused for, with its place |
 mod blocks;
 mod check;
 mod clock;
 mod decimal;
+pub mod edit;
 mod error;
 pub mod import;
 mod lanes;
@@ -27,6 +31,8 @@ mod read;
 mod run_file;
 mod samples;
 mod shape;
+mod steady;
+mod strays;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -129,7 +135,8 @@ impl Run {
     }
 
     /// Duration of one turn, s; `None` without time stamps. Where the angle was inferred the recorded lap is
-    /// the turn (n samples last n spacings), else it follows from the angle that was covered.
+    /// the turn (n samples last n spacings; of an arc its share), else it follows from the angle that was covered, without the
+    /// start, the stop and the pauses.
     pub fn turn_s(&self) -> Option<f64> {
         let time = self.samples.time_s.as_ref()?;
         let (first, last) = (time.first()?, time.last()?);
@@ -137,12 +144,12 @@ impl Run {
         if n < 2.0 {
             return None;
         }
-        let span = last - first;
         if self.samples.angle_inferred {
-            return Some(span * n / (n - 1.0));
+            let lap = (last - first) * n / (n - 1.0);
+            return Some(self.samples.arc_rad().map_or(lap, |arc| lap * TAU / arc));
         }
-        let covered = (self.samples.angle_rad.last()? - self.samples.angle_rad.first()?).abs();
-        (covered > 0.0).then(|| span * TAU / covered)
+        let angle = self.samples.angle_rad.iter();
+        steady::turn_s(&angle.copied().zip(time.iter().copied()).collect::<Vec<_>>())
     }
 }
 

@@ -102,17 +102,13 @@ impl Field {
     }
 
     fn foreign(quantity: Quantity) -> Self {
-        let name = match quantity {
-            Quantity::Time | Quantity::Stamp(_) => "time",
-            Quantity::Angle => "the angle",
-            Quantity::Deviation => "the deviation",
-            Quantity::Radius => "radius_mm",
-            Quantity::Position(_) | Quantity::Target(_) => "a position",
-        };
         Self {
             quantity,
             factor: 1.0,
-            name,
+            name: match quantity {
+                Quantity::Radius => "radius_mm",
+                other => other.name(),
+            },
         }
     }
 }

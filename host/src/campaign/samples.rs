@@ -3,13 +3,16 @@ use super::clock::{Clock, Stamps};
 use super::error::{CampaignError, Place, Problem};
 use super::import::Quantity;
 use super::manifest::Entry;
-use super::run_file::RunFile;
+use super::run_file::{Field, RunFile};
+use super::strays::Strays;
 use super::table::Batch;
-use super::{Frame, Note, Run, Samples, check};
+use super::thinned::Thinned;
+use super::{Direction, Frame, Note, Plane as NamedPlane, Run, Samples, check, steady};
 use crate::fit::fit_circle;
 use giotto_shared::circle::{Circle, CircleError, Merge, Plane, Scatter};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 /// Fewest samples of a run.
 pub(super) const FEWEST: usize = 8;
@@ -63,9 +66,11 @@ pub struct Tilt {
 struct Rows {
     stamps: Stamps,
     time: Vec<f64>,
-    /// x, or the angle.
+    /// Every n-th time, since the first.
+    times: Thinned<f64>,
+    /// First axis of the plane, or the angle.
     first: Vec<f64>,
-    /// y, or the deviation.
+    /// Second axis, or the deviation.
     second: Vec<f64>,
     /// Lowest and highest point over the plane.
     heights: [f64; 2],
@@ -84,6 +89,7 @@ impl Rows {
         let mut time = part.time;
         time.chunks_mut(STAMPS)
             .for_each(|stamps| self.stamps.take(stamps));
+        self.times.extend(time.len(), |k| time[k]);
         if keep_time {
             append(&mut self.time, time);
         }
@@ -105,76 +111,153 @@ fn append(numbers: &mut Vec<f64>, more: Vec<f64>) {
     }
 }
 
+/// Which columns of a file hold what.
+struct Columns {
+    time: Option<usize>,
+    angle: Option<usize>,
+    radial: Option<usize>,
+    /// Two axes in the order of their plane, and the third where there is one.
+    position: Option<([usize; 2], Option<usize>)>,
+    /// The plane that the names of two axes tell, other than XY.
+    plane: Option<NamedPlane>,
+    /// What the length is called.
+    length: &'static str,
+    /// The length is a radius.
+    is_radius: bool,
+}
+
+impl Columns {
+    fn of(fields: &[Field]) -> Self {
+        let index =
+            |wanted: &dyn Fn(Quantity) -> bool| fields.iter().position(|f| wanted(f.quantity));
+        let axes = [0, 1, 2].map(|axis| index(&|q| q == Quantity::Position(axis)));
+        let (position, plane) = match axes {
+            [Some(x), Some(y), z] => (Some(([x, y], z)), None),
+            [None, Some(y), Some(z)] => (Some(([y, z], None)), Some(NamedPlane::Yz)),
+            [Some(x), None, Some(z)] => (Some(([z, x], None)), Some(NamedPlane::Zx)),
+            _ => (None, None),
+        };
+        let radial = index(&|q| matches!(q, Quantity::Deviation | Quantity::Radius));
+        Self {
+            time: index(&|q| matches!(q, Quantity::Time | Quantity::Stamp(_))),
+            angle: index(&|q| q == Quantity::Angle),
+            radial,
+            position,
+            plane,
+            length: radial.map_or("", |f| fields[f].name),
+            is_radius: radial.is_some_and(|f| fields[f].quantity == Quantity::Radius),
+        }
+    }
+
+    /// Without angles the time becomes the angle.
+    fn by_time(&self) -> bool {
+        self.position.is_none() && self.angle.is_none()
+    }
+}
+
 /// Reads and checks one run. Of its rows the angle and the deviation (or x and y) are kept, and the time only if it is wanted
 /// or stands for the angle; everything else goes by: 16 bytes a row are the memory of a run.
 pub(super) fn load(entry: &Entry, keep_time: bool) -> Result<Loaded, CampaignError> {
     let file = RunFile::open(entry)?;
-    let fields = file.fields();
-    let index = |wanted: &dyn Fn(Quantity) -> bool| fields.iter().position(|f| wanted(f.quantity));
-    let time_field = index(&|q| matches!(q, Quantity::Time | Quantity::Stamp(_)));
-    let angle_field = index(&|q| q == Quantity::Angle);
-    let radial_field = index(&|q| matches!(q, Quantity::Deviation | Quantity::Radius));
-    let position = [0, 1, 2].map(|axis| index(&|q| q == Quantity::Position(axis)));
-    let xy = position[0].zip(position[1]);
-    let no_circle = |e: CircleError, field: usize| {
-        CampaignError::new(
-            entry.place(0, field),
-            Problem::NoCircle {
-                reason: e.to_string(),
-            },
-        )
-    };
-    let mut plane = None;
-    if let ([Some(x), Some(y), Some(z)], true) = (position, xy.is_some()) {
-        let scatter = scatter(entry, [x, y, z])?;
-        if scatter.count < FEWEST {
-            return Err(too_few(entry, scatter.count));
-        }
-        plane = Some((
-            PlaneView::through(&scatter).map_err(|e| no_circle(e, x))?,
-            z,
-        ));
+    let columns = Columns::of(&file.fields());
+    let view = plane_view(entry, &columns)?;
+    let mut rows = gather(entry, file, &columns, view.as_ref(), keep_time)?;
+    if rows.second.len() < FEWEST {
+        return Err(too_few(entry, rows.second.len()));
     }
-    // Without angles the time becomes the angle.
-    let polar_by_time = xy.is_none() && angle_field.is_none();
-    let keep = keep_time || polar_by_time;
-    let radius = match radial_field {
-        Some(field) if fields[field].quantity == Quantity::Radius => entry.radius_m,
-        _ => 0.0,
+    let named = columns.plane.map(Frame::of);
+    let run = Run {
+        file: entry.file.clone(),
+        radius_m: entry.radius_m,
+        feed_m_s: entry.feed_m_s,
+        direction: entry.direction,
+        start_angle_rad: entry.start_angle_rad.unwrap_or(0.0),
+        started_s: entry.started_s,
+        temperature_c: entry.temperature_c,
+        centre_m: entry.centre_m,
+        frame: entry.frame_of(view.as_ref().map(|view| view.frame).or(named))?,
+        setup: entry.setup.clone(),
+        samples: Samples {
+            angle_rad: std::mem::take(&mut rows.first),
+            deviation_m: std::mem::take(&mut rows.second),
+            time_s: None,
+            angle_inferred: columns.by_time(),
+        },
+    };
+    if columns.by_time() {
+        by_time(entry, &columns, run, rows, keep_time)
+    } else {
+        by_angle(entry, &columns, run, rows, view, keep_time)
+    }
+}
+
+fn no_circle(entry: &Entry, error: CircleError, field: usize) -> CampaignError {
+    let reason = error.to_string();
+    CampaignError::new(entry.place(0, field), Problem::NoCircle { reason })
+}
+
+/// The plane through points in space.
+fn plane_view(entry: &Entry, columns: &Columns) -> Result<Option<PlaneView>, CampaignError> {
+    let Some(([x, y], Some(z))) = columns.position else {
+        return Ok(None);
+    };
+    let scatter = scatter(entry, [x, y, z])?;
+    if scatter.count < FEWEST {
+        return Err(too_few(entry, scatter.count));
+    }
+    let view = PlaneView::through(&scatter).map_err(|e| no_circle(entry, e, x))?;
+    Ok(Some(view))
+}
+
+/// Walks the rows of a file and keeps what becomes samples.
+fn gather(
+    entry: &Entry,
+    file: RunFile<'_>,
+    columns: &Columns,
+    view: Option<&PlaneView>,
+    keep_time: bool,
+) -> Result<Rows, CampaignError> {
+    let keep = keep_time || columns.by_time();
+    let radius = if columns.is_radius {
+        entry.radius_m
+    } else {
+        0.0
     };
     let mut rows = Rows::default();
     let expected = file.rows().unwrap_or(0);
     rows.first
-        .reserve_exact(if polar_by_time { 0 } else { expected });
+        .reserve_exact(if columns.by_time() { 0 } else { expected });
     rows.second.reserve_exact(expected);
-    rows.time.reserve_exact(if keep && time_field.is_some() {
+    rows.time.reserve_exact(if keep && columns.time.is_some() {
         expected
     } else {
         0
     });
     let prepare = |batch: Batch| {
-        let mut columns = batch.columns;
+        let mut all = batch.columns;
         let mut column =
-            |field: Option<usize>| field.map_or_else(Vec::new, |f| std::mem::take(&mut columns[f]));
-        let time = column(time_field);
+            |field: Option<usize>| field.map_or_else(Vec::new, |f| std::mem::take(&mut all[f]));
+        let time = column(columns.time);
         let mut heights = [0.0_f64; 2];
-        let (first, second) = match (xy, &plane) {
-            (Some((x, y)), None) => (column(Some(x)), column(Some(y))),
-            (Some((x, y)), Some((view, z))) => {
-                let (mut x, mut y, z) = (column(Some(x)), column(Some(y)), column(Some(*z)));
-                for ((x, y), z) in x.iter_mut().zip(&mut y).zip(&z) {
-                    let height = view.plane.height([*x, *y, *z]);
-                    heights = [heights[0].min(height), heights[1].max(height)];
-                    [*x, *y] = view.project([*x, *y, *z]);
+        let (first, second) = match columns.position {
+            Some(([a, b], third)) => {
+                let (mut x, mut y) = (column(Some(a)), column(Some(b)));
+                if let (Some(view), Some(third)) = (view, third) {
+                    let z = column(Some(third));
+                    for ((x, y), z) in x.iter_mut().zip(&mut y).zip(&z) {
+                        let height = view.plane.height([*x, *y, *z]);
+                        heights = [heights[0].min(height), heights[1].max(height)];
+                        [*x, *y] = view.project([*x, *y, *z]);
+                    }
                 }
                 (x, y)
             }
-            (None, _) => {
-                let mut deviation = column(radial_field);
+            None => {
+                let mut deviation = column(columns.radial);
                 if radius != 0.0 {
                     deviation.iter_mut().for_each(|v| *v -= radius);
                 }
-                (column(angle_field), deviation)
+                (column(columns.angle), deviation)
             }
         };
         Part {
@@ -188,81 +271,107 @@ pub(super) fn load(entry: &Entry, keep_time: bool) -> Result<Loaded, CampaignErr
         rows.take(part, keep);
         Ok(())
     })?;
-    let count = rows.second.len();
-    if count < FEWEST {
-        return Err(too_few(entry, count));
-    }
-    let mut run = Run {
-        file: entry.file.clone(),
-        radius_m: entry.radius_m,
-        feed_m_s: entry.feed_m_s,
-        direction: entry.direction,
-        start_angle_rad: entry.start_angle_rad.unwrap_or(0.0),
-        started_s: entry.started_s,
-        temperature_c: entry.temperature_c,
-        centre_m: entry.centre_m,
-        frame: entry.frame_of(plane.as_ref().map(|(view, _)| view.frame))?,
-        setup: entry.setup.clone(),
-        samples: Samples {
-            angle_rad: rows.first,
-            deviation_m: rows.second,
-            time_s: None,
-            angle_inferred: false,
-        },
+    Ok(rows)
+}
+
+/// A run of deviations over time. A ballbar knows time only: the recorded lap is one turn, or the arc that the campaign
+/// declares.
+fn by_time(
+    entry: &Entry,
+    columns: &Columns,
+    mut run: Run,
+    rows: Rows,
+    keep_time: bool,
+) -> Result<Loaded, CampaignError> {
+    let (Some(field), Some(radial)) = (columns.time, columns.radial) else {
+        unreachable!("the header was checked: time and a length")
     };
     let mut notes = Vec::new();
-    // Coarse stamps of a foreign file say nothing that its angles do not say better.
-    let useless = entry.slice.is_some() && !polar_by_time && rows.stamps.coarse();
-    let clock = match time_field.filter(|_| !useless) {
-        None => None,
-        Some(field) => Some((rows.stamps.clock(entry, field)?, rows.time, field)),
-    };
-    let mut location = None;
-    let mut covered = TAU;
-    let noise_m = if let Some((x, _)) = xy {
-        let plane = plane.map(|(view, _)| view.with_heights(rows.heights));
-        location = Some(polar(entry, x, &mut run.samples, plane, &no_circle)?);
-        check::deviation(
-            entry,
-            &run.samples.deviation_m,
-            x,
-            "the distance from the circle",
-        )?
-    } else if let Some(field) = radial_field {
-        if let (Some((clock, ..)), true) = (&clock, polar_by_time) {
-            check::slowness(entry, clock.turn_s)?; // a wrong radius explains more than a wrong deviation
-        }
-        check::deviation(entry, &run.samples.deviation_m, field, fields[field].name)?
-    } else {
-        unreachable!("the header was checked: positions or one length")
-    };
-    let mut laps = None;
+    let count = run.samples.deviation_m.len();
+    let mut clock = rows.stamps.clock(entry, field)?;
+    let covered = entry.arc_rad.unwrap_or(TAU);
+    clock.turn_s *= TAU / covered;
+    check::slowness(entry, clock.turn_s)?; // a wrong radius explains more than a wrong deviation
+    let deviation = &run.samples.deviation_m;
+    let noise_m = check::deviation(entry, deviation, radial, columns.length)?;
+    check::called_um(
+        entry,
+        deviation,
+        noise_m,
+        radial,
+        columns.is_radius,
+        &mut notes,
+    )?;
+    let laps = check::duration(entry, clock.turn_s, deviation, &mut notes)?;
+    check::gaps(entry, &clock, count, field, &mut notes)?;
+    let mut time = rows.time;
+    let angle = inferred_angle(entry, &clock, count, covered);
     let mut kept = None;
-    if polar_by_time {
-        // A ballbar knows time only: the recorded lap is one turn.
-        let Some((clock, mut time, field)) = clock else {
-            unreachable!("the header was checked: time or angle")
-        };
-        laps = check::duration(entry, clock.turn_s, &run.samples.deviation_m, &mut notes)?;
-        check::gaps(entry, &clock, count, field, &mut notes)?;
-        let angle = inferred_angle(entry, &clock, count);
-        if keep_time {
-            run.samples.angle_rad = time.iter().enumerate().map(|(k, t)| angle(k, *t)).collect();
-            kept = Some(time);
-        } else {
-            time.iter_mut()
-                .enumerate()
-                .for_each(|(k, t)| *t = angle(k, *t));
-            run.samples.angle_rad = time;
-        }
-        run.samples.angle_inferred = true;
-        let turn_s = Some(clock.turn_s);
-        return Ok(finish(run, location, turn_s, kept, notes, laps, noise_m));
+    if keep_time {
+        run.samples.angle_rad = time.iter().enumerate().map(|(k, t)| angle(k, *t)).collect();
+        kept = Some(time);
+    } else {
+        time.iter_mut()
+            .enumerate()
+            .for_each(|(k, t)| *t = angle(k, *t));
+        run.samples.angle_rad = time;
     }
-    let field = index(&|q| matches!(q, Quantity::Angle | Quantity::Position(0))).unwrap_or(0);
+    leave_out(entry, &mut run, &mut kept, noise_m, &mut notes)?;
+    let turn_s = Some(clock.turn_s);
+    Ok(finish(run, None, turn_s, kept, notes, laps, noise_m))
+}
+
+/// A run of positions, or of lengths over measured angles.
+fn by_angle(
+    entry: &Entry,
+    columns: &Columns,
+    mut run: Run,
+    rows: Rows,
+    view: Option<PlaneView>,
+    keep_time: bool,
+) -> Result<Loaded, CampaignError> {
+    let mut notes = Vec::new();
+    // Coarse stamps of a foreign file say nothing that its angles do not say better.
+    let useless = entry.slice.is_some() && rows.stamps.coarse();
+    let clock = match columns.time.filter(|_| !useless) {
+        None => None,
+        Some(field) => Some(rows.stamps.clock(entry, field)?),
+    };
+    let mut kept = (keep_time && clock.is_some()).then_some(rows.time);
+    let mut location = None;
+    let field = columns.angle.or(columns.position.map(|(axes, _)| axes[0]));
+    let field = field.unwrap_or(0);
+    let noise_m = if let Some(([first, _], _)) = columns.position {
+        let view = view.map(|view| view.with_heights(rows.heights));
+        location = Some(polar(entry, first, &mut run.samples, view, run.frame)?);
+        let from = "the distance from the circle";
+        check::deviation(entry, &run.samples.deviation_m, first, from)?
+    } else {
+        let radial = columns.radial.unwrap_or(0);
+        let deviation = &run.samples.deviation_m;
+        let noise_m = check::deviation(entry, deviation, radial, columns.length)?;
+        check::called_um(
+            entry,
+            deviation,
+            noise_m,
+            radial,
+            columns.is_radius,
+            &mut notes,
+        )?;
+        noise_m
+    };
     if !unwrapped(&run.samples.angle_rad) {
         unwrap(&mut run.samples.angle_rad);
     }
+    let timed = rows.times.iter();
+    let points: Vec<(f64, f64)> = timed
+        .filter_map(|(row, t)| Some((*run.samples.angle_rad.get(row)?, t)))
+        .collect();
+    leave_out(entry, &mut run, &mut kept, noise_m, &mut notes)?;
+    let turned = seen_from_behind(entry, &run, &mut notes);
+    let entry = turned.as_ref().unwrap_or(entry);
+    run.direction = entry.direction;
+    let mut covered = TAU;
     check::angles(
         entry,
         &run.samples.angle_rad,
@@ -272,13 +381,100 @@ pub(super) fn load(entry: &Entry, keep_time: bool) -> Result<Loaded, CampaignErr
     )?;
     run.start_angle_rad = run.samples.angle_rad[0];
     let mut turn_s = None;
-    if let Some((clock, time, _)) = clock {
-        let turn = clock.turn_s * TAU / covered;
+    if let Some(clock) = clock {
+        let mean = clock.turn_s * TAU / covered;
+        let steady = steady::turn_s(&points).filter(|steady| *steady < 0.99 * mean);
+        let turn = steady.unwrap_or(mean);
         check::feed(entry, turn, &mut notes)?;
         turn_s = Some(turn);
-        kept = keep_time.then_some(time);
     }
-    Ok(finish(run, location, turn_s, kept, notes, laps, noise_m))
+    Ok(finish(run, location, turn_s, kept, notes, None, noise_m))
+}
+
+/// Points in a plane other than XY go round as they do; which side of the plane was meant, a foreign file does not say.
+fn seen_from_behind(entry: &Entry, run: &Run, notes: &mut Vec<Note>) -> Option<Entry> {
+    let angle = &run.samples.angle_rad;
+    let way = angle.last()? - angle.first()?;
+    let other = way * f64::from(entry.direction.sign()) < 0.0;
+    let [_, _, up] = run.frame.normal();
+    if entry.slice.is_none() || entry.plane.is_some() || !other || up > 0.8 {
+        return None;
+    }
+    let normal = run.frame.normal();
+    let axis = if normal[0] > 0.8 { "+X" } else { "+Y" };
+    let direction = match entry.direction {
+        Direction::Ccw => Direction::Cw,
+        Direction::Cw => Direction::Ccw,
+    };
+    let words = match direction {
+        Direction::Ccw => "counter-clockwise",
+        Direction::Cw => "clockwise",
+    };
+    notes.push(Note {
+        at: entry.row(0),
+        text: format!("the circle does not lie in XY; seen from {axis} it goes {words}"),
+    });
+    Some(Entry {
+        direction,
+        ..entry.clone()
+    })
+}
+
+/// Takes out readings that are none of the machine's, and says so.
+fn leave_out(
+    entry: &Entry,
+    run: &mut Run,
+    time: &mut Option<Vec<f64>>,
+    noise_m: f64,
+    notes: &mut Vec<Note>,
+) -> Result<(), CampaignError> {
+    let strays = Strays::of(&run.samples.deviation_m, noise_m);
+    if strays.is_empty() {
+        return Ok(());
+    }
+    if let Some(held) = strays.held.iter().find(|held| {
+        let angle = &run.samples.angle_rad;
+        let after = held.end.min(angle.len() - 1);
+        (angle[after] - angle[held.start]).abs().to_degrees() > check::LARGEST_GAP_DEG
+    }) {
+        let value_um = (run.samples.deviation_m[held.start] * 1e9).round() / 1e3;
+        let problem = Problem::Held {
+            value_um,
+            rows: held.len() + 1,
+        };
+        return Err(CampaignError::new(entry.row(held.start), problem));
+    }
+    let lines = |ranges: &[Range<usize>]| {
+        let line = |row: usize| entry.row(row).line.unwrap_or(0).to_string();
+        let mut lines: Vec<String> = ranges.iter().take(8).map(|r| line(r.start)).collect();
+        if ranges.len() > lines.len() {
+            lines.push("…".to_owned());
+        }
+        lines.join(", ")
+    };
+    let count = |ranges: &[Range<usize>]| ranges.iter().map(Range::len).sum::<usize>();
+    let mut note = |ranges: &[Range<usize>], why: &str| {
+        if let Some(first) = ranges.first() {
+            let text = format!(
+                "{} rows left out: {why} (lines {})",
+                count(ranges),
+                lines(ranges)
+            );
+            let at = entry.row(first.start);
+            notes.push(Note { at, text });
+        }
+    };
+    note(
+        &strays.lone,
+        "lone readings far from their neighbours, a dirty ball?",
+    );
+    note(&strays.held, "a value held while the machine went on");
+    strays.remove(&mut run.samples.angle_rad);
+    strays.remove(&mut run.samples.deviation_m);
+    if let Some(time) = time {
+        strays.remove(time);
+    }
+    Ok(())
 }
 
 fn too_few(entry: &Entry, found: usize) -> CampaignError {
@@ -337,9 +533,14 @@ fn finish(
     }
 }
 
-/// The angle of sample `k` at time `t`: one turn of evenly spaced samples, whatever the rounding of the stamps; by the
-/// stamps themselves where samples were lost.
-fn inferred_angle(entry: &Entry, clock: &Clock, rows: usize) -> impl Fn(usize, f64) -> f64 {
+/// The angle of sample `k` at time `t`: one turn (or the arc) of evenly spaced samples, whatever the rounding of the stamps;
+/// by the stamps themselves where samples were lost.
+fn inferred_angle(
+    entry: &Entry,
+    clock: &Clock,
+    rows: usize,
+    covered: f64,
+) -> impl Fn(usize, f64) -> f64 {
     let (start, d) = (
         entry.start_angle_rad.unwrap_or(0.0),
         f64::from(entry.direction.sign()),
@@ -347,7 +548,7 @@ fn inferred_angle(entry: &Entry, clock: &Clock, rows: usize) -> impl Fn(usize, f
     let (n, rate, whole) = (rows as f64, d * TAU / clock.turn_s, clock.gap.is_none());
     move |k, t| {
         if whole {
-            start + d * TAU * k as f64 / n
+            start + d * covered * k as f64 / n
         } else {
             start + rate * t
         }
@@ -360,10 +561,10 @@ fn polar(
     field: usize,
     samples: &mut Samples,
     plane: Option<PlaneView>,
-    no_circle: &dyn Fn(CircleError, usize) -> CampaignError,
+    frame: Frame,
 ) -> Result<Location, CampaignError> {
     let (x, y) = (&mut samples.angle_rad, &mut samples.deviation_m);
-    let fit = fit_circle(x, y).map_err(|e| no_circle(e, field))?;
+    let fit = fit_circle(x, y).map_err(|e| no_circle(entry, e, field))?;
     let Circle { centre, radius } = fit.circle;
     let relative = radius / entry.radius_m;
     if (relative - 1.0).abs() > check::LARGEST_SIZE_ERROR {
@@ -385,7 +586,8 @@ fn polar(
         });
     Ok(match plane {
         None => Location {
-            origin_m: [centre[0], centre[1], 0.0],
+            origin_m: [0, 1, 2]
+                .map(|k| centre[0] * frame.first()[k] + centre[1] * frame.second()[k]),
             plane: None,
         },
         Some(view) => Location {

@@ -52,6 +52,12 @@ impl<T: Copy, const MOST: usize> Thinned<T, MOST> {
         Some((k * self.stride, self.values[k]))
     }
 
+    /// The first value kept behind `index`, with its place.
+    pub(super) fn after(&self, index: usize) -> Option<(usize, T)> {
+        let k = index / self.stride + 1;
+        Some((k * self.stride, *self.values.get(k)?))
+    }
+
     /// The values kept with their places.
     pub(super) fn iter(&self) -> impl Iterator<Item = (usize, T)> + '_ {
         self.values

@@ -10,7 +10,7 @@ use super::statement;
 use super::status::{Status, TIE};
 use super::tangent;
 use super::tone::{Amplitude, Tone};
-use crate::causes::{Cause, Effect, Fitted, Site};
+use crate::causes::{Cause, Effect, Fitted, Seat, Site};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::collections::BTreeMap;
@@ -514,7 +514,9 @@ fn join_axes(findings: Vec<Finding>) -> Vec<Finding> {
     for finding in findings {
         let twin = out.iter_mut().find(|other| {
             let one_of_several = other.axis.is_some() || other.actuators.len() > 1;
-            other.cause == finding.cause && one_of_several && finding.axis.is_some()
+            // Where circles tell the slides apart, each keeps its own.
+            let apart = finding.cause.model().seat() == Seat::MachineOrOne;
+            !apart && other.cause == finding.cause && one_of_several && finding.axis.is_some()
         });
         match twin {
             Some(twin) if alike(twin, &finding) => {

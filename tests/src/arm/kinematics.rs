@@ -315,10 +315,10 @@ mod tests {
             [-0.4 * s1 - 0.3 * s12, 0.4 * c1 + 0.3 * c12],
             [-0.3 * s12, 0.3 * c12],
         ];
-        for joint in 0..2 {
+        for (joint, want) in want.iter().enumerate() {
             let got = arm.lever(&q, joint);
             for k in 0..2 {
-                assert!((got[k] - want[joint][k]).abs() < 1e-9);
+                assert!((got[k] - want[k]).abs() < 1e-9);
             }
         }
     }

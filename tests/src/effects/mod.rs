@@ -1,13 +1,15 @@
 //! Effects to hide: what they do to a machine, what they are called, how large they truly are.
 mod case;
 mod hidden;
+mod keep;
 mod laws;
 mod listed;
 mod strength;
 mod unlisted;
 
-pub use case::{Case, Keep, Kind, Null, Truth};
+pub use case::{Case, Kind, Null, Truth};
 pub use hidden::{Hidden, left_um};
+pub use keep::Keep;
 pub use laws::{OTHER_LAWS, other_law};
 pub use listed::{LISTED, listed, listed_on};
 pub use strength::{misfit_m, scaled};

@@ -369,9 +369,10 @@ fn path_mm(place: &Place, from: [f64; 6], call: &Call) -> f64 {
     let turns = call.values[4];
     let raw = (turns.signum() * (angle(end) - angle(from))).rem_euclid(std::f64::consts::TAU);
     // Printed digits: an arc of a hair less than nothing is a full turn only if its ends are one.
-    let closed = (from[a] - end[a]).hypot(from[b] - end[b]) < 3e-4;
+    // Ends printed in inches are good to 2.5 µm.
+    let closed = (from[a] - end[a]).hypot(from[b] - end[b]) < 6e-3 / place.unit_mm;
     let first = if closed { std::f64::consts::TAU } else { raw };
-    let small = closed && radius * place.unit_mm < 1e-2;
+    let small = closed && radius * place.unit_mm < 2e-2;
     if small {
         return 0.0;
     }

@@ -90,10 +90,10 @@ impl Stretch {
         [(q[0] - p[0]) / n, (q[1] - p[1]) / n]
     }
 
-    /// Distance of a point in the plane, mm, positive to the left; and whether its foot lies within the stretch.
-    fn distance(&self, p: [f64; 2]) -> (f64, bool) {
+    /// Distance of a point in the plane, mm, and the same with its sign, positive to the left.
+    fn distance(&self, p: [f64; 2]) -> (f64, f64) {
         let [a, b] = [self.flat(self.from), self.flat(self.to)];
-        match self.arc {
+        let (off, own) = match self.arc {
             Some(arc) => {
                 let v = [p[0] - arc.centre[0], p[1] - arc.centre[1]];
                 let r = [a[0] - arc.centre[0], a[1] - arc.centre[1]];
@@ -113,7 +113,13 @@ impl Stretch {
                     (0.0..=1.0).contains(&along),
                 )
             }
+        };
+        if own {
+            return (off.abs(), off);
         }
+        let ends = [a, b].map(|e| (p[0] - e[0]).hypot(p[1] - e[1]));
+        let near = ends[0].min(ends[1]);
+        (near, near.copysign(off))
     }
 }
 
@@ -233,14 +239,11 @@ pub fn deviations(plant: Plant, program: &str, nominal: &str) -> Vec<Deviation> 
     let one = |(chain, meant): (&Vec<Stretch>, &Vec<Stretch>)| {
         let mut most = Deviation::default();
         for p in driven(plant, chain) {
-            // The nearest stretch whose foot is its own; behind both ends of the chain nothing is measured.
             let off = meant
                 .iter()
                 .map(|s| s.distance(s.flat(p)))
-                .filter(|(_, own)| *own)
-                .map(|(off, _)| off)
-                .min_by(|a, b| a.abs().total_cmp(&b.abs()))
-                .unwrap_or(0.0);
+                .min_by(|a, b| a.0.total_cmp(&b.0))
+                .map_or(0.0, |(_, off)| off);
             most.left_um = most.left_um.max(off * 1e3);
             most.right_um = most.right_um.max(-off * 1e3);
         }

@@ -21,8 +21,9 @@ mod image {
     use defmt as _;
     use giotto_firmware::control::Shared;
     use giotto_firmware::control::bench::{self, Interrupt};
-    use giotto_firmware::engine::bench::{Arc, Libm, Plain, Streamed, Turning};
+    use giotto_firmware::engine::bench::{Arc, DEAREST, Libm, Plain, Streamed, TERMS, Turning};
     use giotto_firmware::engine::flag;
+    use giotto_shared::term::Term;
 
     /// How far a helix rises, m.
     const HELIX_M: f64 = 0.02;
@@ -124,8 +125,8 @@ mod image {
     }
 
     /// From rest to rest. All ticks under way, and those at constant feed.
-    fn arc(extended: bool, rise_m: f64, floor: u32) -> Option<[Range; 2]> {
-        let mut arc = Arc::new(extended, rise_m);
+    fn arc(terms: &[Term<f32>], rise_m: f64, floor: u32) -> Option<[Range; 2]> {
+        let mut arc = Arc::new(terms, rise_m);
         let mut ranges = [Range::NONE, Range::NONE];
         while !arc.done() {
             let before = SYST::get_current();
@@ -141,19 +142,23 @@ mod image {
         arc.sound().then_some(ranges)
     }
 
-    /// From rest to rest, each set-point recorded.
-    fn interrupt(floor: u32) -> Option<Range> {
+    /// From rest to rest, each set-point recorded. All ticks, and those under way.
+    fn interrupt(floor: u32) -> Option<[Range; 2]> {
         let shared = cortex_m::singleton!(: Shared = Shared::new())?;
         let segments = cortex_m::singleton!(: bench::Segments = bench::Segments::new())?;
         let points = cortex_m::singleton!(: bench::Points = bench::Points::new())?;
         let mut interrupt = Interrupt::new(HELIX_M, shared, segments, points)?;
-        let mut range = Range::NONE;
+        let mut ranges = [Range::NONE, Range::NONE];
         loop {
             let before = SYST::get_current();
-            black_box(interrupt.run(black_box(false), black_box(false)));
-            range.add(between(before, SYST::get_current()).saturating_sub(floor));
+            let output = black_box(interrupt.run(black_box(false), black_box(false)));
+            let count = between(before, SYST::get_current()).saturating_sub(floor);
+            ranges[0].add(count);
+            if output.flags & flag::MOVING != 0 {
+                ranges[1].add(count);
+            }
             if !interrupt.drain() {
-                return Some(range);
+                return Some(ranges);
             }
         }
     }
@@ -223,18 +228,22 @@ mod image {
 
     fn measure() -> Option<()> {
         let floor = overhead();
-        let [all, steady] = arc(false, 0.0, floor)?;
+        let [all, steady] = arc(&[], 0.0, floor)?;
         say("arc_beta", &all);
         say("arc_beta_steady", &steady);
         say("stream", &stream(floor)?);
-        let [all, steady] = arc(true, 0.0, floor)?;
+        let [all, steady] = arc(&TERMS, 0.0, floor)?;
         say("arc_extended", &all);
         say("arc_extended_steady", &steady);
-        let [all, _] = arc(false, HELIX_M, floor)?;
+        let [all, _] = arc(&DEAREST, 0.0, floor)?;
+        say("arc_dearest", &all);
+        let [all, _] = arc(&[], HELIX_M, floor)?;
         say("helix_beta", &all);
-        let [all, _] = arc(true, HELIX_M, floor)?;
+        let [all, _] = arc(&TERMS, HELIX_M, floor)?;
         say("helix_extended", &all);
-        say("interrupt", &interrupt(floor)?);
+        let [all, moving] = interrupt(floor)?;
+        say("interrupt", &all);
+        say("interrupt_moving", &moving);
         say("naive_libm", &plain::<Libm>(floor));
         say("naive_nalgebra", &plain::<Nalgebra>(floor));
         say("naive_idsp", &plain::<Idsp>(floor));

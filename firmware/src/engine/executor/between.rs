@@ -12,8 +12,20 @@ impl Executor {
         let (before, wrapped) = self.phase.overflowing_sub(self.segment.timing.step);
         (self.phase, self.turns) = (before, self.turns.wrapping_sub(i32::from(wrapped)));
         self.left = self.segment.timing.cruise_ticks.wrapping_add(1);
-        self.mode = Mode::Cruise;
-        let mut out = self.cruise();
+        let mut out = match self.mode {
+            Mode::ArcRise => {
+                self.mode = Mode::ArcCruise;
+                self.arc_cruise::<false>()
+            }
+            Mode::TermRise => {
+                self.mode = Mode::TermCruise;
+                self.arc_cruise::<true>()
+            }
+            _ => {
+                self.mode = Mode::Cruise;
+                self.cruise()
+            }
+        };
         if self.pause {
             self.begin_pause();
         }
@@ -39,7 +51,11 @@ impl Executor {
 
     #[inline(always)]
     pub(super) fn begin_fall(&mut self) {
-        self.mode = Mode::Fall;
+        self.mode = match self.mode {
+            Mode::ArcCruise => Mode::ArcFall,
+            Mode::TermCruise => Mode::TermFall,
+            _ => Mode::Fall,
+        };
         self.clock = Clock::falling(self.segment.timing.clock_step);
         // So that the sum of steps less half the last one is the phase.
         self.advance(self.segment.timing.step >> 1);
@@ -118,7 +134,9 @@ impl Executor {
         self.mode = match self.segment.kind {
             _ if self.segment.epoch != self.epoch => Mode::Rest,
             Kind::Dwell | Kind::Clear => Mode::Dwell,
-            Kind::Arc | Kind::Line | Kind::Helix => Mode::Rise,
+            Kind::Arc if self.segment.extended => Mode::TermRise,
+            Kind::Arc => Mode::ArcRise,
+            Kind::Line | Kind::Helix => Mode::Rise,
         };
         self.clock = Clock::rising(timing.clock_step);
         (self.phase, self.turns) = (self.from, self.from_turns);

@@ -1,5 +1,4 @@
-//! Ticks of any curve: arcs in any plane, helices, lines, and a stop in a rising ramp. One way for all: each slide is
-//! corrected by its own motion.
+//! Ticks of any curve: lines, helices, and a stop in a rising ramp of anything.
 use super::phase::{ramp_phase, scaled};
 use super::{Executor, Mode};
 use crate::engine::planned::{Kind, turn};
@@ -63,7 +62,11 @@ impl Executor {
         match self.segment.kind {
             Kind::Line => {
                 let [x, y, z] = &self.segment.extra.linear;
-                let along = [x, y, z].map(|slide| slide.on_line(c, rate, turning));
+                let along = [
+                    x.on_line(c, rate, turning),
+                    y.on_line(c, rate, turning),
+                    z.on_line(c, rate, turning),
+                ];
                 sum(wanted, along)
             }
             Kind::Helix => self.with_rise(c, s, nominal, rate, turning, wanted),
@@ -88,10 +91,12 @@ impl Executor {
             nz.wrapping_sub(z.on_arc(c, s)),
         ];
         let [x, y, z] = &self.segment.extra.rising;
-        sum(
-            wanted,
-            [x, y, z].map(|slide| slide.offset(risen, rate, turning)),
-        )
+        let offset = [
+            x.offset(risen, rate, turning),
+            y.offset(risen, rate, turning),
+            z.offset(risen, rate, turning),
+        ];
+        sum(wanted, offset)
     }
 
     #[inline(never)]
@@ -171,7 +176,11 @@ impl Executor {
         }
         let rate2 = mulh(rate, rate).wrapping_mul(2);
         let [x, y, z] = &self.segment.extra.linear;
-        let slides = [x, y, z].map(|slide| slide.on_arc(rate, rate2, turning, c, s));
+        let slides = [
+            x.on_arc(rate, rate2, turning, c, s),
+            y.on_arc(rate, rate2, turning, c, s),
+            z.on_arc(rate, rate2, turning, c, s),
+        ];
         sum(wanted, slides)
     }
 

@@ -18,7 +18,7 @@ impl Executor {
     /// asks again at its top.
     pub(super) fn begin_pause(&mut self) {
         let timing = self.segment.timing;
-        let steady = self.mode == Mode::Cruise;
+        let steady = matches!(self.mode, Mode::ArcCruise | Mode::TermCruise | Mode::Cruise);
         if !steady || self.left <= timing.ramp_ticks {
             return;
         }

@@ -42,6 +42,9 @@ impl<'a> OutputFile<'a> {
             if found.is_dir() {
                 return Err(refused("cannot write: it is a folder"));
             }
+            if found.permissions().readonly() {
+                return Err(refused("cannot write: it is read-only"));
+            }
             if !std::fs::read(&real).is_ok_and(|bytes| program(&bytes)) {
                 return Err(refused("is there already and is no program"));
             }

@@ -24,6 +24,8 @@ pub(super) struct Summary<'a> {
 struct Size {
     count: usize,
     first_line: usize,
+    radius_mm: f64,
+    feed_mm_s: f64,
     delta_mm: f64,
     share: f64,
 }
@@ -99,6 +101,8 @@ impl Summary<'_> {
                     .entry((grain(radius_mm), grain(feed_mm_s)))
                     .or_insert_with(|| Size {
                         first_line: report.line,
+                        radius_mm,
+                        feed_mm_s,
                         ..Size::default()
                     });
                 size.count += 1;
@@ -111,13 +115,12 @@ impl Summary<'_> {
         let mut list: Vec<_> = sizes.into_iter().collect();
         list.sort_by_key(|(_, size)| std::cmp::Reverse(size.count));
         let rest: usize = list.iter().skip(NAMED).map(|(_, size)| size.count).sum();
-        for ((radius, feed), size) in list.iter().take(NAMED) {
-            let value = |grains: i64| (grains as f64 / 1000.0).exp();
+        for (_, size) in list.iter().take(NAMED) {
             out.say(format_args!(
                 "  {} of R {:.3} mm at {:.1} mm/s: {:+.1} µm (line {}{}){}",
                 size.count,
-                value(*radius),
-                value(*feed),
+                size.radius_mm,
+                size.feed_mm_s,
                 size.delta_mm * 1e3,
                 size.first_line,
                 if size.count > 1 { " …" } else { "" },

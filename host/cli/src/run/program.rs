@@ -51,7 +51,17 @@ pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
     };
     blocks(&args.program, &text, &running)?;
     let mut controller = args.port.open(out)?;
-    let start_mm = controller.status()?.raw_nm.map(|nm| f64::from(nm) * 1e-6);
+    let status = controller.status()?;
+    if let (Some((line, words)), Some(slot), false) =
+        (giotto_nc::marked(&text), status.active, status.bypass)
+    {
+        out.note(format_args!(
+            "warning: {}:{line}: corrected before ({words}), and the controller corrects by the table in slot {slot}: twice; \
+             run the original, or set `giotto bypass on`",
+            args.program.display()
+        ));
+    }
+    let start_mm = status.raw_nm.map(|nm| f64::from(nm) * 1e-6);
     let blocks = blocks(
         &args.program,
         &text,

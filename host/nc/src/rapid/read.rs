@@ -225,10 +225,15 @@ impl Reader {
             }
             _ if straight || triggered || welded => {
                 let stand = to(0, if welded { 5 } else { 3 }, triggered);
+                let stops = arguments(text, &text[..name.len()])
+                    .is_none_or(|list| list.iter().any(|a| a.eq_ignore_ascii_case("fine")));
                 let before = self.stand.take();
                 self.lose("an instruction that is not rewritten");
                 self.stand = stand;
-                self.passed(before, false, None)
+                Read {
+                    stops,
+                    ..self.passed(before, false, None)
+                }
             }
             _ if text.ends_with(':') => {
                 self.lose("a label");

@@ -1,9 +1,11 @@
 //! Columns named on the command line: `--columns time_s,-,x_mm,y_mm`.
 use super::Format;
+use super::grid::Grid;
 use super::layout::{Head, Layout, Quantity, split};
 use super::named;
 
-pub(super) fn recognise(head: &Head, given: &str) -> Result<Layout, String> {
+/// `alone`: a single column of lengths is a turn of evenly spaced readings.
+pub(super) fn recognise(head: &Head, given: &str, alone: bool) -> Result<Layout, String> {
     let mut fields = Vec::new();
     for (index, name) in given.split(',').map(str::trim).enumerate() {
         if matches!(name, "-" | "") {
@@ -19,11 +21,12 @@ pub(super) fn recognise(head: &Head, given: &str) -> Result<Layout, String> {
     }
     let has = |q| fields.iter().any(|f| f.1 == q);
     let polar = (has(Quantity::Deviation) || has(Quantity::Radius))
-        && (has(Quantity::Time) || has(Quantity::Angle));
-    let planar = has(Quantity::Position(0)) && has(Quantity::Position(1));
-    if !(polar || planar) {
+        && (has(Quantity::Time) || has(Quantity::Angle) || alone);
+    let axes = (0..3).filter(|axis| has(Quantity::Position(*axis))).count();
+    if !(polar || axes >= 2) {
         return Err(
-            "--columns: expected x and y, or deviation (or radius) with time or angle".to_owned(),
+            "--columns: expected x and y (or another two axes), or deviation (or radius) with time or angle"
+                .to_owned(),
         );
     }
     let wanted = given.split(',').count();
@@ -46,11 +49,8 @@ pub(super) fn recognise(head: &Head, given: &str) -> Result<Layout, String> {
                     .all(|(at, ..)| parts.get(*at).is_some_and(number))
             {
                 return Ok(Layout {
-                    format: Format::Columns,
-                    separator,
                     decimal_comma: comma,
-                    skip,
-                    fields,
+                    ..Layout::new(Format::Columns, separator, skip, fields)
                 });
             }
         }
@@ -59,4 +59,42 @@ pub(super) fn recognise(head: &Head, given: &str) -> Result<Layout, String> {
         "--columns: none of the first {} lines has numbers in those columns",
         head.lines.len()
     ))
+}
+
+/// What `--columns` could be for a file: its columns by their names as far as they are understood.
+pub(super) fn example(head: &Head) -> Option<String> {
+    let grid = Grid::of(head)?;
+    let names = grid.names(head).map_or_else(Vec::new, |n| n.names);
+    let usual = |quantity| match quantity {
+        Quantity::Time | Quantity::Stamp(_) => "time_s",
+        Quantity::Angle => "angle_deg",
+        Quantity::Deviation => "deviation_um",
+        Quantity::Radius => "radius_mm",
+        Quantity::Position(axis) => ["x_mm", "y_mm", "z_mm"][axis],
+        Quantity::Target(_) => "-",
+    };
+    let understood = |k: usize| {
+        let name = names.get(k)?;
+        named::column(name).map(|(quantity, _)| usual(quantity))
+    };
+    let mut list: Vec<&str> = (0..grid.width)
+        .map(|k| understood(k).unwrap_or("-"))
+        .collect();
+    // Where nothing is understood, any columns show how it is written.
+    if list.iter().filter(|n| **n != "-").count() < 2 && !list.contains(&"x_mm") {
+        let free: Vec<usize> = grid
+            .numbers
+            .iter()
+            .copied()
+            .filter(|k| list[*k] == "-")
+            .collect();
+        let words: &[&str] = match (list.contains(&"time_s"), free.len()) {
+            (true, 1) => &["deviation_um"],
+            (false, 1) => &["radius_mm"],
+            (true, _) | (false, 2) => &["x_mm", "y_mm"],
+            (false, _) => &["time_s", "x_mm", "y_mm"],
+        };
+        free.iter().zip(words).for_each(|(k, word)| list[*k] = word);
+    }
+    Some(list.join(","))
 }

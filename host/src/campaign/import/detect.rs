@@ -1,5 +1,7 @@
 //! Which layout a file has.
 use super::layout::{Head, Layout};
+use super::named::Found;
+use super::recognise::Reading;
 use super::{columns, kflop, leica, named, rtde, spatial_analyzer};
 use std::fmt;
 
@@ -76,31 +78,41 @@ impl fmt::Display for Format {
 /// What detection says in the end.
 #[derive(Debug)]
 pub(super) enum Detected {
-    Table(Layout),
+    Table(Box<Layout>),
     /// Results, no samples.
     Results,
-    Unknown,
+    /// No layout that is known; the names of its columns, if it has any.
+    Unknown {
+        names: Vec<String>,
+    },
 }
 
-/// Looks at the first lines. `wanted` other than `Auto` tries that layout alone.
-pub(super) fn detect(head: &Head, wanted: Format, given: Option<&str>) -> Result<Detected, String> {
-    if let Some(given) = given {
-        return columns::recognise(head, given).map(Detected::Table);
+/// Looks at the first lines. A format other than `Auto` tries that layout alone.
+pub(super) fn detect(head: &Head, reading: Reading<'_>) -> Result<Detected, String> {
+    let wanted = reading.format;
+    if let Some(given) = reading.columns {
+        let layout = columns::recognise(head, given, reading.even.is_some())?;
+        return Ok(Detected::Table(Box::new(layout)));
     }
-    let first = head.line(0);
-    let xml = first.trim_start().starts_with('<') || first.trim_start().starts_with("\u{ff}\u{fe}");
+    let xml = head.line(0).trim_start().starts_with('<');
     if wanted == Format::B5r || (wanted == Format::Auto && xml) {
         return Ok(Detected::Results);
     }
     type Recogniser = fn(&Head) -> Option<Layout>;
-    let known: [Recogniser; 5] = [
+    let known: [Recogniser; 4] = [
         spatial_analyzer::recognise,
         rtde::recognise,
         kflop::recognise,
         leica::recognise,
-        named::recognise,
     ];
+    let fits = |l: &Layout| wanted == Format::Auto || l.format == wanted;
     let mut found = known.iter().filter_map(|recognise| recognise(head));
-    let layout = found.find(|l| wanted == Format::Auto || l.format == wanted);
-    Ok(layout.map_or(Detected::Unknown, Detected::Table))
+    if let Some(layout) = found.find(fits) {
+        return Ok(Detected::Table(Box::new(layout)));
+    }
+    Ok(match named::recognise(head, reading.even.is_some()) {
+        Found::Table(layout) if fits(&layout) => Detected::Table(layout),
+        Found::Names(names) => Detected::Unknown { names },
+        _ => Detected::Unknown { names: Vec::new() },
+    })
 }

@@ -25,11 +25,5 @@ pub(super) fn recognise(head: &Head) -> Option<Layout> {
     }
     let has = |q| fields.iter().any(|f| f.1 == q);
     let complete = has(Quantity::Time) && has(Quantity::Position(0)) && has(Quantity::Position(1));
-    complete.then_some(Layout {
-        format: Format::Kflop,
-        separator: b',',
-        decimal_comma: false,
-        skip: 1,
-        fields,
-    })
+    complete.then(|| Layout::new(Format::Kflop, b',', 1, fields))
 }

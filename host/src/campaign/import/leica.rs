@@ -30,11 +30,8 @@ pub(super) fn recognise(head: &Head) -> Option<Layout> {
         .filter(|f| matches!(f.1, Quantity::Position(_)))
         .count();
     let decimal_comma = separator == b';';
-    (tracker && positions >= 2).then_some(Layout {
-        format: Format::Leica,
-        separator,
+    (tracker && positions >= 2).then(|| Layout {
         decimal_comma,
-        skip: 1,
-        fields,
+        ..Layout::new(Format::Leica, separator, 1, fields)
     })
 }

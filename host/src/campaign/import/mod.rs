@@ -3,36 +3,53 @@
 //! | file | holds |
 //! |---|---|
 //! | `layout` | what a layout is: separator, decimal mark, which field is what in which unit |
+//! | `grid` | where the rows begin, how their fields are divided, which lines name them |
+//! | `words` | what the name of a column says |
 //! | `detect` | which layout a file has |
 //! | `leica`, `spatial_analyzer`, `rtde`, `kflop` | one file a format with a layout of its own |
-//! | `named` | columns known by the words and units of a header (German locale, plain exports, the contract's own) |
+//! | `named` | columns known by the words and units of a header (exports, logs, other languages, the contract's own) |
+//! | `xml` | logs in XML as tables |
 //! | `columns` | columns named on the command line |
 //! | `recognise` | a file by its first lines |
 //! | `rows` | the rows of a file, SI, block by block |
+//! | `place` | where the rows of a turn stand in a file |
 //! | `sample` | a fair sample of its points |
-//! | `trim` | feed-in, feed-out, laps, arcs |
+//! | `ring` | the circle that most points are on |
+//! | `motion` | turns found from the motion: start, stop, pauses, laps, both directions, arcs |
+//! | `clocked` | turns of deviations over time |
 //! | `scan` | one look at all rows: which are the circle, and where they stand |
 //! | `add` | recordings as runs of a campaign, all or none |
+//! | `batch` | a whole session: folders, names, lists |
 //! | `ballbar20` | the results in `.b5r` files |
 //!
 //! A new instrument is a file with its `recognise` and a line in `detect`.
 mod add;
 pub mod ballbar20;
+pub mod batch;
+mod clocked;
 mod columns;
 mod detect;
+mod grid;
 mod kflop;
 mod layout;
 mod leica;
+mod motion;
 mod named;
+mod place;
 mod recognise;
+mod ring;
 mod rows;
 mod rtde;
 mod sample;
 mod scan;
 mod spatial_analyzer;
-mod trim;
+#[cfg(test)]
+mod tests;
+mod turns;
+mod words;
+mod xml;
 
-pub use add::{Added, Laps, Options, add, open};
+pub use add::{Added, Laps, Options, Reason, add, add_each, open};
 pub use detect::Format;
 pub(in crate::campaign) use layout::Quantity;
 pub use rows::Slice;
@@ -49,5 +66,10 @@ pub fn recognise(
     format: Format,
     columns: Option<&str>,
 ) -> Result<Format, CampaignError> {
-    recognise::rows_of(file, format, columns).map(|slice| slice.format())
+    let reading = recognise::Reading {
+        format,
+        columns,
+        even: None,
+    };
+    recognise::rows_of(file, reading).map(|slice| slice.format())
 }

@@ -2,15 +2,17 @@
 //!
 //! A row is parsed byte by byte without a copy of it. What that does not understand is read again with all leniency of
 //! [`Layout`] (blanks of other alphabets, odd stamps), and what that does not understand either is refused.
-use super::layout::{DateOrder, Layout, Quantity, latin1, split};
+use super::layout::{DateOrder, Layout, Quantity, is_missing, latin1, split};
 use crate::campaign::blocks::{Fault, Text};
 use crate::campaign::decimal;
 use crate::campaign::table::{Batch, shorten};
 use crate::campaign::{CampaignError, Place, Problem};
 use giotto_shared::circle::Scatter;
 use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::Arc;
 
 pub(super) const EXPECTED: &str = "a file with measurements";
 
@@ -26,6 +28,12 @@ pub struct Slice {
     pub(in crate::campaign) rows: usize,
     /// Moments of its points in space, if they were taken.
     pub(in crate::campaign) scatter: Option<Scatter>,
+    /// The text, where it is not read as it stands in the file.
+    pub(super) text: Option<Arc<[u8]>>,
+    /// Bytes of rows that are no part of the circle, in order, between the first and the last row.
+    pub(super) left_out: Arc<[[u64; 2]]>,
+    /// Lines without a row: the row before which they stand and how many they are.
+    pub(super) skipped: Arc<[(usize, usize)]>,
 }
 
 /// A block of rows, as its place in the file is known when it is taken.
@@ -35,6 +43,10 @@ pub(super) struct Block {
     pub(super) rows: usize,
     /// Bytes of the file.
     pub(super) bytes: [u64; 2],
+    /// Lines of the slice before it.
+    pub(super) line: usize,
+    /// Lines without a value: row of the block before which they stand, how many.
+    pub(super) missing: Vec<(usize, usize)>,
 }
 
 impl Slice {
@@ -50,12 +62,32 @@ impl Slice {
 
     /// Line of a row, counted from the first of the slice.
     pub(in crate::campaign) fn line(&self, row: usize) -> usize {
-        self.first_line + row
+        let before = self.skipped.partition_point(|(at, _)| *at <= row);
+        self.first_line + row + self.skipped[..before].iter().map(|s| s.1).sum::<usize>()
+    }
+
+    /// The bytes of a part of the text.
+    pub(super) fn read(&self, path: &Path, bytes: [u64; 2]) -> Result<Vec<u8>, CampaignError> {
+        let io = |e: std::io::Error| CampaignError::io(path, "read", EXPECTED, &e);
+        if let Some(text) = &self.text {
+            let end = text
+                .len()
+                .min(usize::try_from(bytes[1]).unwrap_or(usize::MAX));
+            let start = end.min(usize::try_from(bytes[0]).unwrap_or(usize::MAX));
+            return Ok(text[start..end].to_vec());
+        }
+        let mut file = File::open(path).map_err(io)?;
+        file.seek(SeekFrom::Start(bytes[0])).map_err(io)?;
+        let mut text = Vec::new();
+        file.take(bytes[1] - bytes[0])
+            .read_to_end(&mut text)
+            .map_err(io)?;
+        Ok(text)
     }
 
     /// The columns of one row, if it can be read.
     pub(super) fn one(&self, line: &[u8]) -> Option<Vec<f64>> {
-        let parsed = Plan::of(&self.layout).block(line);
+        let parsed = Plan::of(self).block(u64::MAX - line.len() as u64, line);
         (parsed.batch.rows == 1).then(|| {
             parsed
                 .batch
@@ -74,46 +106,50 @@ impl Slice {
         mut take: impl FnMut(Block, T) -> Result<ControlFlow<()>, CampaignError>,
     ) -> Result<(), CampaignError> {
         let io = |e: std::io::Error| CampaignError::io(path, "read", EXPECTED, &e);
-        let text = Text::between(File::open(path).map_err(io)?, self.bytes[0], self.bytes[1])
-            .map_err(io)?;
-        let plan = Plan::of(&self.layout);
+        let [from, to] = self.bytes;
+        let text = match &self.text {
+            Some(text) => Text::of_memory(text.clone(), from, to),
+            None => Text::between(File::open(path).map_err(io)?, from, to).map_err(io)?,
+        };
+        let plan = Plan::of(self);
         let (mut lines, mut rows) = (0, 0);
         let mut blank: Option<usize> = None;
         let parse = |at: u64, bytes: &[u8]| {
-            let parsed = plan.block(bytes);
-            let [blank, count, lines] = [parsed.blank, Some(parsed.batch.rows), Some(parsed.lines)];
-            (
-                blank,
-                count,
-                lines,
-                parsed.failed,
-                [at, at + bytes.len() as u64],
-                prepare(parsed.batch),
-            )
+            let parsed = plan.block(at, bytes);
+            let rest = Rest {
+                rows: parsed.batch.rows,
+                lines: parsed.lines,
+                blank: parsed.blank,
+                failed: parsed.failed,
+                missing: parsed.missing,
+                bytes: [at, at + bytes.len() as u64],
+            };
+            (rest, prepare(parsed.batch))
         };
-        let walked = text.walk(parse, |(empty, count, more, failed, bytes, prepared)| {
+        let walked = text.walk(parse, |(rest, prepared): (Rest, T)| {
             let refuse = |line: usize, column: usize, problem: Problem| {
                 Err(CampaignError::new(
                     Place::at(path, self.first_line + line, column),
                     problem,
                 ))
             };
-            let (count, more) = (count.unwrap_or(0), more.unwrap_or(0));
-            if let (Some(blank), true) = (blank, count > 0 || failed.is_some()) {
+            if let (Some(blank), true) = (blank, rest.rows > 0 || rest.failed.is_some()) {
                 return refuse(blank, 1, Problem::EmptyLine); // blank lines may end a file, not divide it
             }
-            if let Some((line, column, problem)) = failed {
+            if let Some((line, column, problem)) = rest.failed {
                 return refuse(lines + line, column, problem);
             }
-            blank = blank.or(empty.map(|line| lines + line));
-            lines += more;
+            blank = blank.or(rest.blank.map(|line| lines + line));
             let block = Block {
                 first: rows,
-                rows: count,
-                bytes,
+                rows: rest.rows,
+                bytes: rest.bytes,
+                line: lines,
+                missing: rest.missing,
             };
-            rows += count;
-            if count == 0 {
+            lines += rest.lines;
+            rows += rest.rows;
+            if rest.rows == 0 && block.missing.is_empty() {
                 Ok(ControlFlow::Continue(()))
             } else {
                 take(block, prepared)
@@ -124,6 +160,7 @@ impl Slice {
             Fault::Endless(_) => {
                 let problem = Problem::Columns {
                     reason: "no line end for a long way; expected rows".to_owned(),
+                    example: None,
                 };
                 CampaignError::new(Place::at(path, self.first_line + lines, 1), problem)
             }
@@ -147,29 +184,48 @@ impl Slice {
 /// Fields in the order in which they stand in a row.
 struct Plan<'a> {
     layout: &'a Layout,
+    left_out: &'a [[u64; 2]],
     /// Field of the row, column of the batch, meaning, factor.
     fields: Vec<(usize, usize, Quantity, f64)>,
+}
+
+/// What is known of a block beside its numbers.
+struct Rest {
+    rows: usize,
+    lines: usize,
+    blank: Option<usize>,
+    failed: Option<(usize, usize, Problem)>,
+    missing: Vec<(usize, usize)>,
+    bytes: [u64; 2],
 }
 
 struct Parsed {
     batch: Batch,
     lines: usize,
+    /// Lines without a value: row before which they stand, how many.
+    missing: Vec<(usize, usize)>,
     /// First empty line of those at the end.
     blank: Option<usize>,
     failed: Option<(usize, usize, Problem)>,
 }
 
 impl<'a> Plan<'a> {
-    fn of(layout: &'a Layout) -> Self {
+    fn of(slice: &'a Slice) -> Self {
+        let (layout, left_out) = (&slice.layout, &slice.left_out[..]);
         let columns = layout.fields.iter().enumerate();
         let mut fields: Vec<_> = columns
             .map(|(k, &(at, quantity, factor))| (at, k, quantity, factor))
             .collect();
         fields.sort_by_key(|f| f.0);
-        Self { layout, fields }
+        Self {
+            layout,
+            left_out,
+            fields,
+        }
     }
 
-    fn block(&self, bytes: &[u8]) -> Parsed {
+    /// Parses the block that begins at byte `from`.
+    fn block(&self, from: u64, bytes: &[u8]) -> Parsed {
         let guess = bytes.len() / (8 * self.fields.len()) + 1;
         let mut columns: Vec<Vec<f64>> = self
             .fields
@@ -179,7 +235,24 @@ impl<'a> Plan<'a> {
         let mut values = vec![0.0; columns.len()];
         let (mut at, mut rows, mut lines, mut blank, mut failed) = (0, 0, 0, None, None);
         let mut dates = Dates::default();
+        let mut missing: Vec<(usize, usize)> = Vec::new();
+        let first_hole = self.left_out.partition_point(|hole| hole[1] <= from);
+        let mut holes = self.left_out[first_hole..].iter();
+        let mut hole = holes.next();
         while at < bytes.len() {
+            // Rows that were left out are lines still.
+            if let Some(next) = hole.filter(|hole| hole[0] <= from + at as u64) {
+                let end = bytes.len().min((next[1].saturating_sub(from)) as usize);
+                let skipped = &bytes[at..end.max(at)];
+                lines += memchr::memchr_iter(b'\n', skipped).count();
+                at = end.max(at);
+                hole = if end < bytes.len() {
+                    holes.next()
+                } else {
+                    hole
+                };
+                continue;
+            }
             let fast = if matches!(bytes[at], b'\n' | b'\r') {
                 None
             } else {
@@ -196,9 +269,20 @@ impl<'a> Plan<'a> {
                         (at, lines) = (end, lines + 1);
                         continue;
                     }
-                    if let Err((column, problem)) = slow(self.layout, line, &mut values) {
-                        failed = Some((lines, column, problem));
-                        break;
+                    match slow(self.layout, line, &mut values) {
+                        Ok(true) => {}
+                        Ok(false) => {
+                            match missing.last_mut() {
+                                Some((row, count)) if *row == rows => *count += 1,
+                                _ => missing.push((rows, 1)),
+                            }
+                            (at, lines) = (end, lines + 1);
+                            continue;
+                        }
+                        Err((column, problem)) => {
+                            failed = Some((lines, column, problem));
+                            break;
+                        }
                     }
                     end
                 }
@@ -216,6 +300,7 @@ impl<'a> Plan<'a> {
         Parsed {
             batch: Batch { columns, rows },
             lines,
+            missing,
             blank,
             failed,
         }
@@ -345,8 +430,9 @@ impl Dates {
     }
 }
 
-/// Reads a row with all leniency.
-fn slow(layout: &Layout, line: &[u8], values: &mut [f64]) -> Result<(), (usize, Problem)> {
+/// Reads a row with all leniency; `false` for a row of the usual width in which a value is missing, as instruments write it
+/// when they lose the target.
+fn slow(layout: &Layout, line: &[u8], values: &mut [f64]) -> Result<bool, (usize, Problem)> {
     let text;
     let line = match std::str::from_utf8(line) {
         Ok(line) => line,
@@ -367,6 +453,10 @@ fn slow(layout: &Layout, line: &[u8], values: &mut [f64]) -> Result<(), (usize, 
             },
         ));
     }
+    let used = || layout.fields.iter().map(|f| parts[f.0]);
+    if parts.len() == layout.width && used().any(is_missing) {
+        return Ok(false);
+    }
     for (&(at, quantity, factor), value) in layout.fields.iter().zip(values) {
         let field = parts[at];
         let column = || {
@@ -375,7 +465,7 @@ fn slow(layout: &Layout, line: &[u8], values: &mut [f64]) -> Result<(), (usize, 
                 .count()
                 + 1
         };
-        let name = || format!("{quantity:?}").to_lowercase();
+        let name = || quantity.name().to_owned();
         *value = if let Quantity::Stamp(order) = quantity {
             seconds(field, order).ok_or_else(|| {
                 (
@@ -418,14 +508,20 @@ fn slow(layout: &Layout, line: &[u8], values: &mut [f64]) -> Result<(), (usize, 
             }
         };
     }
-    Ok(())
+    Ok(true)
 }
 
 /// Seconds of a stamp since 1970 (UTC assumed; only differences are used).
 fn seconds(text: &str, order: DateOrder) -> Option<f64> {
     let text = text.trim().trim_start_matches('\'').trim();
-    let (date, clock) = text.split_once(' ')?;
-    let mut clock = clock.trim().split(':');
+    let (date, clock) = match text.split_once([' ', 'T']) {
+        Some((date, clock)) => (Some(date), clock),
+        None => (None, text),
+    };
+    // The zone is the same all along.
+    let clock = clock.trim().trim_end_matches('Z');
+    let clock = clock.split(['+', '-']).next().unwrap_or(clock);
+    let mut clock = clock.split(':');
     let (hour, minute) = (
         clock.next()?.parse::<f64>().ok()?,
         clock.next()?.parse::<f64>().ok()?,
@@ -434,16 +530,18 @@ fn seconds(text: &str, order: DateOrder) -> Option<f64> {
     if clock.next().is_some() {
         return None;
     }
-    Some(days(date, order)? as f64 * 86_400.0 + hour * 3600.0 + minute * 60.0 + second)
+    let days = date.map_or(Some(0), |date| days(date, order))?;
+    Some(days as f64 * 86_400.0 + hour * 3600.0 + minute * 60.0 + second)
 }
 
 /// Days since 1970 of the proleptic Gregorian calendar, years starting in March.
 fn days(date: &str, order: DateOrder) -> Option<i64> {
     let mut date = date.split(['.', '/', '-']).map(|p| p.parse::<i64>().ok());
-    let (a, b, year) = (date.next()??, date.next()??, date.next()??);
-    let (day, month) = match order {
-        DateOrder::DayMonthYear => (a, b),
-        DateOrder::MonthDayYear => (b, a),
+    let (a, b, c) = (date.next()??, date.next()??, date.next()??);
+    let (day, month, year) = match order {
+        DateOrder::DayMonthYear => (a, b, c),
+        DateOrder::MonthDayYear => (b, a, c),
+        DateOrder::YearMonthDay => (c, b, a),
     };
     let year = if year < 100 { year + 2000 } else { year };
     if !(1..=12).contains(&month) || !(1..=31).contains(&day) || !(1970..=9999).contains(&year) {
@@ -461,11 +559,8 @@ mod tests {
     #[test]
     fn both_readers_of_a_row_agree_and_the_plain_one_needs_no_help() {
         let layout = |separator, decimal_comma, fields: &[(usize, Quantity, f64)]| Layout {
-            format: super::super::Format::Columns,
-            separator,
             decimal_comma,
-            skip: 0,
-            fields: fields.to_vec(),
+            ..Layout::new(super::super::Format::Columns, separator, 0, fields.to_vec())
         };
         let stamp = Quantity::Stamp(DateOrder::DayMonthYear);
         let xyz: Vec<_> = (0..3).map(|k| (k, Quantity::Position(k), 1e-3)).collect();
@@ -490,7 +585,18 @@ mod tests {
             (layout(b',', false, &xyz), "\"1.5\",\"2\",\"-3\"\n"),
         ];
         for (layout, row) in cases {
-            let plan = Plan::of(&layout);
+            let mut fields: Vec<_> = layout
+                .fields
+                .iter()
+                .enumerate()
+                .map(|(k, f)| (f.0, k, f.1, f.2))
+                .collect();
+            fields.sort_by_key(|f| f.0);
+            let plan = Plan {
+                layout: &layout,
+                left_out: &[],
+                fields,
+            };
             let [mut fast, mut slow_values] = [
                 vec![0.0; layout.fields.len()],
                 vec![0.0; layout.fields.len()],
@@ -500,7 +606,7 @@ mod tests {
                 Some(row.len()),
                 "{row}"
             );
-            slow(&layout, row.as_bytes(), &mut slow_values).unwrap();
+            assert_eq!(slow(&layout, row.as_bytes(), &mut slow_values), Ok(true));
             assert_eq!(fast, slow_values, "{row}");
             assert!(fast.iter().all(|v| *v != 0.0), "{row}: {fast:?}");
         }
@@ -511,5 +617,10 @@ mod tests {
         assert_eq!(days("01.01.1970", DateOrder::DayMonthYear), Some(0));
         assert_eq!(days("11/08/22", DateOrder::MonthDayYear), Some(19_304));
         assert_eq!(days("13/08/22", DateOrder::MonthDayYear), None);
+        assert_eq!(days("1970-01-02", DateOrder::YearMonthDay), Some(1));
+        let iso = |text| seconds(text, DateOrder::YearMonthDay);
+        assert_eq!(iso("1970-01-02T01:02:03.5Z"), Some(90_123.5));
+        assert_eq!(iso("1970-01-02 01:02:03,5+02:00"), Some(90_123.5));
+        assert_eq!(iso("01:02:03"), Some(3723.0));
     }
 }

@@ -24,11 +24,5 @@ pub(super) fn recognise(head: &Head) -> Option<Layout> {
         .iter()
         .filter(|f| matches!(f.1, Quantity::Position(_)))
         .count();
-    (positions == 3).then_some(Layout {
-        format: Format::Rtde,
-        separator,
-        decimal_comma: false,
-        skip: 1,
-        fields,
-    })
+    (positions == 3).then(|| Layout::new(Format::Rtde, separator, 1, fields))
 }

@@ -24,7 +24,7 @@ pub(super) fn points(
     let mut file = File::open(path).map_err(io)?;
     let size = file.metadata().map_err(io)?.len();
     let start = slice.bytes[0];
-    if size.saturating_sub(start) <= WHOLE {
+    if slice.text.is_some() || size.saturating_sub(start) <= WHOLE {
         slice.walk_all(
             path,
             |batch| batch,

@@ -1,20 +1,24 @@
-//! One look at all rows of a foreign file: which of them are the circle, lap by lap, and where in the file those stand.
+//! One look at all rows of a foreign file: which of them are the circle, turn by turn, and where in the file those stand.
 //!
 //! Memory is 8 bytes a row for positions and angles and 16 for deviations over time, and nothing of it outlives the scan:
 //! what is kept of the rest is every n-th row (65 536 at most) and the moments of blocks.
 use super::add::Options;
+use super::clocked;
 use super::detect::Format;
-use super::layout::Quantity;
-use super::recognise::rows_of;
+use super::layout::{Layout, Quantity};
+use super::motion::Track;
+use super::place::{Mark, Places};
+use super::recognise::{Reading, rows_of};
+use super::ring::{self, Ring};
 use super::rows::Slice;
 use super::sample;
-use super::trim::{self, Ring, Turns};
+use super::turns::{Turn, Turns, Why};
 use crate::campaign::samples::FEWEST;
 use crate::campaign::table::Batch;
 use crate::campaign::thinned::Thinned;
 use crate::campaign::{CampaignError, Place, Problem};
-use giotto_shared::circle::{Merge, Plane, Scatter};
-use std::io::{Read, Seek, SeekFrom};
+use giotto_shared::circle::{Plane, Scatter};
+use std::f64::consts::TAU;
 use std::ops::{ControlFlow, Range};
 use std::path::Path;
 
@@ -23,20 +27,30 @@ pub(super) struct Scan {
     pub(super) format: Format,
     /// Rows of the file.
     pub(super) rows: usize,
-    pub(super) turns: Turns,
-    /// Where the laps stand.
-    pub(super) slices: Vec<Slice>,
-    /// Rows of each lap, by number in the file.
-    pub(super) laps: Vec<Range<usize>>,
-    /// Radius of the circle that the controller wanted, of each lap, m.
-    pub(super) target_radius_m: Vec<Option<f64>>,
+    pub(super) turns: Vec<FoundTurn>,
+    /// What is to be said of the file.
+    pub(super) notes: Vec<String>,
+    /// Line of the first row.
+    pub(super) first_line: usize,
 }
 
-/// A block of rows gone by.
-struct Mark {
-    first: usize,
-    bytes: [u64; 2],
-    scatter: Scatter,
+/// A turn and where it stands.
+pub(super) struct FoundTurn {
+    pub(super) slice: Slice,
+    /// +1 counter-clockwise, −1 clockwise, 0 where it cannot be seen.
+    pub(super) sign: f64,
+    /// Number of the passage in one direction, and of the turn in it, with how many there are of each.
+    pub(super) pass: (usize, usize),
+    pub(super) lap: (usize, usize),
+    pub(super) arc_rad: Option<f64>,
+    /// Angle of its first row since the first row of the test, rad.
+    pub(super) from_rad: f64,
+    /// Rows before it and behind it.
+    pub(super) outside: (usize, usize),
+    /// Why rows are left out, with how many and the lines where they stand together.
+    pub(super) left_out: Vec<(Why, usize, Option<[usize; 2]>)>,
+    /// Radius of the circle that the controller wanted, m.
+    pub(super) target_radius_m: Option<f64>,
 }
 
 /// What is collected of the rows.
@@ -49,9 +63,12 @@ struct Seen {
     /// All of it for deviations over time only.
     time: Vec<f64>,
     deviation: Vec<f64>,
-    stretch: trim::Longest,
+    /// Rows on the circle.
+    on: Vec<Range<usize>>,
     times: Thinned<f64>,
     targets: Thinned<[f64; 3]>,
+    /// Lines without a value: row before which they stand, how many.
+    missing: Vec<(usize, usize)>,
 }
 
 struct Columns {
@@ -68,7 +85,7 @@ impl Columns {
         let find = |wanted: &dyn Fn(Quantity) -> bool| quantities.iter().position(|q| wanted(*q));
         let three = |make: fn(usize) -> Quantity| {
             let found = [0, 1, 2].map(|axis| find(&|q| q == make(axis)));
-            (found[0].is_some() && found[1].is_some()).then_some(found)
+            (found.iter().flatten().count() >= 2).then_some(found)
         };
         let deviation = find(&|q| q == Quantity::Deviation).map(|f| (f, 0.0));
         Self {
@@ -79,6 +96,10 @@ impl Columns {
             target: three(Quantity::Target),
         }
     }
+
+    fn by_time(&self) -> bool {
+        self.position.is_none() && self.angle.is_none()
+    }
 }
 
 /// Looks through a file. `progress` is told the bytes read so far.
@@ -87,28 +108,21 @@ pub(super) fn scan(
     options: &Options,
     progress: &dyn Fn(u64),
 ) -> Result<Scan, CampaignError> {
-    let all = rows_of(path, options.format, options.columns.as_deref())?;
-    let refuse = |problem| CampaignError::new(Place::at(path, all.first_line, 1), problem);
+    let sign = options.direction.map_or(1.0, |d| f64::from(d.sign()));
+    let reading = Reading {
+        format: options.format,
+        columns: options.columns.as_deref(),
+        even: options
+            .even_angles
+            .then_some((options.start_angle_rad.unwrap_or(0.0), sign)),
+    };
+    let mut all = rows_of(path, reading)?;
+    let first_line = all.first_line;
+    let refuse = |problem| CampaignError::new(Place::at(path, first_line, 1), problem);
     let columns = Columns::of(&all, options.radius_m);
     let ring = match columns.position {
         None => None,
-        Some(position) => {
-            let points = sample::points(path, &all, position)?;
-            if points[0].len() < FEWEST {
-                None // too few rows, as the look at all of them will say
-            } else {
-                let found = trim::ring(&points, options.radius_m);
-                let rows = points[0].len();
-                let radius_mm = (options.radius_m * 1e9).round() / 1e6;
-                Some(found.ok_or_else(|| {
-                    refuse(Problem::OffCircle {
-                        found: 0,
-                        rows,
-                        radius_mm,
-                    })
-                })?)
-            }
-        }
+        Some(position) => circle(path, &mut all, position, options.radius_m, &refuse)?,
     };
     let mut seen = look(path, &all, &columns, ring.as_ref(), progress)?;
     if seen.rows < FEWEST {
@@ -117,21 +131,185 @@ pub(super) fn scan(
             expected: FEWEST,
         }));
     }
-    let turns = turns(&mut seen, path, &all, &columns, options).map_err(refuse)?;
-    let (mut slices, mut targets) = (Vec::new(), Vec::new());
-    for lap in &turns.laps {
-        slices.push(slice(path, &all, &columns, &seen.marks, lap)?);
-        targets.push(target_radius(&seen.targets, lap, columns.target));
+    all.skipped = std::mem::take(&mut seen.missing).into();
+    let mut notes = all.layout.notes.clone();
+    let (turns, clocked) = if columns.by_time() {
+        time_unit(
+            &mut all.layout,
+            seen.time.as_mut_slice(),
+            options,
+            &mut notes,
+        );
+        let entry = options.entry(path, all.clone());
+        let found = clocked::turns(&seen.time, &seen.deviation, &entry).map_err(refuse)?;
+        notes.extend(found.notes);
+        seen.on = vec![found.inside];
+        (found.turns, true)
+    } else {
+        (
+            by_angle(&mut seen, &mut all, &columns, options, &mut notes).map_err(refuse)?,
+            false,
+        )
+    };
+    let mut found = Vec::new();
+    let mut places = Places::new(path, &all, &seen.marks);
+    for (p, pass) in turns.passes.iter().enumerate() {
+        for (k, turn) in pass.turns.iter().enumerate() {
+            let slice = if clocked && !turn.left_out.is_empty() {
+                closed_up(&all, &seen, turn)
+            } else {
+                places.slice(turn, columns.position)?
+            };
+            found.push(FoundTurn {
+                slice,
+                sign: pass.sign,
+                pass: (p + 1, turns.passes.len()),
+                lap: (k + 1, pass.turns.len()),
+                arc_rad: pass.arc_rad,
+                from_rad: turn.from_rad,
+                outside: (turn.rows.start, seen.rows - turn.rows.end),
+                left_out: reasons(&turns, [p, k], &seen, &all),
+                target_radius_m: target_radius(&seen.targets, &turn.rows, columns.target),
+            });
+        }
     }
-    let laps = turns.laps.clone();
     Ok(Scan {
         format: all.layout.format,
         rows: seen.rows,
-        turns,
-        slices,
-        laps,
-        target_radius_m: targets,
+        turns: found,
+        notes,
+        first_line,
     })
+}
+
+/// The circle of positions, in the unit in which it has the programmed radius where the file gives none.
+fn circle(
+    path: &Path,
+    all: &mut Slice,
+    position: [Option<usize>; 3],
+    radius_m: f64,
+    refuse: &dyn Fn(Problem) -> CampaignError,
+) -> Result<Option<Ring>, CampaignError> {
+    const UNITS: [(f64, &str); 4] = [(1.0, "mm"), (1e3, "m"), (25.4, "inches"), (1e-3, "µm")];
+    let points = sample::points(path, all, position)?;
+    let rows = points.iter().map(Vec::len).max().unwrap_or(0);
+    if rows < FEWEST {
+        return Ok(None); // too few rows, as the look at all of them will say
+    }
+    let units = if all.layout.open.length {
+        &UNITS[..]
+    } else {
+        &UNITS[..1]
+    };
+    for (unit, name) in units {
+        let points = points
+            .clone()
+            .map(|axis| axis.iter().map(|v| v * unit).collect());
+        let Some(ring) = ring::ring(&points, radius_m) else {
+            continue;
+        };
+        let fits = (ring.radius_m() / radius_m - 1.0).abs() < 0.25;
+        if units.len() == 1 || (fits && *unit == 1.0) {
+            return Ok(Some(ring));
+        }
+        if fits {
+            let is = |q| matches!(q, Quantity::Position(_) | Quantity::Target(_));
+            let fields = all.layout.fields.iter_mut();
+            fields.filter(|f| is(f.1)).for_each(|f| f.2 *= unit);
+            let words = "no unit in the header: positions taken as";
+            all.layout.notes.push(format!(
+                "{words} {name}, with which the circle has the programmed radius"
+            ));
+            return Ok(Some(ring));
+        }
+    }
+    // As millimetres, so that the refusal tells how far off it is.
+    let ring = ring::ring(&points, radius_m);
+    let radius_mm = (radius_m * 1e9).round() / 1e6;
+    ring.map(Some).ok_or_else(|| {
+        refuse(Problem::OffCircle {
+            found: 0,
+            rows,
+            radius_mm,
+        })
+    })
+}
+
+/// The unit of time that makes the turn last about as long as programmed, where the file gives none.
+fn time_unit(layout: &mut Layout, time: &mut [f64], options: &Options, notes: &mut Vec<String>) {
+    let (Some(first), Some(last)) = (time.first(), time.last()) else {
+        return;
+    };
+    let turn_s = TAU * options.radius_m / options.feed_m_s;
+    if let Some(factor) = unit_of_time(layout, (last - first) / turn_s, notes) {
+        time.iter_mut().for_each(|t| *t *= factor);
+    }
+}
+
+/// The factor that brings `ratio`, measured over programmed duration, to about one; changes the layout.
+fn unit_of_time(layout: &mut Layout, ratio: f64, notes: &mut Vec<String>) -> Option<f64> {
+    const UNITS: [(f64, &str); 4] = [(1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"), (60.0, "minutes")];
+    if !layout.open.time || (1.0 / 30.0..=30.0).contains(&ratio) {
+        return None;
+    }
+    let (factor, name) = UNITS
+        .into_iter()
+        .find(|(factor, _)| (0.2..20.0).contains(&(ratio * factor)))?;
+    let fields = layout.fields.iter_mut();
+    fields
+        .filter(|f| f.1 == Quantity::Time)
+        .for_each(|f| f.2 *= factor);
+    notes.push(format!("no unit in the header: time taken as {name}"));
+    Some(factor)
+}
+
+/// Turns of positions or measured angles.
+fn by_angle(
+    seen: &mut Seen,
+    all: &mut Slice,
+    columns: &Columns,
+    options: &Options,
+    notes: &mut Vec<String>,
+) -> Result<Turns, Problem> {
+    if columns.position.is_some() {
+        let on: usize = seen.on.iter().map(Range::len).sum();
+        if on * 4 < seen.rows || on < FEWEST {
+            let radius_mm = (options.radius_m * 1e9).round() / 1e6;
+            return Err(Problem::OffCircle {
+                found: on,
+                rows: seen.rows,
+                radius_mm,
+            });
+        }
+    } else {
+        seen.on = std::iter::once(0..seen.rows).collect();
+        let (low, high) = seen
+            .angle
+            .iter()
+            .fold((f64::MAX, f64::MIN), |(l, h), a| (l.min(*a), h.max(*a)));
+        if all.layout.open.angle && (380.0..420.0).contains(&(high - low).to_degrees()) {
+            seen.angle.iter_mut().for_each(|a| *a *= 0.9);
+            let fields = all.layout.fields.iter_mut();
+            fields
+                .filter(|f| f.1 == Quantity::Angle)
+                .for_each(|f| f.2 *= 0.9);
+            notes.push("\"grad\" taken as a 400th of a turn: the angles end there".to_owned());
+        }
+    }
+    let track = Track {
+        angle: &mut seen.angle,
+        on: &seen.on,
+        time: &seen.times,
+    };
+    let turns = track.turns()?;
+    if let Some(turn) = turns.passes.first().and_then(|p| p.turns.first()) {
+        let t = |row: usize| seen.times.at(row).map(|(_, t)| t);
+        if let (Some(from), Some(to)) = (t(turn.rows.start), t(turn.rows.end - 1)) {
+            let turn_s = TAU * options.radius_m / options.feed_m_s;
+            unit_of_time(&mut all.layout, (to - from) / turn_s, notes);
+        }
+    }
+    Ok(turns)
 }
 
 fn look(
@@ -141,23 +319,23 @@ fn look(
     ring: Option<&Ring>,
     progress: &dyn Fn(u64),
 ) -> Result<Seen, CampaignError> {
-    let by_time = columns.position.is_none() && columns.angle.is_none();
+    let by_time = columns.by_time();
     let prepare = |batch: Batch| {
         let mut scatter = Scatter::default();
         let mut on = Vec::new();
         let mut angle = Vec::new();
         if let (Some(position), Some(ring)) = (columns.position, ring) {
             let column = |axis: usize| position[axis].map(|f| batch.columns[f].as_slice());
-            if let (Some(x), Some(y)) = (column(0), column(1)) {
-                let z = column(2);
-                scatter = z.map_or_else(Scatter::default, |z| Scatter::of_block(x, y, z));
-                angle.reserve_exact(batch.rows);
-                on.reserve_exact(batch.rows);
-                for k in 0..batch.rows {
-                    let (a, inside) = ring.at([x[k], y[k], z.map_or(0.0, |z| z[k])]);
-                    angle.push(a);
-                    on.push(inside);
-                }
+            let value = |axis: usize, k: usize| column(axis).map_or(0.0, |c| c[k]);
+            if let [Some(x), Some(y), Some(z)] = [0, 1, 2].map(column) {
+                scatter = Scatter::of_block(x, y, z);
+            }
+            angle.reserve_exact(batch.rows);
+            on.reserve_exact(batch.rows);
+            for k in 0..batch.rows {
+                let (a, inside) = ring.at([value(0, k), value(1, k), value(2, k)]);
+                angle.push(a);
+                on.push(inside);
             }
         } else if let Some(field) = columns.angle {
             angle.clone_from(&batch.columns[field]);
@@ -168,7 +346,10 @@ fn look(
     all.walk(path, prepare, |block, (batch, scatter, angle, on)| {
         if seen.angle.is_empty() && seen.deviation.is_empty() {
             // Rows are about as long as the first ones: reserve once, so that growing never doubles the memory.
-            let size = std::fs::metadata(path).map_or(0, |m| m.len());
+            let size = match &all.text {
+                Some(text) => text.len() as u64,
+                None => std::fs::metadata(path).map_or(0, |m| m.len()),
+            };
             let rows = size / ((block.bytes[1] - block.bytes[0]) / block.rows.max(1) as u64).max(1);
             let rows = usize::try_from(rows + rows / 64).unwrap_or(0);
             if by_time {
@@ -180,12 +361,16 @@ fn look(
         }
         seen.marks.push(Mark {
             first: block.first,
+            line: block.line,
             bytes: block.bytes,
             scatter,
         });
+        let missing = block.missing.iter();
+        seen.missing
+            .extend(missing.map(|(row, lines)| (block.first + row, *lines)));
+        on_circle(&mut seen.on, seen.rows, &on);
         seen.rows += block.rows;
         seen.angle.extend_from_slice(&angle);
-        on.iter().for_each(|on| seen.stretch.push(*on));
         if by_time {
             let time = columns.time.map_or(&[][..], |f| &batch.columns[f]);
             let (radial, nominal) = columns
@@ -210,136 +395,116 @@ fn look(
     Ok(seen)
 }
 
-fn turns(
-    seen: &mut Seen,
-    path: &Path,
-    all: &Slice,
-    columns: &Columns,
-    options: &Options,
-) -> Result<Turns, Problem> {
-    if columns.position.is_some() {
-        let (rows, stretch) = (seen.rows, seen.stretch.best());
-        if stretch.len() * 4 < rows || stretch.len() < FEWEST {
-            let radius_mm = (options.radius_m * 1e9).round() / 1e6;
-            return Err(Problem::OffCircle {
-                found: stretch.len(),
-                rows,
-                radius_mm,
-            });
+/// Adds the rows of a block that lie on the circle to the stretches that do.
+fn on_circle(stretches: &mut Vec<Range<usize>>, first: usize, on: &[bool]) {
+    for (row, on) in (first..).zip(on) {
+        if !on {
+            continue;
         }
-        let mut angle = std::mem::take(&mut seen.angle);
-        let angle = &mut angle[stretch.clone()];
-        trim::unwrap(angle);
-        let mut turns = trim::of_angles(angle, stretch.start, &seen.times)?;
-        turns
-            .laps
-            .iter_mut()
-            .for_each(|l| *l = l.start + stretch.start..l.end + stretch.start);
-        turns.feed_in += stretch.start;
-        turns.feed_out += rows - stretch.end;
-        return Ok(turns);
+        match stretches.last_mut() {
+            Some(last) if last.end == row => last.end += 1,
+            _ => stretches.push(row..row + 1),
+        }
     }
-    if columns.angle.is_some() {
-        let mut angle = std::mem::take(&mut seen.angle);
-        trim::unwrap(&mut angle);
-        return trim::of_angles(&angle, 0, &seen.times);
-    }
-    let (time, deviation) = (
-        std::mem::take(&mut seen.time),
-        std::mem::take(&mut seen.deviation),
-    );
-    trim::of_times(&time, &deviation, &options.entry(path, all.clone()))
 }
 
-/// Where the rows of a lap stand, and the moments of their points.
-fn slice(
-    path: &Path,
+/// Why rows are left out of a turn: around it, within it, for want of a value.
+fn reasons(
+    turns: &Turns,
+    at: [usize; 2],
+    seen: &Seen,
     all: &Slice,
-    columns: &Columns,
-    marks: &[Mark],
-    lap: &Range<usize>,
-) -> Result<Slice, CampaignError> {
-    let byte = |row: usize| byte_of(path, marks, row);
-    let bytes = [byte(lap.start)?, byte(lap.end)?];
-    let first_line = all.line(lap.start);
-    let of = |bytes: [u64; 2]| Slice {
-        layout: all.layout.clone(),
-        bytes,
-        first_line,
-        rows: lap.len(),
-        scatter: None,
+) -> Vec<(Why, usize, Option<[usize; 2]>)> {
+    let turn = &turns.passes[at[0]].turns[at[1]];
+    let mut counts: Vec<(Why, usize)> = Vec::new();
+    let mut add = |why: Why, rows: usize| match counts.iter_mut().find(|c| c.0 == why) {
+        Some(count) => count.1 += rows,
+        None => counts.push((why, rows)),
     };
-    let mut slice = of(bytes);
-    if let Some([Some(x), Some(y), Some(z)]) = columns.position {
-        let mut sum = Scatter::default();
-        let add = |from: u64, to: u64, sum: &mut Scatter| -> Result<(), CampaignError> {
-            if from >= to {
-                return Ok(());
-            }
-            let part = |b: Batch| Scatter::of_block(&b.columns[x], &b.columns[y], &b.columns[z]);
-            of([from, to]).walk_all(path, part, |part| {
-                sum.merge(&part);
-                Ok(())
-            })
-        };
-        // Whole blocks are known; the rows before and after them are read again.
-        let inside: Vec<&Mark> = marks
+    let around = turns.outside(at, seen.rows, &seen.on);
+    around
+        .iter()
+        .flatten()
+        .for_each(|(why, rows)| add(*why, *rows));
+    turn.left_out.iter().for_each(|l| add(l.why, l.rows.len()));
+    let missing: usize = all.skipped.iter().map(|s| s.1).sum();
+    if missing > 0 {
+        add(Why::Missing, missing);
+    }
+    let lines = |why: Why| {
+        let mut stretches = turn.left_out.iter().filter(|l| l.why == why);
+        let one = stretches.next().filter(|_| stretches.next().is_none())?;
+        Some([all.line(one.rows.start), all.line(one.rows.end - 1)])
+    };
+    let first_missing = all.skipped.first().map(|(row, lines)| {
+        let line = all.line(*row) - lines;
+        [line, line + lines - 1]
+    });
+    let place = |why: Why| match why {
+        Why::Missing => first_missing.filter(|_| all.skipped.len() == 1),
+        _ => lines(why),
+    };
+    let placed = |(why, rows): &(Why, usize)| {
+        let inside: usize = turn
+            .left_out
             .iter()
-            .filter(|m| m.bytes[0] >= bytes[0] && m.bytes[1] <= bytes[1])
-            .collect();
-        if let (Some(first), Some(last)) = (inside.first(), inside.last()) {
-            add(bytes[0], first.bytes[0], &mut sum)?;
-            inside.iter().for_each(|m| sum.merge(&m.scatter));
-            add(last.bytes[1], bytes[1], &mut sum)?;
-        } else {
-            add(bytes[0], bytes[1], &mut sum)?;
-        }
-        slice.scatter = Some(sum);
-    }
-    Ok(slice)
-}
-
-/// The byte at which a row begins; one after the last row for the number of rows.
-fn byte_of(path: &Path, marks: &[Mark], row: usize) -> Result<u64, CampaignError> {
-    let io = |e: std::io::Error| CampaignError::io(path, "read", super::rows::EXPECTED, &e);
-    let at = marks.partition_point(|m| m.first <= row).saturating_sub(1);
-    let Some(mark) = marks.get(at) else {
-        return Ok(0);
+            .filter(|l| l.why == *why)
+            .map(|l| l.rows.len())
+            .sum();
+        (
+            *why,
+            *rows,
+            place(*why).filter(|_| *why == Why::Missing || inside == *rows),
+        )
     };
-    let ahead = row - mark.first;
-    if ahead == 0 {
-        return Ok(mark.bytes[0]);
-    }
-    let mut file = std::fs::File::open(path).map_err(io)?;
-    file.seek(SeekFrom::Start(mark.bytes[0])).map_err(io)?;
-    let mut text = Vec::new();
-    file.take(mark.bytes[1] - mark.bytes[0])
-        .read_to_end(&mut text)
-        .map_err(io)?;
-    // The last row of a file may have no end of line.
-    let end = memchr::memchr_iter(b'\n', &text)
-        .nth(ahead - 1)
-        .map_or(text.len(), |p| p + 1);
-    Ok(mark.bytes[0] + end as u64)
+    counts.iter().map(placed).collect()
 }
 
-/// Radius of the circle through the controller's own positions of a lap; of every n-th where there are many.
+/// A turn of deviations over time with its stops taken out, as a text of its own.
+fn closed_up(all: &Slice, seen: &Seen, turn: &Turn) -> Slice {
+    let mut text = String::new();
+    let (mut shift, mut skipped, mut rows) = (0.0, Vec::new(), 0);
+    let mut stops = turn.left_out.iter().peekable();
+    let mut row = turn.rows.start;
+    while row < turn.rows.end {
+        if let Some(stop) = stops.next_if(|s| s.rows.start == row) {
+            shift += seen.time[stop.rows.end] - seen.time[stop.rows.start];
+            skipped.push((rows, stop.rows.len()));
+            row = stop.rows.end;
+            continue;
+        }
+        text += &format!("{:e};{:e}\n", seen.time[row] - shift, seen.deviation[row]);
+        rows += 1;
+        row += 1;
+    }
+    let fields = vec![(0, Quantity::Time, 1.0), (1, Quantity::Deviation, 1.0)];
+    Slice {
+        layout: Layout::new(all.layout.format, b';', all.layout.skip, fields),
+        bytes: [0, u64::MAX],
+        first_line: all.line(turn.rows.start),
+        rows,
+        scatter: None,
+        text: Some(text.into_bytes().into()),
+        left_out: Default::default(),
+        skipped: skipped.into(),
+    }
+}
+
+/// Radius of the circle through the controller's own positions of a turn; of every n-th where there are many.
 fn target_radius(
     targets: &Thinned<[f64; 3]>,
-    lap: &Range<usize>,
+    rows: &Range<usize>,
     columns: Option<[Option<usize>; 3]>,
 ) -> Option<f64> {
-    let spatial = columns?[2].is_some();
+    let columns = columns?;
     let mut points: [Vec<f64>; 3] = Default::default();
-    for (_, point) in targets.iter().filter(|(row, _)| lap.contains(row)) {
-        let axes = if spatial { 3 } else { 2 };
+    for (_, point) in targets.iter().filter(|(row, _)| rows.contains(row)) {
         points
             .iter_mut()
             .zip(point)
-            .take(axes)
             .for_each(|(axis, v)| axis.push(v));
     }
-    let (x, y) = if spatial {
+    let (x, y) = if columns.iter().all(Option::is_some) {
         let [x, y, z] = &points;
         let plane = Plane::fit(x.iter().zip(y).zip(z).map(|((&x, &y), &z)| [x, y, z])).ok()?;
         x.iter()
@@ -349,8 +514,8 @@ fn target_radius(
             .map(|[u, v]| (u, v))
             .unzip()
     } else {
-        let [x, y, _] = points;
-        (x, y)
+        let mut axes = points.into_iter().zip(columns).filter(|(_, c)| c.is_some());
+        (axes.next()?.0, axes.next()?.0)
     };
     crate::fit::fit_circle(&x, &y)
         .ok()

@@ -20,11 +20,5 @@ pub(super) fn recognise(head: &Head) -> Option<Layout> {
     if row.len() > 6 {
         fields.push((6, Quantity::Stamp(DateOrder::MonthDayYear), 1.0));
     }
-    Some(Layout {
-        format: Format::SpatialAnalyzer,
-        separator: b',',
-        decimal_comma: false,
-        skip,
-        fields,
-    })
+    Some(Layout::new(Format::SpatialAnalyzer, b',', skip, fields))
 }
