@@ -20,6 +20,9 @@ pub struct ModelFile {
     pub campaign: String,
     /// Machine, as the campaign names it.
     pub machine: String,
+    /// Delay of the machine behind its command, s, where a diagnosis could tell it: dead time on top of the servo's own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub delay_s: Option<f64>,
     /// The radius law.
     pub servo: Servo,
     /// Where it was fitted: the table's bounds.
@@ -36,6 +39,7 @@ struct Written {
     format: u32,
     campaign: String,
     machine: String,
+    delay_s: Option<f64>,
     servo: Servo,
     valid: Valid,
     #[serde(default, rename = "effect")]
@@ -118,6 +122,7 @@ impl ModelFile {
             format: FORMAT,
             campaign: written.campaign,
             machine: written.machine,
+            delay_s: written.delay_s,
             servo: written.servo,
             valid: written.valid,
             effects,
@@ -159,9 +164,19 @@ impl ModelFile {
     }
 
     fn fault(&self) -> Option<Fault> {
-        self.servo.fault().or_else(|| self.valid.fault())
+        self.servo
+            .fault()
+            .or_else(|| self.valid.fault())
+            .or_else(|| {
+                let delay_s = self.delay_s?;
+                let possible = (0.0..=LONGEST_DELAY_S).contains(&delay_s);
+                Fault::unless(possible, &["delay_s"], delay_s, "a delay of 0 to 1 s")
+            })
     }
 }
+
+/// Longest delay of a machine behind its command that is no mistake, s.
+const LONGEST_DELAY_S: f64 = 1.0;
 
 const FINITE: &str = "a finite number";
 
@@ -317,6 +332,11 @@ phase_rad = 0.5
         assert_eq!(
             refuse("value = 2.5", "value = inf"),
             "M.toml:24:9: `effect.value` is inf; expected 0 to 1000"
+        );
+        let delayed = refuse("\n[servo]", "delay_s = 7.5\n[servo]");
+        assert!(
+            delayed.ends_with("`delay_s` is 7.5; expected a delay of 0 to 1 s"),
+            "{delayed}"
         );
         assert!(
             refuse("pitch_mm = 10.0", "pitch_mm = nan")

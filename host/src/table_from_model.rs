@@ -198,6 +198,7 @@ mod tests {
                 feed_mm_s: [20.0, 700.0],
             },
             effects: Vec::new(),
+            delay_s: None,
         }
     }
 

@@ -107,7 +107,14 @@ pub(super) fn summary(campaign: &Campaign, path: &Path, seed: u64) -> Result<Sum
         let file = campaign.runs.get(index).map_or("", |run| run.file.as_str());
         refused(&format_args!("{file}: {error}"))
     })?;
-    let diagnosis = diagnose(campaign, &Options { model: None, seed }).map_err(|e| refused(&e))?;
+    let diagnosis = diagnose(
+        campaign,
+        &Options {
+            seed,
+            ..Options::default()
+        },
+    )
+    .map_err(|e| refused(&e))?;
     Ok(Summary::of(&report, &diagnosis))
 }
 

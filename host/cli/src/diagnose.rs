@@ -23,9 +23,22 @@ pub struct Args {
     /// Write an HTML report here.
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
+    /// Known scatter of a circle's size between runs, µm; for sessions too short to show it.
+    #[arg(long, value_name = "UM", value_parser = repeatability)]
+    repeatability: Option<f64>,
+    /// Look at every run, also one that does not fit the others.
+    #[arg(long)]
+    keep_all: bool,
     /// Seed of the bootstrap.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+}
+
+fn repeatability(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(um) if um > 0.0 && um <= 1e4 => Ok(um),
+        _ => Err("a scatter of more than 0 and at most 10000 µm is expected".into()),
+    }
 }
 
 /// Runs the command.
@@ -41,13 +54,21 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         &Options {
             model,
             seed: args.seed,
+            repeatability_m: args.repeatability.map(|um| um * 1e-6),
+            keep_all: args.keep_all,
         },
     );
     bar.finish_and_clear();
-    let diagnosis = diagnosis.map_err(|e| args.source.refused(&e))?;
-    if let Some(path) = &args.output {
-        diagnosis.model.save(path)?;
-        out.note(format_args!("wrote {}", path.display()));
+    let mut diagnosis = diagnosis.map_err(|e| args.source.refused(&e))?;
+    let mut refused = None;
+    match &args.output {
+        Some(path) if diagnosis.worth_writing => {
+            diagnosis.model.save(path)?;
+            diagnosis.model_written = true;
+            out.note(format_args!("wrote {}", path.display()));
+        }
+        Some(path) => refused = Some(nothing_real(path, &diagnosis)),
+        None => {}
     }
     if let Some(page) = &page {
         let html = giotto_report::html(&campaign, &diagnosis).map_err(Failure::input)?;
@@ -55,10 +76,25 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         out.note(format_args!("wrote {}", page.path().display()));
     }
     if out.json {
-        return out.document(&diagnosis);
+        out.document(&diagnosis)?;
+    } else {
+        show(&campaign.name, &diagnosis, args.output.as_deref(), &out);
     }
-    show(&campaign.name, &diagnosis, args.output.as_deref(), &out);
-    Ok(())
+    refused.map_or(Ok(()), Err)
+}
+
+/// Why no model was written.
+fn nothing_real(path: &Path, d: &Diagnosis) -> Failure {
+    let why = match (&d.gain, d.findings.is_empty()) {
+        (None, _) => "these runs prove nothing: ",
+        (Some(_), true) => "nothing was found beside circles that do not shrink with speed: ",
+        (Some(_), false) => "what was found does not foretell runs left out better than before: ",
+    };
+    Failure::check(format_args!(
+        "{}: not written; {why}nothing can be called real",
+        path.display()
+    ))
+    .help(&d.recommendation.words)
 }
 
 /// The diagnosis as a person reads it.
@@ -133,6 +169,15 @@ fn show(name: &str, d: &Diagnosis, extended: Option<&Path>, out: &Output) {
             out.say(format_args!("  {words}"));
         }
     }
+    for note in &d.notes {
+        out.say(format_args!("Note: {note}."));
+    }
+    for run in &d.left_out {
+        out.say(format_args!(
+            "Left out: {}: {} (`--keep-all` keeps it).",
+            run.file, run.reason
+        ));
+    }
     for missing in &d.cannot_tell {
         out.say(format_args!("Cannot tell: {missing}."));
     }
@@ -171,50 +216,16 @@ fn row(f: &Finding) -> [String; 7] {
     ]
 }
 
-/// The one thing to do now, and what it should bring.
+/// The one thing to do now, with the file that was written.
 fn recommendation(d: &Diagnosis, extended: Option<&Path>) -> String {
-    if let (true, Some(first)) = (d.findings.is_empty(), d.cannot_tell.first()) {
-        return first.clone();
+    let words = &d.recommendation.words;
+    match extended.filter(|_| d.model_written) {
+        Some(path) => words
+            .replace(
+                "write the extended model with -o EXTENDED.toml and flash it",
+                "flash it",
+            )
+            .replace("EXTENDED.toml", &quoted(path)),
+        None => words.clone(),
     }
-    let Some(first) = d.findings.first() else {
-        return if d.unexplained.present {
-            "look at the place and the law of what is unexplained; `giotto plan` lists the runs that would narrow it down".into()
-        } else {
-            "flash the fitted model: `giotto fit CAMPAIGN -o MODEL.toml`, `giotto flash MODEL.toml --port PORT`".into()
-        };
-    };
-    if !d.findings.iter().any(|f| f.compensable) {
-        return format!(
-            "{} ({:.1} µm rms of the circles' error, {:.0} % of the misfit)",
-            first.cause.model().words().adjust,
-            first.rms_um,
-            first.share_percent
-        );
-    }
-    let flash = match extended {
-        Some(path) => format!("flash it: `giotto flash {} --port PORT`", quoted(path)),
-        None => "write the extended model with -o EXTENDED.toml and flash it: `giotto flash EXTENDED.toml --port PORT`".into(),
-    };
-    match expected_um(d) {
-        Some([now, then]) if then < now => {
-            format!("{flash} (circles off by {now:.1} µm rms now, by {then:.1} expected)")
-        }
-        _ => flash,
-    }
-}
-
-/// Root mean square error of circles on runs left out, µm: as measured, and with the correction, which leaves
-/// what the extended model does not predict and what it predicts but no controller corrects.
-fn expected_um(d: &Diagnosis) -> Option<[f64; 2]> {
-    let gain = d.gain.as_ref()?;
-    let stays: f64 = d
-        .findings
-        .iter()
-        .filter(|f| !f.compensable)
-        .map(|f| f.rms_um.powi(2))
-        .sum();
-    Some([
-        gain.no_model_rms_um,
-        (gain.extended_rms_um.powi(2) + stays).sqrt(),
-    ])
 }

@@ -237,6 +237,7 @@ fn model_file(fit: &RadiusFit, runs: &[Observation], campaign: &str, machine: &s
             feed_mm_s: range(|o| o.feed_m_s),
         },
         effects: Vec::new(),
+        delay_s: None,
     }
 }
 

@@ -65,6 +65,7 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         &Options {
             model,
             seed: args.seed,
+            ..Options::default()
         },
     );
     bar.finish_and_clear();

@@ -40,6 +40,7 @@ fn model() -> ModelFile {
             feed_mm_s: [20.0, 700.0],
         },
         effects: Vec::new(),
+        delay_s: None,
     }
 }
 

@@ -15,6 +15,7 @@ pub(super) fn model(servo: Servo) -> ModelFile {
             feed_mm_s: [20.0, 700.0],
         },
         effects: Vec::new(),
+        delay_s: None,
     }
 }
 

@@ -22,6 +22,9 @@ const WORDS: Words = Words {
     not_compensable: None,
 };
 
+/// Largest play, m: a millimetre is crossed in a few degrees of any circle worth measuring. A longer crossing is no
+/// reversal any more but an oval, and belongs to another cause.
+const LARGEST_PLAY_M: f64 = 1e-3;
 /// In the contract's unit.
 const SIZE: Parameter =
     Parameter::needed("value", [-5.0, 5.0], "mm: as much as a table may correct");
@@ -49,6 +52,16 @@ impl CauseModel for Backlash {
 
     fn shapes(&self, _views: &[RunView]) -> Vec<Vec<f64>> {
         [0.0, 5e-6, 20e-6, 60e-6].map(|play| vec![play]).to_vec()
+    }
+
+    fn tidy(&self, shape: &mut [f64]) {
+        shape
+            .iter_mut()
+            .for_each(|play_m| *play_m = play_m.clamp(0.0, LARGEST_PLAY_M));
+    }
+
+    fn allows(&self, value_mm: f64) -> bool {
+        value_mm.abs() <= LARGEST_PLAY_M * 1e3
     }
 
     fn signature(

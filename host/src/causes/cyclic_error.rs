@@ -46,6 +46,9 @@ pub fn finest_wave_per_m(views: &[RunView]) -> f64 {
     1.0 / (travel / 300.0).max(1e-3)
 }
 
+/// Pitches of screws, racks, belts and gears as they are built, m. A longer period within the travel is a bend of the axis.
+const PITCH_M: [f64; 2] = [2e-4, 0.12];
+
 impl CauseModel for CyclicError {
     fn cause(&self) -> Cause {
         Cause::CyclicError
@@ -95,6 +98,12 @@ impl CauseModel for CyclicError {
     /// A hundredth of a wave over the travel.
     fn bend(&self, _which: usize, pitch_m: f64, travel_m: f64) -> Bend {
         Bend::Amount(0.01 * pitch_m * pitch_m / travel_m)
+    }
+
+    fn tidy(&self, shape: &mut [f64]) {
+        shape
+            .iter_mut()
+            .for_each(|pitch_m| *pitch_m = pitch_m.abs().clamp(PITCH_M[0], PITCH_M[1]));
     }
 
     fn columns(&self) -> usize {

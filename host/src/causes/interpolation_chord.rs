@@ -17,6 +17,9 @@ const WORDS: Words = Words {
     not_compensable: Some("it arises in the interpolator behind the correction"),
 };
 
+/// Longest set-point period, s: the slowest controllers and stream protocols give 20 to 30 set-points a second. A longer
+/// ripple is not made by set-points.
+const LONGEST_S: f64 = 0.05;
 /// In the contract's unit.
 const SIZE: Parameter = Parameter::needed(
     "value",
@@ -50,6 +53,10 @@ impl CauseModel for InterpolationChord {
 
     fn evidence(&self) -> Evidence {
         Evidence::Tone
+    }
+
+    fn allows(&self, period_s: f64) -> bool {
+        period_s > 0.0 && period_s <= LONGEST_S
     }
 
     fn parameters(&self) -> &'static [&'static Parameter] {

@@ -177,6 +177,11 @@ pub trait CauseModel: Sync {
     /// Brings shape parameters back to where they mean something.
     fn tidy(&self, _shape: &mut [f64]) {}
 
+    /// Whether a value (in the contract's unit) is one that the cause can have at all.
+    fn allows(&self, value: f64) -> bool {
+        value.is_finite()
+    }
+
     /// Whether it can take on the form of other things: beside much that is unexplained it needs to be larger.
     fn flexible(&self) -> bool {
         !self.shape_names().is_empty()

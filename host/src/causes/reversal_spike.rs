@@ -23,6 +23,12 @@ const WORDS: Words = Words {
     not_compensable: None,
 };
 
+/// Decay of the loop's answer, s: from the fastest current-bound drives to an integral time that no one would keep.
+const DECAYS_S: [f64; 2] = [5e-4, 0.4];
+/// Shortest rise, s: the cycle of a fast position loop.
+const SHORTEST_RISE_S: f64 = 5e-5;
+/// Presliding travel of guides and gears, m: ball tracks to wound-up drives.
+const PRESLIDINGS_M: [f64; 2] = [1e-8, 5e-4];
 /// In the contract's unit.
 const SIZE: Parameter =
     Parameter::needed("value", [-1e4, 1e4], "µm: a table corrects 5 mm at most");
@@ -101,7 +107,18 @@ impl CauseModel for ReversalSpike {
     }
 
     fn tidy(&self, shape: &mut [f64]) {
-        shape.iter_mut().for_each(|value| *value = value.abs());
+        let [decay_s, rise_s, presliding_m] = shape else {
+            return;
+        };
+        *decay_s = decay_s.abs().clamp(DECAYS_S[0], DECAYS_S[1]);
+        *rise_s = rise_s.abs().clamp(SHORTEST_RISE_S, *decay_s);
+        *presliding_m = presliding_m.abs().clamp(PRESLIDINGS_M[0], PRESLIDINGS_M[1]);
+    }
+
+    // Friction opposes the new direction: the spike is outward. An inward one is another thing, the shoulder of a step
+    // for the most part.
+    fn allows(&self, peak_um: f64) -> bool {
+        peak_um > 0.0
     }
 
     fn signature(

@@ -11,6 +11,30 @@ pub use crate::causes::ORDERS;
 /// Columns: the mean, then cosine and sine of each order.
 pub const COLUMNS: usize = 1 + 2 * ORDERS;
 
+/// Columns in the order in which they are made orthogonal: the centre, which is the operator's, before the mean, so that
+/// on an arc the size is what the centre cannot do.
+const SEQUENCE: [usize; COLUMNS] = sequence();
+
+const fn sequence() -> [usize; COLUMNS] {
+    let mut out = [0; COLUMNS];
+    let mut at = 3;
+    (out[0], out[1], out[2]) = (1, 2, 0);
+    while at < COLUMNS {
+        out[at] = at;
+        at += 1;
+    }
+    out
+}
+
+/// Columns that come before one in that order.
+const fn earlier(column: usize) -> std::ops::Range<usize> {
+    match column {
+        0 => 1..3,
+        1 | 2 => 1..column,
+        _ => 0..column,
+    }
+}
+
 /// Of a column that keeps so much of its length the rest is orthogonal at once.
 const NEARLY_ALL: f64 = 0.9;
 
@@ -42,22 +66,31 @@ impl Basis {
         let samples = angle_rad.len();
         let mut triangle = [[0.0; COLUMNS]; COLUMNS];
         let mut columns = waves(angle_rad, hidden);
-        for k in 0..COLUMNS {
-            let (earlier, later) = columns.split_at_mut(k * samples);
-            let column = &mut later[..samples];
+        for k in SEQUENCE {
+            let before = earlier(k);
+            let (first, rest) = columns.split_at_mut(samples * if k == 0 { 1 } else { k });
+            // The mean comes behind the centre, everything else behind what has a smaller number.
+            let (column, earlier): (&mut [f64], &[f64]) = if k == 0 {
+                (first, &rest[..before.len() * samples])
+            } else {
+                (
+                    &mut rest[..samples],
+                    &first[before.start * samples..before.end * samples],
+                )
+            };
             let length = dot(column, column).sqrt();
             let mut left = length;
             for _ in 0..2 {
-                let before = left;
+                let last = left;
                 let mut along = [0.0; COLUMNS];
-                dots(earlier, column, &mut along[..k]);
-                axpys(&along.map(|a| -a)[..k], earlier, column);
-                for j in 0..k {
-                    triangle[j][k] += along[j];
+                dots(earlier, column, &mut along[..before.len()]);
+                axpys(&along.map(|a| -a)[..before.len()], earlier, column);
+                for (j, along) in before.clone().zip(along) {
+                    triangle[j][k] += along;
                 }
                 left = dot(column, column).sqrt();
                 // What has lost little has lost no digits.
-                if left > NEARLY_ALL * before {
+                if left > NEARLY_ALL * last {
                     break;
                 }
             }
@@ -109,8 +142,11 @@ impl Basis {
     /// The same from their coordinates.
     pub fn harmonics_of(&self, coordinates: &Low) -> Harmonics {
         let mut x = *coordinates;
-        for k in (0..COLUMNS).rev() {
-            let above: f64 = (k + 1..COLUMNS).map(|j| self.triangle[k][j] * x[j]).sum();
+        for (at, k) in SEQUENCE.into_iter().enumerate().rev() {
+            let above: f64 = SEQUENCE[at + 1..]
+                .iter()
+                .map(|&j| self.triangle[k][j] * x[j])
+                .sum();
             x[k] = if self.triangle[k][k] > 0.0 {
                 (x[k] - above) / self.triangle[k][k]
             } else {
@@ -133,7 +169,7 @@ impl Basis {
             for (column, amount) in [(first, c), (first + 1, s)] {
                 // Sine of the mean: there is none.
                 if amount != 0.0 && !(order == 0 && column > 0) {
-                    for row in 0..=column {
+                    for row in earlier(column).chain([column]) {
                         out[row] += self.triangle[row][column] * amount;
                     }
                 }

@@ -14,8 +14,7 @@ use super::spread;
 use super::survey::{Lag, Prepared, Response, Survey, misfit};
 use super::tangent;
 use super::tone::{self, Tone};
-use crate::campaign::Campaign;
-use crate::causes::{ALL, Cause, Evidence, Harmonics, Site};
+use crate::causes::{ALL, Cause, Evidence, Harmonics, RunView, Site};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -26,6 +25,10 @@ pub struct Start {
     pub response: Response,
     /// Whether the baseline has a fourth-order coefficient of its own (then `higher_order_dynamics` is in it).
     pub own_fourth_order: bool,
+    /// Scatter of the size between runs that is taken at least, m.
+    pub repeatability_m: f64,
+    /// By how much the delay is taken as longer than the response says, s, where the set-up offset does not show it.
+    pub more_lag_s: f64,
 }
 
 const PASSES: usize = 6;
@@ -50,12 +53,11 @@ struct Seen {
 }
 
 /// Searches the explanations of a campaign.
-pub fn explain(campaign: &Campaign, start: &Start) -> Explained {
-    let survey = Survey::new(campaign);
-    let (mut response, mut more_lag_s) = (start.response, 0.0);
+pub fn explain(survey: &Survey, start: &Start) -> Explained {
+    let (mut response, mut more_lag_s) = (start.response, start.more_lag_s);
     let mut seen = Seen::default();
     let (mut found, mut longer_s) =
-        pass(&survey, start, (response, more_lag_s), &mut seen, &[], None);
+        pass(survey, start, (response, more_lag_s), &mut seen, &[], None);
     // Scatter is measured well only beside a model, so there are two passes at least.
     let mut known = None;
     for _ in 1..PASSES {
@@ -75,13 +77,20 @@ pub fn explain(campaign: &Campaign, start: &Start) -> Explained {
             break;
         }
         known = Some(kinds.len());
-        // A response of another kind has a lag of its own: what the old one lacked says nothing of it.
-        let other = (survey.lag(&refined).tau_s - survey.lag(&response).tau_s).abs() > OTHER_LAG_S;
-        more_lag_s = if other { 0.0 } else { more_lag_s + longer_s };
+        let [new, old] = [&refined, &response].map(|response| survey.lag(response));
+        more_lag_s = if !new.measured && !old.measured {
+            // The delay is a parameter of its own: another response does not change what is known of it.
+            more_lag_s + longer_s + old.tau_s - new.tau_s
+        } else if (new.tau_s - old.tau_s).abs() > OTHER_LAG_S {
+            // A response of another kind has a lag of its own: what the old one lacked says nothing of it.
+            0.0
+        } else {
+            more_lag_s + longer_s
+        };
         response = refined;
         let left = left.all_samples(&found.runs);
         (found, longer_s) = pass(
-            &survey,
+            survey,
             start,
             (response, more_lag_s),
             &mut seen,
@@ -154,7 +163,7 @@ fn prepare(
     if seen.looked_beside != Some(seen.tones.len()) {
         // Before anything is believed: teeth look like everything.
         let whole = misfit(&runs).all_samples(&runs);
-        seen.teeth = roughness::find(&runs, &whole, &spread::measure(&runs, &whole));
+        seen.teeth = roughness::find(&runs, &whole, &spread::measure(&runs, &whole, false));
         // What was found with a tone or teeth in sight is not to be trusted.
         afresh = seen.looked_beside.is_some();
         seen.looked_beside = Some(seen.tones.len());
@@ -187,9 +196,10 @@ fn pass(
     };
     // Once there is a model, what it leaves shows the scatter better than the data do.
     let spread = match left {
-        Some(left) => spread::measure(&runs, left),
-        None => spread::measure(&runs, &data.all_samples(&runs)),
-    };
+        Some(left) => spread::measure(&runs, left, true),
+        None => spread::measure(&runs, &data.all_samples(&runs), false),
+    }
+    .at_least(start.repeatability_m);
     let mut found = Explained {
         apart_m2: seen
             .tones
@@ -211,6 +221,7 @@ fn pass(
         nuisance: Vec::new(),
         items: Vec::new(),
         chosen: Vec::new(),
+        tied: Vec::new(),
         tones: Vec::new(),
         tangents: None,
         more_lag_s,
@@ -239,6 +250,7 @@ fn pass(
             &barred,
         );
         found.chosen = prune(&found, &all, found.chosen.clone(), &mut barred);
+        bar_impossible(&mut found, &all, &mut barred);
         if chosen_kinds(&found) == before {
             break;
         }
@@ -285,9 +297,10 @@ fn enter(found: &mut Explained, start: &Start, kinds: &[Kind]) {
         restore_fourth_order(found);
     }
     let mut further = Vec::new();
+    let no_fourth = start.own_fourth_order || !shows_fourth_order(&views);
     for model in ALL {
         if model.evidence() != Evidence::Signature
-            || (start.own_fourth_order && model.cause() == Cause::HigherOrderDynamics)
+            || (no_fourth && model.cause() == Cause::HigherOrderDynamics)
         {
             continue;
         }
@@ -313,6 +326,50 @@ fn enter(found: &mut Explained, start: &Start, kinds: &[Kind]) {
         }
     }
     found.enter(further);
+}
+
+/// Whether the rates of turn can tell f⁴/R³ from f²/R and a static error of each radius: two more rates than radii.
+fn shows_fourth_order(views: &[RunView]) -> bool {
+    let mut circles: Vec<[f64; 2]> = views
+        .iter()
+        .map(|view| [view.radius_m, view.omega_rad_s])
+        .collect();
+    circles.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    let same = |a: f64, b: f64| (a - b).abs() < 0.02 * b.abs();
+    circles.dedup_by(|a, b| same(a[0], b[0]) && same(a[1], b[1]));
+    let rates = circles.len();
+    circles.dedup_by(|a, b| same(a[0], b[0]));
+    rates >= circles.len() + 2
+}
+
+/// Takes out, and bars, what was fitted with a value that its cause cannot have.
+fn bar_impossible(found: &mut Explained, weights: &[f64], barred: &mut Vec<usize>) {
+    loop {
+        refit(found, weights);
+        let columns = columns_of(&found.nuisance, &found.items, &found.chosen);
+        let amount = |item: usize| {
+            let at = columns
+                .iter()
+                .position(|column| *column == found.items[item].columns[0]);
+            at.and_then(|at| found.solution.coefficients.get(at))
+                .copied()
+                .unwrap_or(0.0)
+        };
+        let impossible = found
+            .chosen
+            .iter()
+            .copied()
+            .find(|&item| match &found.items[item].kind {
+                // A phase takes the sign of an amplitude.
+                Kind::Cause { cause, .. } => {
+                    cause.model().columns() == 1 && !cause.model().allows(amount(item))
+                }
+                Kind::Pattern(_) => false,
+            });
+        let Some(item) = impossible else { break };
+        found.chosen.retain(|&other| other != item);
+        barred.push(item);
+    }
 }
 
 /// The response holds a fourth-order part that the search may still reject: give it back to the data, to first

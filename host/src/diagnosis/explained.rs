@@ -1,7 +1,7 @@
 //! What a search found, with all that is needed to refit it.
 use super::basis::Basis;
 use super::column::Column;
-use super::item::{Item, Kind};
+use super::item::{Item, Kind, scarcity};
 use super::ledger::Ledger;
 use super::linear::{Factor, Solution, solve};
 use super::roughness::Teeth;
@@ -35,6 +35,8 @@ pub struct Explained {
     pub items: Vec<Item>,
     /// The chosen ones.
     pub chosen: Vec<usize>,
+    /// Those of them that another cause explains as well to the last digit: fitted, but not stated.
+    pub tied: Vec<usize>,
     /// The fit of nuisance and chosen.
     pub solution: Solution,
     /// The same with what their shapes and the lag may be off by.
@@ -55,6 +57,14 @@ impl Explained {
         vec![1.0; self.runs.len()]
     }
 
+    /// The chosen causes that can be stated.
+    pub fn stated(&self) -> impl Iterator<Item = usize> {
+        self.chosen
+            .iter()
+            .copied()
+            .filter(|item| self.items[*item].listed() && !self.tied.contains(item))
+    }
+
     /// Enters explanations, each chosen from so many starting shapes; gives their numbers.
     pub fn enter(&mut self, kinds: Vec<(Kind, usize)>) -> Range<usize> {
         let first = self.items.len();
@@ -63,11 +73,12 @@ impl Explained {
             .map(|(kind, _)| kind.columns_over(&self.runs))
             .collect();
         let mut next = self.ledger.size();
+        let scarcity = scarcity(self.runs.len());
         for ((kind, shapes), columns) in kinds.into_iter().zip(&columns) {
             let own = (next..next + columns.len()).collect();
             next += columns.len();
             self.items.push(Item {
-                price: kind.price(shapes),
+                price: kind.price(shapes, scarcity),
                 columns: own,
                 kind,
                 fitted_beside: None,

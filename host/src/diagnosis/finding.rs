@@ -1,4 +1,5 @@
 //! What is reported of a cause.
+use super::status::Status;
 use crate::causes::{Cause, Effect};
 use giotto_shared::Actuator;
 use serde::Serialize;
@@ -15,6 +16,17 @@ pub struct Estimate {
     pub unit: &'static str,
 }
 
+/// The largest thing that a cause does to a circle of the campaign.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Largest {
+    /// Largest deviation, µm.
+    pub max: f64,
+    /// On a circle of this radius, mm …
+    pub radius_mm: f64,
+    /// … at this feed, mm/s.
+    pub feed_mm_s: f64,
+}
+
 /// One cause, found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
@@ -28,6 +40,12 @@ pub struct Finding {
     pub probability: f64,
     /// How large.
     pub estimate: Estimate,
+    /// How sure it is, in a class.
+    pub status: Status,
+    /// The largest thing it does to these circles.
+    pub effect_um: Largest,
+    /// What to set right, and on which side.
+    pub remedy: String,
     /// Share of the baseline's explainable misfit, %.
     pub share_percent: f64,
     /// Root mean square over all samples of what it does to the circles, µm.

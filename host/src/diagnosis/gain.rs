@@ -1,25 +1,25 @@
 //! The proof: the extended *simulation* against runs that it has not seen.
 //!
-//! Each radius is left out once, then each speed. The causes are chosen again on the runs that are left, with
-//! their sizes; the shapes (pitch, time constants) are those found on all runs. The machine with the causes
+//! Each radius is left out once, then each speed. The causes stated are fitted again on the runs that are left; the
+//! shapes (pitch, time constants) are those found on all runs. The machine with the causes
 //! built in runs the circles left out, in the time domain, and what is measured there is compared.
 use super::baseline::{Size, fit_lag};
 use super::duration::Clamp;
 use super::explained::Explained;
 use super::item::Kind;
 use super::linear::solve;
-use super::material::prune;
-use super::search::{columns_of, select};
 use super::survey::Response;
 use super::vector::dot;
-use crate::campaign::Campaign;
+use super::veto;
+use crate::campaign::{Campaign, Run};
 use crate::causes::{Cause, Effect};
 use crate::model_file::{ModelFile, Servo};
 use crate::simulation::machine::{Machine, PositionLoop};
-use crate::simulation::{CircleTest, circle};
+use crate::simulation::{CircleTest, SAMPLES_PER_TURN, circle};
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 use serde::Serialize;
+use std::f64::consts::TAU;
 
 /// Root mean squares over runs left out, centre free, sample by sample.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -63,12 +63,7 @@ pub fn machine(response: &Response, effects: &[Effect], lag_s: Option<f64>) -> M
         machine = other;
     }
     if let Some(lag_s) = lag_s {
-        // What the recording shows of delay beyond that of the response is dead time.
-        let own = match machine.mechanics[0] {
-            Some(mechanics) => 2.0 * mechanics.zeta / mechanics.omega_n_rad_s,
-            None => 0.0,
-        } + (1.0 - machine.servo[0].feed_forward) / machine.servo[0].kv_per_s;
-        machine.dead_time_s = [(lag_s - own).max(0.0); 3];
+        machine.set_delay(lag_s);
     }
     for effect in effects {
         // Already in the response.
@@ -91,7 +86,8 @@ pub fn beta(response: &Response) -> Servo {
 
 /// Response and effects that a set gives when it is fitted on some runs only.
 fn fitted(found: &Explained, weights: &[f64], set: &[usize]) -> Option<(Response, Vec<Effect>)> {
-    let columns = columns_of(&found.nuisance, &found.items, set);
+    // The stated set, as far as these runs determine it.
+    let (set, columns) = veto::determined(found, weights, set);
     let solution = solve(&found.ledger.white(weights), &columns)?;
     let value = |column: usize| {
         columns
@@ -106,11 +102,25 @@ fn fitted(found: &Explained, weights: &[f64], set: &[usize]) -> Option<(Response
     } else {
         response.b_s4 = 0.0;
     }
+    // A servo is claimed only where the circles show one: beside f⁴/R³ it is what that needs.
+    let alone = found.nuisance.len() == 1 && !set.iter().any(|&item| is_fourth_order(found, item));
+    let own = columns
+        .iter()
+        .position(|column| *column == found.nuisance[0]);
+    if let (true, Some(own)) = (alone, own)
+        && response.a_s2.abs() < CLEAR * solution.covariance[(own, own)].sqrt()
+    {
+        response.a_s2 = 0.0;
+    }
     let mut effects = Vec::new();
-    for &item in set {
+    for &item in &set {
         let Kind::Cause { cause, .. } = &found.items[item].kind else {
             continue;
         };
+        // What has two names is fitted, so that it bends nothing else, but belongs to no machine.
+        if found.tied.contains(&item) {
+            continue;
+        }
         let values: Vec<f64> = found.items[item]
             .columns
             .iter()
@@ -129,7 +139,30 @@ fn fitted(found: &Explained, weights: &[f64], set: &[usize]) -> Option<(Response
         ));
     }
     effects.extend(found.teeth.iter().filter_map(super::verdict::teeth_effect));
+    let fastest = found
+        .runs
+        .iter()
+        .map(|run| run.view.omega_rad_s)
+        .fold(0.0, f64::max);
+    let (w2, a, b) = (fastest * fastest, response.a_s2, response.b_s4);
+    // A response that would blow up within the measured range is no response.
+    if 1.0 + a * w2 + b * w2 * w2 < 0.1 {
+        response = found.response;
+    }
     Some((response, effects))
+}
+
+/// Standard errors above which κ2 of a servo is claimed.
+const CLEAR: f64 = 3.0;
+
+fn is_fourth_order(found: &Explained, item: usize) -> bool {
+    matches!(
+        found.items[item].kind,
+        Kind::Cause {
+            cause: Cause::HigherOrderDynamics,
+            ..
+        }
+    )
 }
 
 /// Measures the gain. `start` is the baseline if a model was given; else kv is fitted in each fold.
@@ -140,29 +173,14 @@ pub fn measure(
     clamp: Option<Clamp>,
     seed: u64,
 ) -> Gain {
-    let mut folds: Vec<Vec<usize>> = Vec::new();
-    let by = |key: &dyn Fn(usize) -> f64| -> Vec<Vec<usize>> {
-        let mut values: Vec<f64> = (0..campaign.runs.len()).map(key).collect();
-        values.sort_by(f64::total_cmp);
-        values.dedup_by(|a, b| (*a - *b).abs() < 1e-9 * b.abs());
-        let same = |i: usize, value: f64| (key(i) - value).abs() < 1e-9 * value.abs();
-        values
-            .iter()
-            .map(|&v| (0..campaign.runs.len()).filter(|&i| same(i, v)).collect())
-            .collect()
-    };
-    let radii = by(&|i| campaign.runs[i].radius_m);
-    let feeds = by(&|i| campaign.runs[i].feed_m_s);
-    let count = [
-        if radii.len() > 1 { radii.len() } else { 0 },
-        if feeds.len() > 1 { feeds.len() } else { 0 },
-    ];
-    if count[0] > 0 {
-        folds.extend(radii);
-    }
-    if count[1] > 0 {
-        folds.extend(feeds);
-    }
+    let circles: Vec<[f64; 2]> = campaign
+        .runs
+        .iter()
+        .map(|run| [run.radius_m, run.feed_m_s])
+        .collect();
+    let [radii, feeds] = veto::folds(&circles);
+    let count = [radii.len(), feeds.len()];
+    let folds = [radii, feeds].concat();
     let errors: Vec<Errors> = folds
         .par_iter()
         .flat_map(|out| fold(campaign, found, given, clamp, out))
@@ -173,7 +191,7 @@ pub fn measure(
     let (extended, baseline) = (mean(&|e| e.extended), mean(&|e| e.baseline));
     let floor = mean(&|e| e.floor);
     let percent = |extended: f64, baseline: f64| {
-        if baseline > 0.0 {
+        if baseline > 0.0 && extended != baseline {
             100.0 * (1.0 - (extended / baseline).sqrt())
         } else {
             0.0
@@ -239,17 +257,8 @@ fn fold(
     let weights: Vec<f64> = (0..runs.len())
         .map(|i| if out.contains(&i) { 0.0 } else { 1.0 })
         .collect();
-    let products = found.ledger.white(&weights);
-    let mut barred = Vec::new();
-    let set = select(
-        &products,
-        &found.nuisance,
-        &found.items,
-        &found.chosen,
-        &barred,
-    );
-    let mut set = prune(found, &weights, set, &mut barred);
     // A pattern without a name has no place in the simulation, but it must not bend the causes.
+    let set = &found.chosen;
     let training: Vec<usize> = (0..runs.len()).filter(|&i| weights[i] > 0.0).collect();
     let programmed: Vec<Size> = training
         .iter()
@@ -259,15 +268,12 @@ fn fold(
     let baseline = given
         .cloned()
         .unwrap_or_else(|| machine(&lag_only, &[], None));
-    set.sort_unstable();
-    let nothing_new =
-        clamp.is_none() && found.teeth.is_empty() && !set.iter().any(|&i| found.items[i].listed());
+    let nothing_new = clamp.is_none() && found.teeth.is_empty() && !found.stated().any(|_| true);
     let extended =
-        fitted(found, &weights, &set)
+        fitted(found, &weights, set)
             .filter(|_| !nothing_new)
             .map(|(response, effects)| {
-                let lag = found.lag.measured.then_some(found.lag.tau_s);
-                let mut machine = machine(&response, &effects, lag);
+                let mut machine = machine(&response, &effects, Some(found.lag.tau_s));
                 if let Some(clamp) = clamp {
                     machine.centripetal_limit_m_s2 = Some(clamp.limit_m_s2);
                 }
@@ -301,7 +307,7 @@ fn fold(
                 let [cos, sin] = basis.centre(&rest);
                 (dot(&rest, &rest) - cos * cos - sin * sin).max(0.0) / samples
             };
-            let simulated = |machine: &Machine| left(&circle(machine, &test).deviation_m);
+            let simulated = |machine: &Machine| left(&at_samples(machine, &test, run));
             let base = simulated(&baseline);
             let x = run.feed_m_s.powi(2) / run.radius_m;
             let size = beta[0] * x + beta[1] * x * x / run.radius_m;
@@ -327,20 +333,83 @@ fn fold(
         .collect()
 }
 
-/// β1, β2 by least squares on the sizes.
+/// Deviations of a simulated circle where a run has its samples, m. A whole turn by the clock is sampled as the run is;
+/// an arc is a part of the turn, and where the angle was measured it is that of the tool, not of the command.
+fn at_samples(machine: &Machine, test: &CircleTest, run: &Run) -> Vec<f64> {
+    let samples = &run.samples;
+    if samples.angle_inferred && samples.arc_rad().is_none() {
+        return circle(machine, test).deviation_m;
+    }
+    let turn = circle(
+        machine,
+        &CircleTest {
+            start_angle_rad: 0.0,
+            samples: Some(SAMPLES_PER_TURN),
+            ..*test
+        },
+    );
+    let angle = |index: usize| {
+        let [x, y] = turn.position_m[index];
+        if samples.angle_inferred {
+            turn.angle_rad[index]
+        } else {
+            y.atan2(x)
+        }
+    };
+    let mut places: Vec<[f64; 2]> = (0..turn.deviation_m.len())
+        .map(|index| [angle(index).rem_euclid(TAU), turn.deviation_m[index]])
+        .collect();
+    places.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let between = |theta: f64| {
+        let at = theta.rem_euclid(TAU);
+        let next = places.partition_point(|place| place[0] <= at);
+        let count = places.len();
+        let ([before, from], [after, to]) =
+            (places[(next + count - 1) % count], places[next % count]);
+        let span = (after - before).rem_euclid(TAU);
+        let share = if span > 0.0 {
+            (at - before).rem_euclid(TAU) / span
+        } else {
+            0.0
+        };
+        from + share.min(1.0) * (to - from)
+    };
+    samples
+        .angle_rad
+        .iter()
+        .map(|theta| between(*theta))
+        .collect()
+}
+
+/// β1, β2 by least squares on the sizes, β0 of each radius free where it was run at two speeds or more.
 fn beta_of(sizes: &[Size]) -> [f64; 2] {
+    let row = |s: &Size| {
+        let w2 = s.omega_rad_s.powi(2);
+        [w2 * s.radius_m, w2 * w2 * s.radius_m, s.error_m]
+    };
+    let mut radii: Vec<f64> = sizes.iter().map(|s| s.radius_m).collect();
+    radii.sort_by(f64::total_cmp);
+    radii.dedup_by(|a, b| (*a - *b).abs() < 1e-9 * *b);
     let (mut xx, mut xy, mut yy, mut xe, mut ye) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    for s in sizes {
-        let x = s.omega_rad_s.powi(2) * s.radius_m;
-        let y = s.omega_rad_s.powi(4) * s.radius_m;
-        xx += x * x;
-        xy += x * y;
-        yy += y * y;
-        xe += x * s.error_m;
-        ye += y * s.error_m;
+    for radius_m in radii {
+        let own: Vec<[f64; 3]> = sizes
+            .iter()
+            .filter(|s| (s.radius_m - radius_m).abs() < 1e-9 * radius_m)
+            .map(row)
+            .collect();
+        let mean: [f64; 3] =
+            std::array::from_fn(|k| own.iter().map(|row| row[k]).sum::<f64>() / own.len() as f64);
+        for row in own {
+            let [x, y, e]: [f64; 3] = std::array::from_fn(|k| row[k] - mean[k]);
+            xx += x * x;
+            xy += x * y;
+            yy += y * y;
+            xe += x * e;
+            ye += y * e;
+        }
     }
     let determinant = xx * yy - xy * xy;
-    if determinant.abs() > 1e-12 * xx * yy {
+    if determinant.abs() > 1e-9 * xx * yy {
         [
             (xe * yy - ye * xy) / determinant,
             (ye * xx - xe * xy) / determinant,
@@ -351,7 +420,12 @@ fn beta_of(sizes: &[Size]) -> [f64; 2] {
 }
 
 /// The model file of what was found on all runs.
-pub fn extended_model(campaign: &Campaign, found: &Explained, effects: Vec<Effect>) -> ModelFile {
+pub fn extended_model(
+    campaign: &Campaign,
+    found: &Explained,
+    effects: Vec<Effect>,
+    delay_s: Option<f64>,
+) -> ModelFile {
     let weights = found.all();
     let response =
         fitted(found, &weights, &found.chosen).map_or(found.response, |(response, _)| response);
@@ -391,5 +465,6 @@ pub fn extended_model(campaign: &Campaign, found: &Explained, effects: Vec<Effec
             .into_iter()
             .filter(|e| e.cause() != Cause::HigherOrderDynamics)
             .collect(),
+        delay_s,
     }
 }

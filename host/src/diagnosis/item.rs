@@ -4,6 +4,7 @@ use super::column::Column;
 use super::pattern::Pattern;
 use super::survey::Prepared;
 use crate::causes::{Cause, Harmonics, Seat, Site};
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Price of one listed column: ln(78 runs) + 2·ln(25 competitors), about 11, and a margin for the scatter
 /// being estimated.
@@ -94,10 +95,10 @@ impl Kind {
         }
     }
 
-    /// What it has to take off χ², chosen from `shapes` starting shapes.
-    pub fn price(&self, shapes: usize) -> f64 {
+    /// What it has to take off χ², chosen from `shapes` starting shapes; `scarcity` is that of the runs.
+    pub fn price(&self, shapes: usize, scarcity: f64) -> f64 {
         let phase = PRICE_OF_PHASE * (self.columns() - 1) as f64;
-        match self {
+        let own = match self {
             Self::Cause { cause, site, .. } => {
                 let shapes = 2.0 * (shapes.max(1) as f64).ln();
                 // Of two ways to say the same, the one that names the axes.
@@ -105,6 +106,47 @@ impl Kind {
                 PRICE + phase + shapes + if vague { PRICE_OF_VAGUENESS } else { 0.0 }
             }
             Self::Pattern(_) => PRICE + PRICE_OF_PATTERN + phase,
-        }
+        };
+        scarcity * own
+    }
+}
+
+/// Runs for which the prices are: the paper's campaign.
+const USUAL_RUNS: usize = 78;
+/// Share of the runs that are left to measure the scatter when laws have been fitted to them (see `spread`).
+const LEFT: f64 = 2.0 / 3.0;
+
+/// By how much more a column has to take off χ² where the scatter in the metric is known from few runs: the F quantile
+/// of the same false-alarm rate, against that of the usual number of runs.
+pub fn scarcity(runs: usize) -> f64 {
+    let quantile = |runs: usize| {
+        let dof = (LEFT * runs as f64).max(1.0);
+        // Two-sided: F(1, dof) is the square of t.
+        let level = 0.5 * FALSE_COLUMN;
+        StudentsT::new(0.0, 1.0, dof).map_or(1.0, |law| law.inverse_cdf(1.0 - level).powi(2))
+    };
+    (quantile(runs) / quantile(USUAL_RUNS)).clamp(1.0, MOST_SCARCE)
+}
+
+/// Chance with which one column of noise takes [`PRICE`] off χ²: the tail of χ²₁ there.
+const FALSE_COLUMN: f64 = 1.83e-4;
+/// Beyond, nothing can be found at all.
+const MOST_SCARCE: f64 = 6.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn few_runs_ask_for_more() {
+        assert_eq!(scarcity(USUAL_RUNS), 1.0);
+        assert_eq!(
+            scarcity(500),
+            1.0,
+            "many do not ask for less than was calibrated"
+        );
+        // t² for the 12 degrees of freedom of 18 runs against 52: by the tables of Student's t, 5.2² over 4.0².
+        let few = scarcity(18);
+        assert!((1.55..1.85).contains(&few), "{few}");
     }
 }

@@ -241,7 +241,7 @@ directions = ["ccw", "cw"]
         let (runs, _) =
             Survey::new(&campaign).prepare(&Response::of(&Servo::Lag { kv_per_s: 90.0 }), 0.0);
         let data = misfit(&runs);
-        let spread = spread::measure(&runs, &data.all_samples(&runs));
+        let spread = spread::measure(&runs, &data.all_samples(&runs), false);
         let columns: Vec<Column> = kinds()
             .iter()
             .flat_map(|kind| kind.columns_over(&runs))

@@ -150,8 +150,29 @@ impl<'a> Factor<'a> {
     }
 }
 
-/// Residual variance of `values` on the columns (those that add nothing are skipped), by Gram–Schmidt.
+/// Residual variance of `values` on the columns (those that add nothing are skipped).
 pub fn residual_variance(columns: &[Vec<f64>], values: &[f64]) -> f64 {
+    let (left, rank) = left_of(columns, values);
+    let degrees = values.len().saturating_sub(rank);
+    if degrees == 0 {
+        0.0
+    } else {
+        left.iter().map(|x| x * x).sum::<f64>() / degrees as f64
+    }
+}
+
+/// What the columns make of `values` by least squares.
+pub fn fitted_values(columns: &[Vec<f64>], values: &[f64]) -> Vec<f64> {
+    let (left, _) = left_of(columns, values);
+    values
+        .iter()
+        .zip(&left)
+        .map(|(value, left)| value - left)
+        .collect()
+}
+
+/// What the columns leave of `values`, by Gram–Schmidt, and how many of them are independent.
+fn left_of(columns: &[Vec<f64>], values: &[f64]) -> (Vec<f64>, usize) {
     let mut basis: Vec<Vec<f64>> = Vec::new();
     let mut left = values.to_vec();
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
@@ -174,12 +195,7 @@ pub fn residual_variance(columns: &[Vec<f64>], values: &[f64]) -> f64 {
         }
     }
     project(&mut left, &basis);
-    let degrees = values.len().saturating_sub(basis.len());
-    if degrees == 0 {
-        0.0
-    } else {
-        dot(&left, &left) / degrees as f64
-    }
+    (left, basis.len())
 }
 
 #[cfg(test)]

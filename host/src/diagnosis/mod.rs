@@ -4,49 +4,68 @@
 //! causes and nameless patterns compete for it ([`search`], [`mod@explain`]) in their best shapes ([`shape`],
 //! [`tangent`]); tones in time ([`tone`]), teeth at
 //! low speed ([`roughness`]) and the duration of the turns ([`duration`]) are looked at for themselves. What
-//! is found is stated with its doubts ([`verdict`], [`unexplained`]) and proven on runs left out ([`gain`]).
+//! is found is stated with its doubts ([`verdict`], [`unexplained`]) and proven on runs left out ([`veto`], [`gain`]).
+//! What is left must be noise ([`omnibus`]). Before all this come what a session brings along: an override for all runs
+//! ([`feed_override`]), a spoilt run ([`influence`]), a delay that is not known ([`delay`]).
 pub mod baseline;
 pub mod basis;
 pub mod column;
+pub mod delay;
 pub mod duration;
 pub mod explain;
 pub mod explained;
+pub mod feed_override;
 pub mod finding;
 pub mod gain;
+pub mod influence;
 pub mod item;
 pub mod ledger;
 pub mod linear;
 pub mod material;
 pub mod misfit;
+pub mod omnibus;
+pub mod orders;
 pub mod pattern;
 pub mod picture;
 pub mod pitch;
 pub mod places;
 pub mod products;
 pub mod propose;
+pub mod recommendation;
 pub mod roughness;
 pub mod search;
+pub mod sequence;
 pub mod shape;
 pub mod spread;
+pub mod statement;
+pub mod status;
 pub mod survey;
 pub mod tangent;
 pub mod tone;
 pub mod unexplained;
 pub mod vector;
 pub mod verdict;
+pub mod veto;
 
+pub use delay::Delay;
 pub use finding::{Estimate, Finding, Unexplained};
 pub use gain::Gain;
+pub use influence::LeftOut;
+pub use recommendation::{Action, Recommendation};
+pub use status::Status;
 
 use crate::campaign::Campaign;
 use crate::causes::Effect;
 use crate::model_file::{ModelFile, Servo};
 use crate::simulation::machine::{Machine, MachineError};
 use baseline::{Size, fit_lag};
-use duration::Durations;
-use explain::{Start, explain};
+use delay::{Explanation, explain_all};
+use duration::{Clamp, Durations};
+use explain::Start;
+use explained::Explained;
 use serde::Serialize;
-use survey::{Response, believed_feed_m_s};
+use status::Ground;
+use survey::{Response, Survey, believed_feed_m_s};
 
 /// What a diagnosis may be told.
 #[derive(Clone, Debug)]
@@ -55,6 +74,10 @@ pub struct Options {
     pub model: Option<ModelFile>,
     /// Seed of the bootstrap.
     pub seed: u64,
+    /// Known scatter of the size between runs of one circle, m; that of the campaign where it states one.
+    pub repeatability_m: Option<f64>,
+    /// Looks at every run, spoilt or not.
+    pub keep_all: bool,
 }
 
 impl Default for Options {
@@ -62,6 +85,8 @@ impl Default for Options {
         Self {
             model: None,
             seed: 1,
+            repeatability_m: None,
+            keep_all: false,
         }
     }
 }
@@ -105,6 +130,19 @@ pub struct Diagnosis {
     pub misfit: misfit::Misfit,
     /// What these runs cannot tell, and what is missing.
     pub cannot_tell: Vec<String>,
+    /// What was taken otherwise than the campaign says, in words.
+    pub notes: Vec<String>,
+    /// Runs that were not looked at.
+    pub left_out: Vec<LeftOut>,
+    /// Delay of the machine behind its command, where the circles show it.
+    pub delay_s: Option<Delay>,
+    /// The one thing to do now.
+    pub recommendation: Recommendation,
+    /// Whether the extended model was written to a file; who writes it says so.
+    pub model_written: bool,
+    /// Whether there is anything in the model that can be called real: without it no file is written.
+    #[serde(skip)]
+    pub worth_writing: bool,
     /// Seed of the bootstrap.
     pub seed: u64,
     /// The extended model.
@@ -146,121 +184,388 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
     {
         return Err(DiagnosisError::Empty);
     }
-    let given = options
-        .model
-        .as_ref()
-        .map(Machine::from_model)
-        .transpose()?;
-    let programmed: Vec<Size> = campaign
-        .runs
-        .iter()
-        .map(|run| Size::of(run, run.feed_m_s))
-        .collect();
-    let believed: Vec<Size> = campaign
-        .runs
-        .iter()
-        .map(|run| Size::of(run, believed_feed_m_s(run)))
-        .collect();
-    let (start, name) = match &options.model {
-        Some(model) => (
-            Start {
-                response: Response::of(&model.servo),
-                own_fourth_order: !matches!(model.servo, Servo::Lag { .. }),
-            },
-            format!("the given model of {}", model.machine),
-        ),
-        None => {
-            let response = fit_lag(&believed);
-            let name = if response.a_s2 > 0.0 {
-                format!("one servo lag, kv = {:.1} /s", response.a_s2.powf(-0.5))
-            } else {
-                "an ideal servo (circles do not shrink with speed)".to_string()
-            };
-            (
-                Start {
-                    response,
-                    own_fourth_order: false,
-                },
-                name,
-            )
-        }
+    let session = Session::of(campaign, options);
+    let baseline = Simulation::of(&session, options)?;
+    let seen = session.without(&baseline);
+    let durations = duration::read(&session.campaign);
+    let survey = if baseline.known.is_empty() {
+        session.survey
+    } else {
+        Survey::new(&seen)
     };
-    let known = options
-        .model
-        .as_ref()
-        .map(|model| model.effects.clone())
-        .unwrap_or_default();
-    let cleaned = without_known(campaign, &start, &known);
-    let campaign_seen = cleaned.as_ref().unwrap_or(campaign);
-    let durations = duration::read(campaign);
     let clamp = match durations {
-        Durations::Clamped(clamp) if !knows_clamp(&known) => Some(clamp),
+        Durations::Clamped(clamp) if !knows_clamp(&baseline.known) => Some(clamp),
         _ => None,
     };
-    let found = explain(campaign_seen, &start);
-    let clamp_energy = clamp.map(|clamp| {
-        let energy = campaign
-            .runs
-            .iter()
-            .zip(programmed.iter().zip(&believed))
-            .map(|(run, (p, b))| {
-                let off = run.radius_m
-                    * (found.response.gain(p.omega_rad_s) - found.response.gain(b.omega_rad_s));
-                off * off * run.samples.deviation_m.len() as f64
-            })
-            .sum::<f64>();
-        (clamp, energy)
-    });
-    let mut cannot_tell = poverty(campaign);
-    // Labels that the clock contradicts, and not as a clamp would: nothing that depends on them can be believed.
-    let contradicted =
-        matches!(durations, Durations::Unexplained { runs, .. } if 4 * runs > campaign.runs.len());
-    let too_poor = campaign.runs.len() < FEWEST_RUNS || contradicted;
-    if contradicted {
-        cannot_tell.push("the turns did not last as the programmed radius and feed say: check which file belongs to which run".into());
-    }
-    let findings = if too_poor {
-        Vec::new()
-    } else {
-        verdict::findings(&found, clamp_energy)
-    };
-    let unexplained = if too_poor {
-        Unexplained::default()
-    } else {
-        unexplained::describe(&found, &durations)
-    };
-    let effects: Vec<Effect> = known
-        .iter()
-        .cloned()
-        .chain(findings.iter().flat_map(|f| f.effects.clone()))
-        .collect();
-    let gain = (!too_poor)
-        .then(|| gain::measure(campaign_seen, &found, given.as_ref(), clamp, options.seed));
-    let gain = gain.filter(|gain| gain.folds != [0, 0]);
-    let in_sample = misfit::rms_um(&found);
-    let (heldout_base, heldout_extended) = gain.as_ref().map_or((in_sample, in_sample), |gain| {
+    let ground = Footing::of(
+        &session.campaign,
+        &durations,
+        baseline.start.repeatability_m,
+    );
+    let mut explanation = explain_all(&survey, &baseline.start, baseline.delay_s);
+    let ties = verdict::ties(&explanation.found);
+    explanation.found.tied = ties.iter().map(|(item, _)| *item).collect();
+    let proof = prove(
+        &seen,
+        &mut explanation.found,
+        &baseline,
+        clamp,
+        &ground,
+        options.seed,
+    );
+    let found = &explanation.found;
+    let stated = state(
+        &explanation,
+        &session.campaign,
+        clamp,
+        &durations,
+        &ground,
+        proof.as_ref(),
+    );
+    let mut cannot_tell = ground.cannot_tell;
+    cannot_tell.extend(explanation.words());
+    cannot_tell.extend(
+        ties.iter()
+            .map(|(item, other)| tie_words(found, *item, *other)),
+    );
+    let in_sample = misfit::rms_um(found);
+    let (heldout_base, heldout_extended) = proof.as_ref().map_or((in_sample, in_sample), |gain| {
         (gain.baseline_rms_um, gain.extended_rms_um)
     });
-    Ok(Diagnosis {
+    let effects: Vec<Effect> = baseline
+        .known
+        .iter()
+        .cloned()
+        .chain(stated.findings.iter().flat_map(|f| f.effects.clone()))
+        .collect();
+    // The delay with which the gain was proven.
+    let delay_s = survey.inferred().then_some(found.lag.tau_s.max(0.0));
+    let model = gain::extended_model(&session.campaign, found, effects, delay_s);
+    let mut picture = picture::draw(&session.campaign, &seen, found);
+    picture
+        .iter_mut()
+        .for_each(|run| run.index = session.places[run.index]);
+    let mut diagnosis = Diagnosis {
         noise_um: found.spread.noise_m() * 1e6,
         spread_um: found.spread.order_m2[0].sqrt() * 1e6,
         baseline: Baseline {
-            name,
+            name: baseline.name,
             heldout_rms_um: heldout_base,
         },
-        unexplained,
+        unexplained: stated.unexplained,
         extended: Extended {
             heldout_rms_um: heldout_extended,
         },
-        gain_percent: gain.as_ref().map_or(0.0, |gain| gain.percent),
-        misfit: misfit::split(&found),
-        gain,
+        gain_percent: proof.as_ref().map_or(0.0, |gain| gain.percent),
+        misfit: misfit::split(found),
+        worth_writing: is_worth_writing(&stated.findings, &model, proof.as_ref()),
+        gain: proof,
         cannot_tell,
+        notes: session.notes,
+        left_out: session.left_out,
+        delay_s: explanation.delay,
+        recommendation: Recommendation::default(),
+        model_written: false,
         seed: options.seed,
-        picture: picture::draw(campaign, campaign_seen, &found),
-        model: gain::extended_model(campaign, &found, effects),
+        picture,
+        model,
+        findings: stated.findings,
+    };
+    diagnosis.recommendation = recommendation::of(&diagnosis);
+    Ok(diagnosis)
+}
+
+/// Whether a model holds something that can be called real: causes that are proven on runs left out, or, without any, a
+/// servo that foretells them better than no model.
+fn is_worth_writing(findings: &[Finding], model: &ModelFile, gain: Option<&Gain>) -> bool {
+    let Some(gain) = gain else { return false };
+    if findings.is_empty() {
+        Response::of(&model.servo).a_s2 != 0.0 && gain.baseline_rms_um < gain.no_model_rms_um
+    } else {
+        recommendation::is_proven(gain)
+    }
+}
+
+/// What a session brought, made ready: one override for all taken in, a spoilt run left out.
+struct Session {
+    campaign: Campaign,
+    survey: Survey,
+    /// Index in the given campaign of each run looked at.
+    places: Vec<usize>,
+    notes: Vec<String>,
+    left_out: Vec<LeftOut>,
+}
+
+/// One run in so many may be spoilt.
+const ONE_SPOILT_IN: usize = 12;
+
+impl Session {
+    fn of(campaign: &Campaign, options: &Options) -> Self {
+        let mut notes = Vec::new();
+        let mut campaign = match feed_override::find(campaign) {
+            Some(factor) => {
+                notes.push(feed_override::words(factor));
+                feed_override::applied(campaign, factor)
+            }
+            None => campaign.clone(),
+        };
+        let mut places: Vec<usize> = (0..campaign.runs.len()).collect();
+        let mut left_out = Vec::new();
+        let mut survey = Survey::new(&campaign);
+        let most = if options.keep_all {
+            0
+        } else {
+            (campaign.runs.len() / ONE_SPOILT_IN).max(1)
+        };
+        while left_out.len() < most {
+            let Some(spoilt) = spoilt_of(&campaign, &survey, options) else {
+                break;
+            };
+            let run = campaign.runs.remove(spoilt.run);
+            places.remove(spoilt.run);
+            left_out.push(LeftOut {
+                file: run.file,
+                reason: influence::reason(&spoilt),
+            });
+            survey = Survey::new(&campaign);
+        }
+        Self {
+            campaign,
+            survey,
+            places,
+            notes,
+            left_out,
+        }
+    }
+
+    /// The campaign with what the given effects do taken out.
+    fn without(&self, baseline: &Simulation) -> Campaign {
+        without_known(&self.campaign, baseline).unwrap_or_else(|| self.campaign.clone())
+    }
+}
+
+fn spoilt_of(campaign: &Campaign, survey: &Survey, options: &Options) -> Option<influence::Spoilt> {
+    let response = match &options.model {
+        Some(model) => Response::of(&model.servo),
+        None => fit_lag(&sizes(campaign, believed_feed_m_s)),
+    };
+    let (runs, _) = survey.prepare(&response, 0.0);
+    let data = survey::misfit(&runs);
+    let profiles = places::place_means(&runs, &data);
+    let means: Vec<f64> = runs
+        .iter()
+        .zip(data.low())
+        .map(|(run, low)| low[0] / (run.visible().max(1) as f64).sqrt())
+        .collect();
+    influence::find(&runs, &profiles, &means)
+}
+
+fn sizes(campaign: &Campaign, feed_m_s: impl Fn(&crate::campaign::Run) -> f64) -> Vec<Size> {
+    campaign
+        .runs
+        .iter()
+        .map(|run| Size::of(run, feed_m_s(run)))
+        .collect()
+}
+
+/// The simulation as it stands.
+struct Simulation {
+    start: Start,
+    name: String,
+    /// As a machine without its effects, if a model was given.
+    given: Option<Machine>,
+    /// Effects of the given model.
+    known: Vec<Effect>,
+    /// Delay of the given model, s.
+    delay_s: Option<f64>,
+}
+
+impl Simulation {
+    fn of(session: &Session, options: &Options) -> Result<Self, DiagnosisError> {
+        let campaign = &session.campaign;
+        let stated = options.repeatability_m.or(campaign.repeatability_m);
+        let assumed = (campaign.runs.len() < FEWEST_RUNS).then_some(ASSUMED_REPEATABILITY_M);
+        let repeatability_m = stated.or(assumed).unwrap_or(0.0);
+        let Some(model) = &options.model else {
+            let response = fit_lag(&sizes(campaign, believed_feed_m_s));
+            let name = if response.a_s2 > 0.0 {
+                format!("one servo lag, kv = {:.1} /s", response.a_s2.powf(-0.5))
+            } else if response.a_s2 < 0.0 {
+                "circles that grow with speed, as no servo lag makes them".to_string()
+            } else {
+                "an ideal servo (circles do not shrink with speed)".to_string()
+            };
+            return Ok(Self {
+                start: Start {
+                    response,
+                    own_fourth_order: false,
+                    repeatability_m,
+                    more_lag_s: 0.0,
+                },
+                name,
+                given: None,
+                known: Vec::new(),
+                delay_s: None,
+            });
+        };
+        // Refuses what cannot be simulated, its effects among it.
+        Machine::from_model(model)?;
+        let bare = ModelFile {
+            effects: Vec::new(),
+            ..model.clone()
+        };
+        Ok(Self {
+            start: Start {
+                response: Response::of(&model.servo),
+                own_fourth_order: !matches!(model.servo, Servo::Lag { .. }),
+                repeatability_m,
+                more_lag_s: 0.0,
+            },
+            name: format!("the given model of {}", model.machine),
+            given: Some(Machine::from_model(&bare)?),
+            known: model.effects.clone(),
+            delay_s: model.delay_s,
+        })
+    }
+}
+
+/// Scatter of the size between runs that is assumed where it is neither measured nor known, m: a ballbar set up with care.
+pub const ASSUMED_REPEATABILITY_M: f64 = 1.5e-6;
+
+/// What these runs allow to be said at all.
+struct Footing {
+    cannot_tell: Vec<String>,
+    /// Whether the labels can be believed.
+    believable: bool,
+    /// Whether the scatter between runs is measured.
+    measured_scatter: bool,
+}
+
+impl Footing {
+    fn of(campaign: &Campaign, durations: &Durations, repeatability_m: f64) -> Self {
+        let mut cannot_tell = poverty(campaign, repeatability_m);
+        // Labels that the clock contradicts, and not as a clamp would: nothing that depends on them can be believed.
+        let contradicted = matches!(durations, Durations::Unexplained { runs, .. } if 4 * runs > campaign.runs.len());
+        if contradicted {
+            cannot_tell.push("the turns did not last as the programmed radius and feed say: check which file belongs to which run".into());
+        }
+        Self {
+            cannot_tell,
+            believable: !contradicted,
+            measured_scatter: campaign.runs.len() >= FEWEST_RUNS,
+        }
+    }
+}
+
+/// The proof on runs left out, with its veto: causes without which they are foretold better are taken out.
+fn prove(
+    seen: &Campaign,
+    found: &mut Explained,
+    baseline: &Simulation,
+    clamp: Option<Clamp>,
+    footing: &Footing,
+    seed: u64,
+) -> Option<Gain> {
+    if !footing.believable || !footing.measured_scatter {
+        return None;
+    }
+    veto::apply(found);
+    let measure =
+        |found: &Explained| gain::measure(seen, found, baseline.given.as_ref(), clamp, seed);
+    let mut gain = measure(found);
+    // The simulation in the time domain has the last word, where the closed forms were too sure.
+    while gain.percent < 0.0 {
+        let listed: Vec<usize> = found.stated().collect();
+        let without = |&item: &usize| {
+            let mut fewer = found.clone();
+            veto::take_out(&mut fewer, item);
+            (measure(&fewer), fewer)
+        };
+        let best = listed
+            .iter()
+            .map(without)
+            .min_by(|a, b| a.0.extended_rms_um.total_cmp(&b.0.extended_rms_um));
+        let Some((better, fewer)) = best else { break };
+        (gain, *found) = (better, fewer);
+    }
+    Some(gain).filter(|gain| gain.folds != [0, 0])
+}
+
+/// Two names for one thing.
+fn tie_words(found: &Explained, item: usize, other: crate::causes::Cause) -> String {
+    let largest = statement::largest(found, item);
+    let item::Kind::Cause { cause, .. } = found.items[item].kind else {
+        return String::new();
+    };
+    format!(
+        "up to {:.1} µm are {} or {}, which do the same to these circles: {}",
+        largest.max,
+        cause.model().words().name,
+        other.model().words().name,
+        cause.model().words().next
+    )
+}
+
+/// What is said.
+struct Stated {
+    findings: Vec<Finding>,
+    unexplained: Unexplained,
+}
+
+fn state(
+    explanation: &Explanation,
+    campaign: &Campaign,
+    clamp: Option<Clamp>,
+    durations: &Durations,
+    footing: &Footing,
+    proof: Option<&Gain>,
+) -> Stated {
+    let found = &explanation.found;
+    if !footing.believable {
+        return Stated {
+            findings: Vec::new(),
+            unexplained: Unexplained::default(),
+        };
+    }
+    let mut findings = verdict::findings(
+        found,
+        clamp.map(|clamp| (clamp, clamp_energy_m2(campaign, found))),
+    );
+    explanation.doubt(&mut findings);
+    status::settle(
+        &mut findings,
+        Ground {
+            measured_scatter: footing.measured_scatter,
+            proven: proof.is_some_and(|gain| gain.ci95_percent[0] > 0.0),
+        },
+    );
+    findings.retain(|finding| {
+        finding.probability > status::TIE && finding.cause.model().allows(finding.estimate.value)
+    });
+    let unexplained = if footing.measured_scatter {
+        let mut unexplained = unexplained::describe(found, durations);
+        omnibus::report(&mut unexplained, &omnibus::test(found));
+        unexplained
+    } else {
+        Unexplained::default()
+    };
+    Stated {
         findings,
-    })
+        unexplained,
+    }
+}
+
+/// What the slower feed of a clamp explains, m².
+fn clamp_energy_m2(campaign: &Campaign, found: &Explained) -> f64 {
+    campaign
+        .runs
+        .iter()
+        .map(|run| {
+            let gain = |feed_m_s: f64| found.response.gain(feed_m_s / run.radius_m);
+            let off = run.radius_m * (gain(run.feed_m_s) - gain(believed_feed_m_s(run)));
+            off * off * run.samples.deviation_m.len() as f64
+        })
+        .sum()
 }
 
 fn knows_clamp(known: &[Effect]) -> bool {
@@ -270,12 +575,12 @@ fn knows_clamp(known: &[Effect]) -> bool {
 }
 
 /// The campaign with what the given effects do taken out, by the simulation with and without them.
-fn without_known(campaign: &Campaign, start: &Start, known: &[Effect]) -> Option<Campaign> {
-    if known.is_empty() {
+fn without_known(campaign: &Campaign, baseline: &Simulation) -> Option<Campaign> {
+    if baseline.known.is_empty() {
         return None;
     }
-    let plain = gain::machine(&start.response, &[], None);
-    let with = gain::machine(&start.response, known, None);
+    let plain = gain::machine(&baseline.start.response, &[], baseline.delay_s);
+    let with = gain::machine(&baseline.start.response, &baseline.known, baseline.delay_s);
     let mut out = campaign.clone();
     for run in &mut out.runs {
         let test = crate::simulation::CircleTest::of(run);
@@ -295,7 +600,7 @@ fn without_known(campaign: &Campaign, start: &Start, known: &[Effect]) -> Option
 }
 
 /// What the campaign is too poor to tell.
-fn poverty(campaign: &Campaign) -> Vec<String> {
+fn poverty(campaign: &Campaign, repeatability_m: f64) -> Vec<String> {
     let distinct = |key: &dyn Fn(&crate::campaign::Run) -> f64| {
         let mut values: Vec<f64> = campaign.runs.iter().map(key).collect();
         values.sort_by(f64::total_cmp);
@@ -305,8 +610,9 @@ fn poverty(campaign: &Campaign) -> Vec<String> {
     let mut out = Vec::new();
     if campaign.runs.len() < FEWEST_RUNS {
         out.push(format!(
-            "{} run(s): the scatter between runs cannot be measured, so nothing can be called real; measure at least {FEWEST_RUNS}, better 26",
-            campaign.runs.len()
+            "{} run(s): the scatter between runs cannot be measured and is taken as {:.1} µm (`--repeatability` states another), so what is listed is provisional and nothing can be called real; measure at least {FEWEST_RUNS}, better 26",
+            campaign.runs.len(),
+            repeatability_m * 1e6
         ));
     }
     if distinct(&|run| run.radius_m) < 2 {

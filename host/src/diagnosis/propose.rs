@@ -1,11 +1,12 @@
 //! Patterns that the data themselves suggest.
 use super::basis::{Low, ORDERS};
 use super::explained::{Explained, residual};
-use super::item::Kind;
+use super::item::{Kind, scarcity};
 use super::material::smallest_pattern_m;
 use super::pattern::{LAWS, Law, Pattern};
 use super::places::{PLACES, bump_weights, place_means};
 use super::search::columns_of;
+use super::spread::is_arc;
 use super::survey::Prepared;
 use super::vector::axpy;
 use crate::causes::Harmonics;
@@ -33,10 +34,11 @@ pub fn propose_patterns(found: &mut Explained) {
     ranked.extend(bumps(found, &sizes));
     let count = found.ledger.samples(&found.all());
     let smallest_m = smallest_pattern_m(found);
+    let scarcity = scarcity(runs.len());
     ranked.retain(|candidate| {
         let kind = Kind::Pattern(candidate.pattern);
         let rms_m = (candidate.energy_m2 / count).sqrt();
-        candidate.gain > kind.price(1)
+        candidate.gain > kind.price(1, scarcity)
             && rms_m > 0.3 * smallest_m
             && !found.items.iter().any(|item| item.kind == kind)
     });
@@ -114,6 +116,10 @@ fn views(found: &Explained) -> Vec<Vec<Harmonics>> {
 
 fn harmonics(found: &Explained, sizes: &Sizes) -> Vec<Candidate> {
     let runs = &found.runs;
+    // Waves that an arc cannot hold are not read from it.
+    if runs.iter().any(is_arc) {
+        return Vec::new();
+    }
     let patterns = Pattern::all_harmonics(ORDERS);
     let one_view = |by_clock: Vec<Harmonics>| -> Vec<Candidate> {
         let turned = |(run, waves): (&Prepared, &Harmonics)| waves.seen_from(-run.turned_rad);

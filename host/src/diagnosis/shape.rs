@@ -129,11 +129,14 @@ impl Task {
         })
     }
 
+    /// As this cause with another shape, within what the cause can have.
     fn kind(&self, shape: &[f64]) -> Kind {
+        let mut shape = shape.to_vec();
+        self.cause.model().tidy(&mut shape);
         Kind::Cause {
             cause: self.cause,
             site: self.site,
-            shape: shape.to_vec(),
+            shape,
         }
     }
 }

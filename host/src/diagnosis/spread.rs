@@ -5,6 +5,7 @@
 //! time has been taken out. Tests against the noise within a run alone would make everything significant.
 use super::basis::{COLUMNS, Low, ORDERS, order_of};
 use super::linear;
+use super::orders;
 use super::survey::Prepared;
 use crate::causes::Harmonics;
 use rayon::prelude::*;
@@ -13,6 +14,9 @@ use rayon::prelude::*;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spread {
     /// Variance of one sample.
+    pub sample_m2: f64,
+    /// Variance of white noise that is as loud at the orders of the search: more than that of a sample where the noise
+    /// is correlated along the turn.
     pub noise_m2: f64,
     /// Variance between runs of the mean (order 0) and of each coefficient of the orders 2….
     pub order_m2: [f64; ORDERS + 1],
@@ -21,7 +25,21 @@ pub struct Spread {
 impl Spread {
     /// Standard deviation of one sample, m.
     pub fn noise_m(&self) -> f64 {
-        self.noise_m2.sqrt()
+        self.sample_m2.sqrt()
+    }
+
+    /// The same with the scatter of the size between runs, at least, that a person knows of or that is assumed, m; a
+    /// low order scatters by a share of it.
+    pub fn at_least(mut self, repeatability_m: f64) -> Self {
+        for (order, variance) in self.order_m2.iter_mut().enumerate() {
+            let share = match order {
+                0 => 1.0,
+                1 => 0.0,
+                _ => OF_SIZE / order as f64,
+            };
+            *variance = variance.max((share * repeatability_m).powi(2));
+        }
+        self
     }
 
     /// Share of a basis column that scatter between runs takes away from `samples` samples that are seen: 0 nothing, 1 all.
@@ -41,21 +59,39 @@ impl Spread {
     }
 }
 
+/// Scatter of the second order, each of cosine and sine, as a share of that of the size where nothing is known of it.
+const OF_SIZE: f64 = 0.6;
+
 /// Share of a circle that has to be seen for its harmonics to be read.
 pub const WHOLE: f64 = 0.7;
 
-/// Measures noise and scatter. `residual` holds, run by run, what the current model leaves.
-pub fn measure(runs: &[Prepared], residual: &[Vec<f64>]) -> Spread {
-    let noise_m2 = noise(residual);
+/// Measures noise and scatter. `residual` holds, run by run, what the current model leaves; `modelled`: it holds no more
+/// steps and spikes, so that its colour is that of the noise.
+pub fn measure(runs: &[Prepared], residual: &[Vec<f64>], modelled: bool) -> Spread {
+    let sample_m2 = noise(residual);
+    let colour = if modelled {
+        orders::colour(runs, residual, sample_m2)
+    } else {
+        1.0
+    };
+    let noise_m2 = colour * sample_m2;
     let mut order_m2 = [0.0; ORDERS + 1];
     // Of a circle that is hidden for the most part nothing low can be read.
     let seen = |run: &Prepared| run.visible() as f64 > WHOLE * run.deviation_m.len() as f64;
-    // Waves of the machine angle, as the signatures are.
+    let arcs = runs.iter().any(is_arc);
     let (runs, harmonics): (Vec<&Prepared>, Vec<Harmonics>) = runs
         .par_iter()
         .zip(residual)
         .filter(|(run, _)| seen(run))
-        .map(|(run, left)| (run, run.basis.harmonics(left).seen_from(-run.turned_rad)))
+        .map(|(run, left)| {
+            let waves = if arcs {
+                columns_as_waves(run, left)
+            } else {
+                // Waves of the machine angle, as the signatures are.
+                run.basis.harmonics(left).seen_from(-run.turned_rad)
+            };
+            (run, waves)
+        })
         .unzip();
     for (order, slot) in order_m2.iter_mut().enumerate() {
         if order == 1 {
@@ -76,7 +112,36 @@ pub fn measure(runs: &[Prepared], residual: &[Vec<f64>]) -> Spread {
             .sum();
         *slot = (total / parts as f64 - within).max(0.0);
     }
-    Spread { noise_m2, order_m2 }
+    Spread {
+        sample_m2,
+        noise_m2,
+        order_m2,
+    }
+}
+
+/// Whether a run covers so little of the turn that its waves cannot be told apart.
+pub fn is_arc(run: &Prepared) -> bool {
+    let angles = &run.view.psi_rad;
+    match (angles.first(), angles.last()) {
+        (Some(first), Some(last)) => (last - first).abs() < ARC * std::f64::consts::TAU,
+        _ => true,
+    }
+}
+
+/// Share of a turn below which a run is an arc.
+const ARC: f64 = 0.95;
+
+/// The coordinates of an arc's orthonormal columns on the scale of waves of a whole turn: waves of an arc are read with
+/// errors far beyond what they do to it, its columns are not.
+fn columns_as_waves(run: &Prepared, left: &[f64]) -> Harmonics {
+    let low = run.basis.coordinates(left);
+    let samples = run.visible().max(1) as f64;
+    let (mean, wave) = (samples.sqrt().recip(), (2.0 / samples).sqrt());
+    let mut out = Harmonics::mean(low[0] * mean);
+    for order in 1..=ORDERS {
+        out.0[order] = [low[2 * order - 1] * wave, low[2 * order] * wave];
+    }
+    out
 }
 
 fn mean_inverse_samples(runs: &[&Prepared]) -> f64 {
@@ -84,6 +149,11 @@ fn mean_inverse_samples(runs: &[&Prepared]) -> f64 {
         .map(|run| 1.0 / run.visible().max(1) as f64)
         .sum::<f64>()
         / runs.len().max(1) as f64
+}
+
+/// Variance of a sample, m², by what a model leaves of each run.
+pub fn sample_noise_m2(residual: &[Vec<f64>]) -> f64 {
+    noise(residual)
 }
 
 /// Variance of a sample from second differences: smooth effects cancel, and the median over the runs ignores

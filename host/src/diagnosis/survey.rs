@@ -177,18 +177,16 @@ impl Lag {
 /// Ratio of measured to programmed feed below which a run counts as slowed.
 const SLOWED: f64 = 0.995;
 
-/// Feed of the run as its turn shows it; the programmed one without time stamps or where they agree to 0.5 %.
+/// Feed of the run as its turn shows it, m/s; `None` without time stamps.
+pub fn measured_feed_m_s(run: &Run) -> Option<f64> {
+    let turn_s = run.turn_s().filter(|turn_s| *turn_s > 0.0)?;
+    Some(std::f64::consts::TAU * run.radius_m / turn_s)
+}
+
+/// The measured feed; the programmed one without time stamps or where they agree to 0.5 %.
 pub fn believed_feed_m_s(run: &Run) -> f64 {
-    let turn_m = std::f64::consts::TAU * run.radius_m;
-    match run.turn_s() {
-        Some(turn_s) if turn_s > 0.0 => {
-            let measured = turn_m / turn_s;
-            if (SLOWED..=1.0 / SLOWED).contains(&(measured / run.feed_m_s)) {
-                run.feed_m_s
-            } else {
-                measured
-            }
-        }
+    match measured_feed_m_s(run) {
+        Some(measured) if !(SLOWED..=1.0 / SLOWED).contains(&(measured / run.feed_m_s)) => measured,
         _ => run.feed_m_s,
     }
 }
@@ -301,6 +299,11 @@ impl Survey {
         self.runs.iter().map(|run| Arc::clone(&run.basis)).collect()
     }
 
+    /// Whether the angles follow from the time, and so hold the delay.
+    pub const fn inferred(&self) -> bool {
+        self.inferred
+    }
+
     /// Lag of the machine behind the command: by the turn of the set-up offset, or else that of the response's own chain.
     pub fn lag(&self, response: &Response) -> Lag {
         if self.inferred {
@@ -352,8 +355,9 @@ pub fn misfit(runs: &[Prepared]) -> Column {
     column.unwrap_or_else(|| Column::zero(runs.len()))
 }
 
-/// Dead time that a servo may have on top of its own lag, s.
-const UNSEEN_S: f64 = 0.01;
+/// Delay that filters, networks and dead times may add to the lag of a response, s: standard deviation of what is known
+/// of the delay before it is measured.
+const UNSEEN_S: f64 = 0.03;
 
 /// Least eccentricity that shows its turn clearly against a micrometre of noise, m.
 const SMALLEST_OFFSET_M: f64 = 3e-6;

@@ -222,6 +222,13 @@ pub fn finish(found: &mut Explained, weights: &[f64]) -> f64 {
     }
 }
 
+/// Standard error of the delay beside all that is chosen, s; `None`: it was not fitted.
+pub fn lag_se_s(found: &Explained) -> Option<f64> {
+    let tangents = found.tangents.as_ref().filter(|tangents| tangents.lag)?;
+    let last = tangents.columns.len().checked_sub(1)?;
+    Some(LAG_STEP_S * tangents.solution.covariance[(last, last)].sqrt())
+}
+
 /// Covariance and columns with the tangents, or without where there are none.
 pub fn covariance(found: &Explained) -> (&DMatrix<f64>, Vec<usize>, Vec<f64>) {
     match &found.tangents {

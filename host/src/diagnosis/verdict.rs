@@ -1,11 +1,13 @@
 //! From the chosen explanations to findings: estimate, interval, probability, share, look-alikes.
 use super::duration::Clamp;
 use super::explained::{Explained, energies};
-use super::finding::{Estimate, Finding};
+use super::finding::{Estimate, Finding, Largest};
 use super::item::Kind;
 use super::linear::solve;
 use super::roughness::{self, Teeth};
 use super::search::{columns_of, evidence, select};
+use super::statement;
+use super::status::{Status, TIE};
 use super::tangent;
 use super::tone::{Amplitude, Tone};
 use crate::causes::{Cause, Effect, Fitted, Seat, Site};
@@ -48,6 +50,9 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
         let Kind::Cause { cause, site, .. } = &found.items[item].kind else {
             return None;
         };
+        if found.tied.contains(&item) {
+            return None;
+        }
         let words = cause.model().words();
         let (value, half) = estimate(found, item);
         let ci95 = [value - half, value + half];
@@ -59,6 +64,9 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
             axis: site.axis(),
             actuators: site.actuators(),
             probability: probability(found, &weights, at),
+            status: Status::default(),
+            effect_um: statement::largest(found, item),
+            remedy: statement::remedy(*cause, &site.actuators(), value),
             estimate: Estimate {
                 value,
                 ci95,
@@ -88,11 +96,13 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
         let half = 2.0 * clamp.se_m_s2 * 1e3;
         let ci95 = [value - half, value + half];
         let effect = Effect::new(Cause::FeedClamp, Site::Machine, value, ci95, []);
-        out.extend(
-            effect
-                .ok()
-                .map(|effect| plain(effect, HIGHEST, share(energy), rms(energy))),
-        );
+        let finding = effect
+            .ok()
+            .map(|effect| plain(effect, HIGHEST, share(energy), rms(energy)));
+        out.extend(finding.map(|finding| Finding {
+            effect_um: statement::of_slower_feed(found),
+            ..finding
+        }));
     }
     let (pieces, energy) = unexplained_energy(found, &each);
     let hidden_by_pieces = pieces >= PIECES && tone_energy < 9.0 * energy;
@@ -102,12 +112,20 @@ pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> 
         .zip(tone_energies)
         .filter(|_| !hidden_by_pieces)
     {
-        out.extend(tone_finding(tone, share(energy), rms(energy)));
+        let finding = tone_finding(tone, share(energy), rms(energy));
+        out.extend(finding.map(|finding| Finding {
+            effect_um: statement::of_tone(found, tone),
+            ..finding
+        }));
     }
     for (teeth, energy) in found.teeth.iter().zip(teeth_energy) {
         let odds = 0.5 * teeth.significance.powi(2) - 14.0;
         let effect = teeth_effect(teeth);
-        out.extend(effect.map(|effect| plain(effect, sigmoid(odds), share(energy), rms(energy))));
+        let finding = effect.map(|effect| plain(effect, sigmoid(odds), share(energy), rms(energy)));
+        out.extend(finding.map(|finding| Finding {
+            effect_um: statement::of_teeth(found, teeth),
+            ..finding
+        }));
     }
     out.sort_by(|a, b| b.share_percent.total_cmp(&a.share_percent));
     out
@@ -127,9 +145,6 @@ fn unexplained_energy(found: &Explained, each: &[f64]) -> (usize, f64) {
 
 /// So many patterns side by side are pieces of one thing that none of them describes.
 const PIECES: usize = 3;
-
-/// A look-alike that explains these data to the last digit leaves even odds, give or take rounding.
-const EVEN: f64 = 0.5 - 1e-6;
 
 /// Against all patterns, rms: below, a cause beside so many of them may be a further piece. One with shape parameters fits more.
 const LARGER_THAN_PIECES: [f64; 2] = [1.0 / 3.0, 3.0];
@@ -164,7 +179,7 @@ fn without_bent(
                             (roughness::energy_m2(teeth, &found.runs) / samples).sqrt() * 1e6;
                         f.rms_um < 0.25 * teeth_um
                     });
-            f.probability >= EVEN && !piece && !smear
+            f.probability > TIE && !piece && !smear
         })
         .collect()
 }
@@ -182,6 +197,9 @@ fn plain(effect: Effect, probability: f64, share_percent: f64, rms_um: f64) -> F
         axis: effect.site().axis(),
         actuators: effect.site().actuators(),
         probability,
+        status: Status::default(),
+        effect_um: Largest::default(),
+        remedy: statement::remedy(effect.cause(), &effect.site().actuators(), effect.value()),
         estimate: Estimate {
             value: effect.value(),
             ci95: effect.ci95(),
@@ -390,6 +408,38 @@ fn probability(found: &Explained, weights: &[f64], at: usize) -> f64 {
     }
 }
 
+/// Chosen causes in whose place another cause does as well to the last digit, and its name: even odds are no finding.
+pub fn ties(found: &Explained) -> Vec<(usize, Cause)> {
+    let products = found.ledger.white(&found.all());
+    let worth = |set: &[usize]| evidence(&products, &found.nuisance, &found.items, set);
+    let Some(best) = worth(&found.chosen) else {
+        return Vec::new();
+    };
+    let twin = |(at, &own): (usize, &usize)| {
+        let Kind::Cause { cause, .. } = found.items[own].kind else {
+            return None;
+        };
+        let other = (0..found.items.len()).find(|&index| {
+            let Kind::Cause { cause: other, .. } = found.items[index].kind else {
+                return false;
+            };
+            let mut swapped = found.chosen.clone();
+            swapped[at] = index;
+            other != cause
+                && !found.chosen.contains(&index)
+                && worth(&swapped).is_some_and(|worth| worth > best - EVEN)
+        })?;
+        match found.items[other].kind {
+            Kind::Cause { cause, .. } => Some((own, cause)),
+            Kind::Pattern(_) => None,
+        }
+    };
+    found.chosen.iter().enumerate().filter_map(twin).collect()
+}
+
+/// Difference of evidence (2·ln of the odds) below which two names have even odds.
+const EVEN: f64 = 0.4;
+
 /// Other causes that would explain these data nearly as well in its place (evidence within 2·ln 20).
 fn look_alikes(found: &Explained, weights: &[f64], at: usize) -> Vec<String> {
     let products = found.ledger.white(weights);
@@ -480,6 +530,10 @@ fn join_axes(findings: Vec<Finding>) -> Vec<Finding> {
                         twin.actuators.push(actuator);
                     }
                 }
+                if finding.effect_um.max > twin.effect_um.max {
+                    twin.effect_um = finding.effect_um;
+                }
+                twin.remedy = statement::remedy(twin.cause, &twin.actuators, value);
                 twin.estimate.value = value;
                 twin.estimate.ci95 = [value - half, value + half];
                 twin.share_percent += finding.share_percent;

@@ -70,8 +70,10 @@ pub fn spread(diagnosis: &Diagnosis) -> Spread {
     let between = diagnosis.spread_um.max(0.1).powi(2) * 1e-12;
     let mut order_m2 = [between; ORDERS + 1];
     order_m2[1] = 0.0;
+    let noise_m2 = diagnosis.noise_um.max(0.1).powi(2) * 1e-12 * VIEW as f64 / TURN;
     Spread {
-        noise_m2: diagnosis.noise_um.max(0.1).powi(2) * 1e-12 * VIEW as f64 / TURN,
+        sample_m2: noise_m2,
+        noise_m2,
         order_m2,
     }
 }

@@ -72,7 +72,8 @@ pub fn of(diagnosis: &Diagnosis) -> Question {
             });
         }
     }
-    let nothing_proven = diagnosis.findings.is_empty() && diagnosis.gain.is_none();
+    // Provisional findings of a session without a proof are no more than questions.
+    let nothing_proven = diagnosis.gain.is_none();
     if question.classes.is_empty() && (nothing_proven || diagnosis.unexplained.present) {
         let why = if diagnosis.unexplained.present {
             "something matches no cause: more radii, feeds and places narrow its law down"

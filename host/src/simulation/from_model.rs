@@ -27,11 +27,21 @@ impl Machine {
     /// Coefficients that are not finite, or that only a machine slower than the simulation allows can have.
     pub fn from_model(model: &ModelFile) -> Result<Self, MachineError> {
         let mut machine = Self::from_servo(&model.servo)?;
+        if let Some(delay_s) = model.delay_s {
+            machine.set_delay(delay_s);
+        }
         for effect in &model.effects {
             effect.cause().model().apply(effect, &mut machine);
         }
         machine.check()?;
         Ok(machine)
+    }
+
+    /// Gives every axis so much delay behind the command, s: what their chain does not have of it is dead time.
+    pub fn set_delay(&mut self, delay_s: f64) {
+        let mechanics = self.mechanics[0].map_or(0.0, |m| 2.0 * m.zeta / m.omega_n_rad_s);
+        let own_s = mechanics + (1.0 - self.servo[0].feed_forward) / self.servo[0].kv_per_s;
+        self.dead_time_s = [(delay_s - own_s).max(0.0); 3];
     }
 
     /// As [`Self::from_model`], without effects.

@@ -23,6 +23,7 @@ pub fn model() -> ModelFile {
             feed_mm_s: [0.1, 5000.0],
         },
         effects: Vec::new(),
+        delay_s: None,
     }
 }
 

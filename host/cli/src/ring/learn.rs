@@ -38,7 +38,13 @@ pub fn learn(plan: &Plan, seed: u64) -> Result<Learned, DemoError> {
     };
     let observations: Vec<Observation> = report.runs.iter().map(observation).collect();
     let fit = RadiusFit::new(&observations, fit::Options::default())?;
-    let diagnosis = diagnose(&campaign, &diagnosis::Options { model: None, seed })?;
+    let diagnosis = diagnose(
+        &campaign,
+        &diagnosis::Options {
+            seed,
+            ..diagnosis::Options::default()
+        },
+    )?;
     let table = table_from_model(&diagnosis.model)?;
     Ok(Learned {
         campaign,

@@ -26,6 +26,7 @@ fn image(scale: f64) -> Vec<u8> {
             feed_mm_s: [20.0, 700.0],
         },
         effects: Vec::new(),
+        delay_s: None,
     };
     let mut out = [0; MAX_IMAGE_BYTES];
     let length = table::encode(&table_from_model(&model).unwrap().table, &mut out).unwrap();
