@@ -50,8 +50,9 @@ pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
         tool_loaded: args.tool_loaded,
     };
     blocks(&args.program, &text, &running)?;
-    let mut controller = args.port.open(out)?;
-    let start_mm = controller.status()?.raw_nm.map(|nm| f64::from(nm) * 1e-6);
+    let mut controller = super::open(&args.port, out)?;
+    let before = controller.status()?;
+    let start_mm = before.raw_nm.map(|nm| f64::from(nm) * 1e-6);
     let blocks = blocks(
         &args.program,
         &text,
@@ -65,7 +66,8 @@ pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
         .run_program(&steps, args.record.every)
         .map_err(|error| failure(&args.program, &blocks, error))?;
     args.record.report(
-        &controller,
+        &mut controller,
+        &before,
         &recording,
         &[("blocks", json!(blocks.len()))],
         out,
