@@ -9,6 +9,8 @@ struct Memory {
     feature: &'static str,
     flash: u32,
     ram: u32,
+    /// Where the code begins, if not behind the vectors.
+    code: u32,
 }
 
 const BOARDS: [Memory; 3] = [
@@ -17,17 +19,21 @@ const BOARDS: [Memory; 3] = [
         feature: "CARGO_FEATURE_MPS2_AN386",
         flash: 0x0000_0000,
         ram: 0x2000_0000,
+        code: 0,
     },
-    // Sectors 0 to 4 of the flash; key and tables are in 9 to 11 (RM0090 3.3). The first of two RAMs (RM0090 2.3).
+    // Vectors in sector 0, tables and key in 1 to 3, code from sector 4 on, configuration in 10 and 11 (RM0090 3.3). The first of
+    // two RAMs (RM0090 2.3).
     Memory {
         feature: "CARGO_FEATURE_STM32F405",
         flash: 0x0800_0000,
         ram: 0x2000_0000,
+        code: 0x0801_0000,
     },
     Memory {
         feature: "CARGO_FEATURE_TICKS",
         flash: 0x0000_0000,
         ram: 0x2000_0000,
+        code: 0,
     },
 ];
 
@@ -77,7 +83,12 @@ fn main() {
         region("FLASH", (board.flash, text)),
         region("RAM", (board.ram, ram)),
     );
-    let memory = format!("MEMORY\n{{\n{flash}{ram}}}\n");
+    let code = if board.code > 0 {
+        format!("_stext = {:#010x};\n", board.code)
+    } else {
+        String::new()
+    };
+    let memory = format!("MEMORY\n{{\n{flash}{ram}}}\n{code}");
     for (name, text) in [
         ("memory.x", memory.as_str()),
         ("device.x", "/* the vector table names its handlers */\n"),

@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | [`engine`] | programs in, set-points out, one a tick | links, flash |
 //! | [`control`] | the engine split between interrupt and background | registers |
+//! | [`stm32_flash`] | the flash controller of a part, testable on the host | what is stored |
 //! | [`store`] | two slots of flash, confirmations, power cuts | what a table means |
 //! | [`engine`] | programs in, one set-point a tick out | flash, serial ports |
 //! | [`server`] | the protocol state machine: request in, reply out | registers, serial ports |
@@ -16,4 +17,5 @@ extern crate std;
 pub mod control;
 pub mod engine;
 pub mod server;
+pub mod stm32_flash;
 pub mod store;

@@ -436,9 +436,11 @@ impl<const N: usize> Stream<N> {
 
     fn carry_on(&mut self) -> [i32; 3] {
         let mut next = self.last_nm();
+        let most = i32::try_from(self.plan.step_nm).unwrap_or(i32::MAX);
         for ((n, v), c) in next.iter_mut().zip(&mut self.velocity).zip(self.change) {
-            *v = v.wrapping_add(c);
-            *n = n.wrapping_add(*v);
+            // Never faster than set-points may be.
+            *v = v.saturating_add(c).clamp(most.wrapping_neg(), most);
+            *n = n.saturating_add(*v);
         }
         next
     }

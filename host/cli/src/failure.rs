@@ -14,6 +14,8 @@ pub enum Kind {
     Controller = 4,
     /// Done, but the check it was asked for failed.
     Check = 5,
+    /// Interrupted by the person at the terminal, as shells say it.
+    Interrupted = 130,
 }
 
 /// An error on its way to the terminal.
@@ -38,6 +40,11 @@ impl Failure {
     /// A requested check failed (exit 5).
     pub fn check(message: impl Display) -> Self {
         Self::new(Kind::Check, message)
+    }
+
+    /// Interrupted (exit 130).
+    pub fn interrupted(message: impl Display) -> Self {
+        Self::new(Kind::Interrupted, message)
     }
 
     /// Wrong usage (exit 2).

@@ -8,25 +8,30 @@ mod choice;
 mod compare;
 mod compensate;
 mod completions;
+mod config;
 mod controller;
 mod demo;
 pub mod destination;
 mod diagnose;
+mod feed;
 mod fit;
 mod flash;
 mod grid;
 mod history;
 mod import;
 mod key;
+mod log;
 mod man;
 mod monitor;
 mod plan;
 mod port;
 mod report;
+mod reset;
 mod rollback;
 mod run;
 mod simulate;
 mod status;
+mod stop;
 mod table;
 mod table_file;
 mod verify;
@@ -98,6 +103,16 @@ enum Command {
     Verify(verify::Args),
     /// Switch the correction off or on.
     Bypass(bypass::Args),
+    /// Stop what runs, within the limits.
+    Stop(stop::Args),
+    /// Clear a fault without losing the position, or say where the machine stands.
+    Reset(reset::Args),
+    /// Feed hold, resume, override of the feed.
+    Feed(feed::Args),
+    /// What has happened on the controller, in words.
+    Log(log::Args),
+    /// The limits that a controller keeps.
+    Config(config::Args),
     /// Execute a path on the controller and record its set-points.
     Run(run::Args),
     /// Live view of the controller in the terminal.
@@ -132,6 +147,11 @@ fn dispatch(command: Command, out: Output) -> Result<(), Failure> {
         Command::Rollback(args) => rollback::run(args, out),
         Command::Verify(args) => verify::run(args, out),
         Command::Bypass(args) => bypass::run(args, out),
+        Command::Stop(args) => stop::run(args, out),
+        Command::Reset(args) => reset::run(args, out),
+        Command::Feed(args) => feed::run(args, out),
+        Command::Log(args) => log::run(args, out),
+        Command::Config(args) => config::run(args, out),
         Command::Run(args) => run::run(args, out),
         Command::Monitor(args) => monitor::run(args, out),
         Command::Controller(args) => controller::run(args, out),

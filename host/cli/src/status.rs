@@ -3,7 +3,7 @@ use super::port::PortArgs;
 use super::{Failure, Output};
 use comfy_table::{Table, presets};
 use giotto_link::Controller;
-use giotto_shared::wire::{Identity, Probation, SlotState, Status};
+use giotto_shared::wire::{ClockSource, Identity, PositionState, Probation, SlotState, Status};
 use serde_json::{Value, json};
 
 /// Arguments of `giotto status`.
@@ -70,6 +70,12 @@ fn document(controller: &Controller, status: &Status) -> Value {
         "bypass": status.bypass,
         "active_slot": status.active,
         "probation": probation,
+        "position": format!("{:?}", status.position).to_lowercase(),
+        "override_percent": status.override_percent,
+        "reset_cause": format!("{:?}", status.reset).to_lowercase(),
+        "clock": format!("{:?}", status.clock).to_lowercase(),
+        "worst_tick_percent": status.worst_tick_permille.map(|permille| f64::from(permille) / 10.0),
+        "stack_left_bytes": status.stack_left_bytes,
         "queued_segments": status.queued,
         "slots": status.slots.iter().map(slot_document).collect::<Vec<_>>(),
         "ticks": status.tick,
@@ -166,14 +172,32 @@ pub(super) fn words(controller: &Controller, status: &Status) -> Table {
         let [x, y, z] = nm.map(millimetres);
         format!("{x:.6} {y:.6} {z:.6} mm")
     };
+    let known = match status.position {
+        PositionState::Unknown => "not known: `giotto reset --at X,Y,Z` declares it",
+        PositionState::Known => "known",
+        PositionState::Kept => "kept over the last reset",
+    };
+    row("position", known.to_owned());
     row("programmed", place(status.raw_nm));
     row("corrected", place(status.corrected_nm));
     let counts = &status.counters;
     row(
         "ticks",
         format!(
-            "{} since boot, {} overrun",
-            status.tick, counts.tick_overruns
+            "{} since boot ({}), {} overrun{}{}",
+            status.tick,
+            format!("{:?}", status.reset).to_lowercase(),
+            counts.tick_overruns,
+            status
+                .worst_tick_permille
+                .map_or(String::new(), |p| format!(
+                    ", longest {:.1} % of a period",
+                    f64::from(p) / 10.0
+                )),
+            match status.clock {
+                ClockSource::Crystal => "",
+                ClockSource::Internal => ", NO CRYSTAL: counted by the internal oscillator",
+            }
         ),
     );
     row(
@@ -223,7 +247,10 @@ pub(super) fn words(controller: &Controller, status: &Status) -> Table {
     if status.stack_bytes > 0 {
         row(
             "stack",
-            format!("{} bytes at the deepest", status.stack_bytes),
+            format!(
+                "{} bytes at the deepest, {} never used",
+                status.stack_bytes, status.stack_left_bytes
+            ),
         );
     }
     table

@@ -8,6 +8,7 @@
 //! | [`flash`] | a table onto a controller, and the proof that it is there |
 //! | [`recording`] | circles run, set-points received |
 //! | [`program`], [`streaming`] | programs and set-points, sent ahead of the machine |
+//! | [`settings`] | stored limits, and the log of events |
 //! | [`port`] | what `--port` may name, and opening it |
 //! | [`serial`] | a serial device |
 //! | [`stepped`] | an emulator whose time passes only while someone waits |
@@ -29,6 +30,7 @@ pub mod recording;
 pub mod serial;
 mod series;
 pub mod serve;
+pub mod settings;
 pub mod signing;
 pub mod stepped;
 pub mod streaming;

@@ -50,8 +50,14 @@ impl Outcome {
         } else {
             None
         };
-        let diagnosis =
-            diagnose(&campaign, &Options { model, ..Options::default() }).map_err(|e| e.to_string())?;
+        let diagnosis = diagnose(
+            &campaign,
+            &Options {
+                model,
+                ..Options::default()
+            },
+        )
+        .map_err(|e| e.to_string())?;
         let json = serde_json::to_value(&diagnosis).map_err(|e| e.to_string())?;
         Self::from_json(&json).ok_or_else(|| format!("not as the contract has it: {json}"))
     }

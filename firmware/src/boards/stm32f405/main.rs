@@ -7,8 +7,9 @@
 //! | PC6 (D6) | USART6, the log, in defmt's encoding |
 //! | PC3 (D11) | stop input: a closed contact to ground lets it run; open, or a broken wire, stops |
 //!
-//! Key and tables are in the last three sectors of the flash. While one is erased the core stands still for a second or two, and so
-//! does the tick: it happens at rest only, and the watchdog waits for four.
+//! Tables and key are in sectors 1 to 3 of the flash, between the vectors and the code. While one is erased the core stands still for
+//! up to half a second, and so does the tick: it happens at rest only, and the watchdog waits for four. So with the configuration, in
+//! sectors 10 and 11, for up to two seconds once in two hundred changes.
 //!
 //! **Never run on a real board**: what QEMU does not emulate (clock, flash, pins) follows the reference manual (RM0090) and
 //! has been seen to fail as it should, never to work.
@@ -94,7 +95,7 @@ mod image {
         };
         common::background(
             board(source, reset),
-            flash::Sectors::new(),
+            flash::Flash::new(),
             flash::LAYOUT,
             (desk, buffers, syst),
             ports,

@@ -95,7 +95,8 @@ impl Brake {
             return Self::default();
         }
         let along = combined(velocity, 1.0 / speed, velocity, 0.0);
-        let acceleration = speed - dot(earlier, along);
+        // Set-points may be as rough as their sender likes: more than the limit is not taken back at the limit of jerk.
+        let acceleration = (speed - dot(earlier, along)).min(limits.acceleration);
         let mut brake = Self {
             along,
             way: speed,
@@ -189,7 +190,7 @@ impl Brake {
 /// Farthest that a brake from a velocity and its change leads on one axis, nm; `speed` is that along the path. All per tick.
 pub(crate) fn farthest_nm(limits: [f32; 2], speed: f32, velocity: f32, change: f32) -> f32 {
     let [acceleration, jerk] = limits;
-    let (velocity, change) = (velocity.abs(), change.max(0.0));
+    let (velocity, change) = (velocity.abs(), change.clamp(0.0, acceleration));
     // While the acceleration is taken back the speed still grows.
     let gained = velocity + 0.5 * change * change / jerk;
     let growing = change / jerk * (velocity + change * change / (3.0 * jerk));

@@ -134,3 +134,35 @@ fn a_stop_follows_the_curvature() {
         assert!(way * way / 0.2 > 3e-4);
     }
 }
+
+/// A sender that goes to and fro at the largest feed, or starts at it at once, and dies: nothing is ever faster than that.
+#[test]
+fn however_rough_the_set_points_no_step_is_longer_than_the_feed() {
+    let plan = plan_with(Operator::default());
+    for period in [1, 2, 3, 5, 40] {
+        for at in 30..60 {
+            for dies in [false, true] {
+                let mut stream: Stream = Stream::new(&plan, [0; 3], 0, true);
+                let (mut place, mut last) = ([0; 3], [0; 3]);
+                for n in 0..4000 {
+                    let forth = if n / period % 2 == 0 { 1 } else { -1 };
+                    let came = n < at;
+                    if came && n > 25 {
+                        place[0] += 1_000_000 * forth;
+                        place[1] -= 900_000 * forth;
+                    }
+                    if n == at && !dies {
+                        stream.stop();
+                    }
+                    let out = stream.tick(came.then(|| sample_at(n, place)));
+                    for axis in 0..3 {
+                        let step = (out.nominal_nm[axis] - last[axis]).abs();
+                        assert!(step < 1_060_000, "{period} {at} {dies} {n}: {step}");
+                    }
+                    last = out.nominal_nm;
+                }
+                assert!(stream.over());
+            }
+        }
+    }
+}

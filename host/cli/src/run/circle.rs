@@ -73,7 +73,9 @@ pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
         start_rad: 0.0,
     };
     args.record.ready()?;
-    let mut controller = args.port.open(out)?;
+    let mut controller = super::open(&args.port, out)?;
+    let before = controller.status()?;
     let recording = controller.run_circle(&wanted, args.record.every)?;
-    args.record.report(&controller, &recording, &[], out)
+    args.record
+        .report(&mut controller, &before, &recording, &[], out)
 }

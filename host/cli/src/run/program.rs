@@ -50,10 +50,10 @@ pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
         tool_loaded: args.tool_loaded,
     };
     blocks(&args.program, &text, &running)?;
-    let mut controller = args.port.open(out)?;
-    let status = controller.status()?;
+    let mut controller = super::open(&args.port, out)?;
+    let before = controller.status()?;
     if let (Some((line, words)), Some(slot), false) =
-        (giotto_nc::marked(&text), status.active, status.bypass)
+        (giotto_nc::marked(&text), before.active, before.bypass)
     {
         out.note(format_args!(
             "warning: {}:{line}: corrected before ({words}), and the controller corrects by the table in slot {slot}: twice; \
@@ -61,7 +61,7 @@ pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
             args.program.display()
         ));
     }
-    let start_mm = status.raw_nm.map(|nm| f64::from(nm) * 1e-6);
+    let start_mm = before.raw_nm.map(|nm| f64::from(nm) * 1e-6);
     let blocks = blocks(
         &args.program,
         &text,
@@ -75,7 +75,8 @@ pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
         .run_program(&steps, args.record.every)
         .map_err(|error| failure(&args.program, &blocks, error))?;
     args.record.report(
-        &controller,
+        &mut controller,
+        &before,
         &recording,
         &[("blocks", json!(blocks.len()))],
         out,

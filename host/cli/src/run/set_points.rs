@@ -1,8 +1,10 @@
 //! What a run says of itself, and the file of its set-points.
+use super::correction::lacks;
 use crate::destination::{Destination, Kind};
 use crate::failure::cannot_write;
 use crate::{Failure, Output};
 use giotto_link::{Controller, Recording};
+use giotto_shared::wire::Status;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -12,6 +14,9 @@ pub(super) struct Record {
     /// Record every so many ticks' set-point.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..), value_name = "N")]
     pub(super) every: u16,
+    /// Exit code 5 if part of the path was not corrected.
+    #[arg(long)]
+    require_correction: bool,
     /// Where to write the set-points.
     #[arg(short, long, value_name = "SETPOINTS.csv")]
     output: Option<PathBuf>,
@@ -29,7 +34,8 @@ impl Record {
     /// Writes the set-points and says what they were; `more` goes into the document.
     pub(super) fn report(
         &self,
-        controller: &Controller,
+        controller: &mut Controller,
+        before: &Status,
         recording: &Recording,
         more: &[(&str, Value)],
         out: Output,
@@ -43,6 +49,7 @@ impl Record {
             .map(|point| offset_m(point.programmed_m, point.corrected_m));
         let largest_um = largest.fold(0.0, f64::max) * 1e6;
         let seconds = recording.points.last().map_or(0.0, |point| point.time_s);
+        let lacks = lacks(controller, before)?;
         if out.json {
             let mut document = json!({
                 "port": controller.port(),
@@ -50,12 +57,15 @@ impl Record {
                 "dt_s": recording.dt_s,
                 "duration_s": seconds,
                 "largest_offset_um": largest_um,
+                "corrected": lacks.is_none(),
+                "stopped": recording.stopped,
                 "output": self.output,
             });
             for (name, value) in more {
                 document[*name] = value.clone();
             }
-            return out.document(&document);
+            out.document(&document)?;
+            return self.verdict(recording, lacks);
         }
         out.say(format_args!(
             "{}: {} set-points in {seconds:.3} s, largest correction {largest_um:.3} um{}",
@@ -65,7 +75,25 @@ impl Record {
                 .as_ref()
                 .map_or(String::new(), |path| format!(", in {}", path.display()))
         ));
-        Ok(())
+        // Without a table nobody expects a correction, unless they say so.
+        if let Some(lacks) = lacks.as_ref().filter(|_| before.active.is_some()) {
+            out.note(lacks);
+        }
+        self.verdict(recording, lacks)
+    }
+
+    /// Whether the run was what was asked for.
+    fn verdict(&self, recording: &Recording, lacks: Option<String>) -> Result<(), Failure> {
+        if recording.stopped {
+            return Err(Failure::interrupted(
+                "stopped before its end; what was recorded is kept",
+            ));
+        }
+        match lacks {
+            Some(lacks) if self.require_correction => Err(Failure::check(lacks)
+                .help("`giotto table show` lists the zones; run inside them, or without --require-correction")),
+            _ => Ok(()),
+        }
     }
 }
 

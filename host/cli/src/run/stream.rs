@@ -5,7 +5,7 @@ use crate::port::PortArgs;
 use crate::source::length;
 use crate::{Failure, Output};
 use giotto_link::ControllerError;
-use giotto_shared::wire::{MotionRefusal, Quantity, Refusal};
+use giotto_shared::wire::{Command, MotionRefusal, PositionState, Quantity, Refusal};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -31,11 +31,18 @@ const SLACK: f64 = 0.1;
 pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
     let rows = read(&args.file)?;
     args.record.ready()?;
-    let mut controller = args.port.open(out)?;
+    let mut controller = super::open(&args.port, out)?;
     let tick_s = 1.0 / f64::from(controller.identity().tick_hz);
     one_a_tick(&args.file, &rows, tick_s)?;
     let places_nm: Vec<[i32; 3]> = rows.iter().map(|row| row.place_nm).collect();
+    if controller.status()?.position == PositionState::Unknown {
+        // Whoever plans this path knows where the machine stands: where it begins.
+        controller.command(Command::Declare {
+            place_nm: places_nm[0],
+        })?;
+    }
     controller.move_to(places_nm[0], args.rapid * 1e-3)?;
+    let before = controller.status()?;
     let (fastest, feed_m_s) = fastest(&places_nm, tick_s);
     let streamed = controller
         .run_stream(&places_nm, feed_m_s, args.record.every)
@@ -52,7 +59,7 @@ pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
         ("rejected_set_points", json!(streamed.rejected)),
     ];
     args.record
-        .report(&controller, &streamed.recording, &more, out)
+        .report(&mut controller, &before, &streamed.recording, &more, out)
 }
 
 /// Where a row's time stands.

@@ -227,6 +227,14 @@ fn the_numbers_of_requests_are_those_of_the_page() {
                 steps: wire::Chunk::new(),
             },
         ),
+        ("ClearFault", Command::ClearFault),
+        ("Declare", Command::Declare { place_nm: [0; 3] }),
+        ("Pause", Command::Pause),
+        ("Resume", Command::Resume),
+        ("Override", Command::Override { percent: 100 }),
+        ("Config", Command::Config),
+        ("SaveConfig", Command::SaveConfig),
+        ("Events", Command::Events { from: 0 }),
     ];
     let versions = [
         format!("protocol version {}.", wire::PROTOCOL_VERSION),

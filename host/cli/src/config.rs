@@ -1,0 +1,159 @@
+//! `giotto config`: the limits that a controller keeps.
+use super::port::PortArgs;
+use super::{Failure, Output};
+use giotto_link::Controller;
+use giotto_shared::wire::{Command, MachineConfig};
+use serde_json::{Map, Value, json};
+
+/// Arguments of `giotto config`.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    #[command(subcommand)]
+    what: Verb,
+}
+
+#[derive(clap::Subcommand, Debug)]
+enum Verb {
+    /// The limits in use.
+    Get {
+        #[command(flatten)]
+        port: PortArgs,
+    },
+    /// Uses other limits from now on, until the next start unless they are saved.
+    Set {
+        /// NAME=VALUE, as `get` shows them; soft limits as NAME=LEAST,MOST.
+        #[arg(required = true, value_name = "NAME=VALUE")]
+        values: Vec<String>,
+        #[command(flatten)]
+        port: PortArgs,
+    },
+    /// Stores the limits in use.
+    Save {
+        #[command(flatten)]
+        port: PortArgs,
+    },
+}
+
+/// A number of the configuration: its name, how many of its unit make one of the controller's, and where it is.
+type Number = (&'static str, f64, fn(&mut MachineConfig) -> &mut f32);
+
+const NUMBERS: [Number; 7] = [
+    ("feed_mm_s", 1e-3, |c| &mut c.feed_m_s),
+    ("acceleration_mm_s2", 1e-3, |c| &mut c.acceleration_m_s2),
+    ("jerk_mm_s3", 1e-3, |c| &mut c.jerk_m_s3),
+    ("positioning_mm_s", 1e-3, |c| &mut c.positioning_m_s),
+    ("offset_mm", 1e-3, |c| &mut c.offset_m),
+    ("offset_rate_mm_s", 1e-3, |c| &mut c.slew_m_s),
+    ("stream_window_ms", 1e-3, |c| &mut c.stream_window_s),
+];
+const SOFT: [&str; 3] = ["soft_x_mm", "soft_y_mm", "soft_z_mm"];
+const CLOCK: &str = "internal_clock";
+
+fn document(config: &MachineConfig) -> Map<String, Value> {
+    let mut copy = *config;
+    let mut all = Map::new();
+    for (name, unit, place) in NUMBERS {
+        // Single precision, shown to its digits.
+        let value = f64::from(*place(&mut copy)) / unit;
+        let digits = format!("{value:.6e}").parse::<f64>().unwrap_or(value);
+        all.insert(name.to_owned(), json!(digits));
+    }
+    for (name, limits) in SOFT.into_iter().zip(config.soft_nm) {
+        all.insert(
+            name.to_owned(),
+            json!(limits.map(|nm| f64::from(nm) * 1e-6)),
+        );
+    }
+    all.insert(CLOCK.to_owned(), json!(config.internal_clock));
+    all
+}
+
+fn change(config: &mut MachineConfig, text: &str) -> Result<(), Failure> {
+    let names = || {
+        let numbers = NUMBERS.iter().map(|(name, ..)| *name);
+        let all: Vec<&str> = numbers.chain(SOFT).chain([CLOCK]).collect();
+        all.join(", ")
+    };
+    let wrong = |what: &str| Failure::usage(format_args!("\"{text}\": {what}"));
+    let (name, value) = text
+        .split_once('=')
+        .ok_or_else(|| wrong("expected NAME=VALUE").help(format_args!("names: {}", names())))?;
+    let number = |text: &str| {
+        let value = text
+            .trim()
+            .parse::<f64>()
+            .ok()
+            .filter(|value| value.is_finite());
+        value.ok_or_else(|| wrong("expected a number"))
+    };
+    if let Some((_, unit, place)) = NUMBERS.iter().find(|(known, ..)| *known == name) {
+        *place(config) = (number(value)? * unit) as f32;
+    } else if let Some(axis) = SOFT.iter().position(|known| *known == name) {
+        let (least, most) = value
+            .split_once(',')
+            .ok_or_else(|| wrong("expected LEAST,MOST in mm"))?;
+        // Out of what an i32 can say saturates, and is refused by the controller.
+        config.soft_nm[axis] = [number(least)?, number(most)?].map(|mm| (mm * 1e6).round() as i32);
+    } else if name == CLOCK {
+        config.internal_clock = value.parse().map_err(|_| wrong("expected true or false"))?;
+    } else {
+        return Err(wrong("no such limit").help(format_args!("names: {}", names())));
+    }
+    Ok(())
+}
+
+fn show(controller: &mut Controller, out: Output) -> Result<(), Failure> {
+    let (config, stored) = controller.config()?;
+    let all = document(&config);
+    if out.json {
+        return out
+            .document(&json!({ "port": controller.port(), "stored": stored, "config": all }));
+    }
+    for (name, value) in all {
+        let value = value.to_string();
+        out.say(format_args!("{name} = {}", value.trim_matches(['[', ']'])));
+    }
+    let kept = if stored {
+        "stored"
+    } else {
+        "not stored: gone after the next start"
+    };
+    out.say(format_args!("({kept})"));
+    Ok(())
+}
+
+/// Runs the command.
+pub fn run(args: Args, out: Output) -> Result<(), Failure> {
+    match args.what {
+        Verb::Get { port } => show(&mut port.open(out)?, out),
+        Verb::Set { values, port } => {
+            // What is no limit is said before a port is opened.
+            let mut blank = MachineConfig {
+                feed_m_s: 0.0,
+                acceleration_m_s2: 0.0,
+                jerk_m_s3: 0.0,
+                positioning_m_s: 0.0,
+                offset_m: 0.0,
+                slew_m_s: 0.0,
+                stream_window_s: 0.0,
+                soft_nm: [[0; 2]; 3],
+                internal_clock: false,
+            };
+            values
+                .iter()
+                .try_for_each(|text| change(&mut blank, text))?;
+            let mut controller = port.open(out)?;
+            let (mut config, _) = controller.config()?;
+            values
+                .iter()
+                .try_for_each(|text| change(&mut config, text))?;
+            controller.command(Command::Configure(config))?;
+            show(&mut controller, out)
+        }
+        Verb::Save { port } => {
+            let mut controller = port.open(out)?;
+            controller.command(Command::SaveConfig)?;
+            show(&mut controller, out)
+        }
+    }
+}
