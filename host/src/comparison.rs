@@ -353,7 +353,10 @@ mod tests {
                 .any(|c| c.cause == "backlash" && c.fate == Fate::Gone)
         );
         assert!(
-            gone.figures.iter().any(|f| f.changed && f.figure == "g_b"),
+            gone.figures
+                .iter()
+                .filter(|f| f.figure == "g_b")
+                .all(|f| f.change_um < 0.0),
             "{:?}",
             gone.words
         );
