@@ -104,6 +104,10 @@ impl Machine {
     /// Where the tool is after one more set-point.
     fn step(&mut self, input: [f64; 3]) -> [f64; 3] {
         let fade = (-self.dt_s / LAG_S).exp();
+        #[allow(
+            clippy::needless_range_loop,
+            reason = "indices are those of the formula"
+        )]
         for k in 0..3 {
             // The lag's answer to a straight piece, in closed form.
             let (from, rate) = (self.input[k], (input[k] - self.input[k]) / self.dt_s);

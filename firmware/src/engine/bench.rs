@@ -147,7 +147,9 @@ impl Arc {
         let mut queue = heapless::spsc::Queue::new();
         let (start, planned) = planned(terms, rise_m);
         // Whether there is one is looked at in `sound`; the queue is empty.
-        let _ = planned.map(|planned| queue.enqueue(planned));
+        if let Some(planned) = planned {
+            let _ = queue.enqueue(planned);
+        }
         Self {
             executor: Executor::new(start, Config::robot(1000).engage_ticks(), false),
             queue,

@@ -59,6 +59,10 @@ impl Grid {
         let keys: Vec<usize> = (0..self.keys.min(self.header.len())).collect();
         let of = |columns: &[usize]| columns.iter().map(|k| sizes[*k] + GAP).sum::<usize>();
         let mut blocks: Vec<Vec<usize>> = vec![keys.clone()];
+        #[allow(
+            clippy::needless_range_loop,
+            reason = "indices are those of the formula"
+        )]
         for k in keys.len()..self.header.len() {
             let last = blocks
                 .last_mut()

@@ -68,7 +68,7 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     }
     let diagnosed = add(&found, &mut rows, &mut findings, args.seed, out)?;
     rows.sort_by(|a, b| (a.date, &a.folder).cmp(&(b.date, &b.folder)));
-    findings.sort_by(|a, b| a.date.cmp(&b.date));
+    findings.sort_by_key(|a| a.date);
     if diagnosed > 0 || !files[0].exists() {
         std::fs::create_dir_all(&store).map_err(|e| cannot_write(&store, &e))?;
         // The findings first: a campaign that is in the store has its findings there.

@@ -62,9 +62,10 @@ impl<L: Link> SteppedLink<L> {
             while self.inner.now() < until {
                 let mut bytes = [0; 4096];
                 let count = self.inner.receive(&mut bytes, until)?;
-                let answered = bytes[..count]
-                    .iter()
-                    .fold(false, |answered, &byte| self.take(byte) || answered);
+                let mut answered = false;
+                for &byte in &bytes[..count] {
+                    answered |= self.take(byte);
+                }
                 if answered {
                     self.ticks += ticks;
                     return Ok(());

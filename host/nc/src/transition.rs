@@ -321,7 +321,15 @@ fn weighted(parts: &[Vec<f64>], target: &[f64], weights: &[f64]) -> Option<[f64;
             }
         }
     }
+    #[allow(
+        clippy::needless_range_loop,
+        reason = "indices are those of the formula"
+    )]
     for i in 0..n {
+        #[allow(
+            clippy::needless_range_loop,
+            reason = "indices are those of the formula"
+        )]
         for j in 0..i {
             m[i][j] = m[j][i];
         }
@@ -334,6 +342,10 @@ fn weighted(parts: &[Vec<f64>], target: &[f64], weights: &[f64]) -> Option<[f64;
         }
         for j in i + 1..n {
             let factor = m[j][i] / m[i][i];
+            #[allow(
+                clippy::needless_range_loop,
+                reason = "indices are those of the formula"
+            )]
             for c in i..=2 * NODES {
                 m[j][c] -= factor * m[i][c];
             }

@@ -83,7 +83,7 @@ fn half_range(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     let stated: Vec<f64> = values.flatten().collect();
     let low = stated.iter().copied().fold(f64::INFINITY, f64::min);
     let high = stated.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    (high >= low).then(|| 0.5 * (high - low))
+    (high >= low).then_some(0.5 * (high - low))
 }
 
 /// What is left of a run when its samples are gone.

@@ -155,6 +155,10 @@ fn however_rough_the_set_points_no_step_is_longer_than_the_feed() {
                         stream.stop();
                     }
                     let out = stream.tick(came.then(|| sample_at(n, place)));
+                    #[allow(
+                        clippy::needless_range_loop,
+                        reason = "indices are those of the formula"
+                    )]
                     for axis in 0..3 {
                         let step = (out.nominal_nm[axis] - last[axis]).abs();
                         assert!(step < 1_060_000, "{period} {at} {dies} {n}: {step}");

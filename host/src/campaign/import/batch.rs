@@ -116,7 +116,7 @@ pub fn files(given: &[PathBuf]) -> Result<Vec<PathBuf>, CampaignError> {
             let problem = Problem::EmptyFolder;
             return Err(CampaignError::new(Place::file(path), problem));
         }
-        inside.sort_by(|a, b| natural(a).cmp(&natural(b)));
+        inside.sort_by_key(|name| natural(name));
         files.extend(inside);
     }
     Ok(files)

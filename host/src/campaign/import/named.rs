@@ -175,7 +175,7 @@ fn positions(
         notes.push(format!(
             "positions of {sets} points: the first is taken, from column {first} on (--columns for another)"
         ));
-    } else if labelled && axes(&plain) >= 2 || labelled && targets.is_some() {
+    } else if labelled && (axes(&plain) >= 2 || targets.is_some()) {
         let names: Vec<&str> = set(0)
             .into_iter()
             .flatten()
