@@ -77,7 +77,7 @@ pub(super) fn uneven(angle: &[f64]) -> bool {
         let share = (used[n * quarter / 4] - first).abs() / extent;
         (share - (n * quarter / 4) as f64 / (n as f64 - 1.0)).abs() > 1.0 / n as f64 + 1e-3
     });
-    largest.max(seam) > 1.8 * mean || bent
+    largest > 1.8 * mean || (seam - mean).abs() > 0.5 * mean || bent
 }
 
 /// The correction for points about a least-squares circle: `residual` is the distance from it by angle and deviation, `noise_m`

@@ -316,6 +316,14 @@ impl Rows<'_> {
                 moved_rad: TAU,
             });
         }
+        // Where the form is hardly more than the noise, a flat part of it is no stop.
+        let values = &self.deviation[rows.clone()];
+        let [low, high] = values
+            .iter()
+            .fold([f64::MAX, f64::MIN], |[l, h], v| [l.min(*v), h.max(*v)]);
+        if high - low < 30.0 * self.noise {
+            return None;
+        }
         let stop = stops
             .into_iter()
             .filter(|s| s.start > head && s.end < tail)
