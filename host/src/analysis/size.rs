@@ -50,22 +50,34 @@ impl Merge for Sectors {
     }
 }
 
-/// Whether points lie so unevenly that form can pass for size: steps several times the usual one.
+/// Whether points lie so unevenly that form can pass for size: some steps, that over the seam of the turn too, are much larger
+/// than the usual one, or the points gather somewhere. Of dense recordings every n-th point is looked at.
 pub(super) fn uneven(angle: &[f64]) -> bool {
-    let (Some(first), Some(last)) = (angle.first(), angle.last()) else {
+    const MOST: usize = 20_000;
+    let used: Vec<f64> = angle
+        .iter()
+        .copied()
+        .step_by(angle.len().div_ceil(MOST).max(1))
+        .collect();
+    let (Some(first), Some(last), n) = (used.first(), used.last(), used.len()) else {
         return false;
     };
-    let n = angle.len();
-    let mean = (last - first).abs() / (n as f64 - 1.0);
-    let largest = angle
+    if n < 8 {
+        return false;
+    }
+    let extent = (last - first).abs();
+    let mean = extent / (n as f64 - 1.0);
+    let largest = used
         .windows(2)
         .map(|w| (w[1] - w[0]).abs())
         .fold(0.0, f64::max);
-    // Rows that lie closer at a start show in how far the middle of the rows is from the middle of the angles.
-    let middle = (angle[n / 2] - first).abs() / (last - first).abs();
-    let quarter = (angle[n / 4] - first).abs() / (last - first).abs();
-    let bent = (middle - 0.5).abs().max((quarter - 0.25).abs()) > 2.0 / n as f64 + 2e-3;
-    largest > (2.5 * mean).max(0.1f64.to_radians()) || bent
+    let seam = (TAU - extent).abs();
+    // Rows that lie closer at a start show in how far the quarters of the rows are from the quarters of the angle.
+    let bent = (1..4).any(|quarter| {
+        let share = (used[n * quarter / 4] - first).abs() / extent;
+        (share - (n * quarter / 4) as f64 / (n as f64 - 1.0)).abs() > 1.0 / n as f64 + 1e-3
+    });
+    largest > 1.8 * mean || (seam - mean).abs() > 0.5 * mean || bent
 }
 
 /// The correction for points about a least-squares circle: `residual` is the distance from it by angle and deviation, `noise_m`

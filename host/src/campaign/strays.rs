@@ -108,6 +108,13 @@ fn stands_out(deviation: &[f64], rows: Range<usize>, least: f64) -> bool {
     if lowest < least || (after - before).abs() > 0.3 * lowest {
         return false;
     }
+    // A machine comes back from a spike by degrees.
+    let steep = |a: usize, b: usize| (deviation[a] - deviation[b]).abs() > 0.25 * lowest;
+    if steep(rows.start - 1, rows.start - 2)
+        || (rows.end + 1 < deviation.len() && steep(rows.end, rows.end + 1))
+    {
+        return false;
+    }
     let smooth = |part: &[f64]| {
         part.windows(3)
             .all(|w| (w[2] - 2.0 * w[1] + w[0]).abs() < 0.5 * lowest)

@@ -246,9 +246,6 @@ impl Rows<'_> {
             return Ok(self.laps(&rows, lasts / f64::from(laps), laps as usize, 0.0));
         }
         if ratio > 1.0 + FEED {
-            if let Some(piece) = self.without_stops(&rows, notes) {
-                return Ok(piece);
-            }
             if let Some(turn_s) = self.period(&rows) {
                 let laps = ((lasts + 2.0 * self.spacing) / turn_s).floor().max(1.0);
                 let over = lasts - laps * turn_s;
@@ -258,6 +255,9 @@ impl Rows<'_> {
                     360.0 * over / turn_s
                 ));
                 return Ok(self.laps(&rows, turn_s, laps as usize, lead));
+            }
+            if let Some(piece) = self.without_stops(&rows, notes) {
+                return Ok(piece);
             }
         }
         Ok(one(rows))
@@ -315,6 +315,14 @@ impl Rows<'_> {
                 arc_rad: None,
                 moved_rad: TAU,
             });
+        }
+        // Where the form is hardly more than the noise, a flat part of it is no stop.
+        let values = &self.deviation[rows.clone()];
+        let [low, high] = values
+            .iter()
+            .fold([f64::MAX, f64::MIN], |[l, h], v| [l.min(*v), h.max(*v)]);
+        if high - low < 30.0 * self.noise {
+            return None;
         }
         let stop = stops
             .into_iter()

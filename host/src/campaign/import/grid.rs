@@ -105,8 +105,10 @@ impl Grid {
             }
             let fields = self.header_fields(bare, line);
             if let Some(found) = &mut names {
-                if fields.len() == self.width {
-                    for (group, field) in found.groups.iter_mut().zip(&fields) {
+                // What stands above the names is divided as the rows are, or says nothing of them.
+                let above = split(line, self.separator);
+                if above.len() == self.width {
+                    for (group, field) in found.groups.iter_mut().zip(above) {
                         if !field.is_empty() {
                             *group = format!("{field} {group}").trim().to_owned();
                         }
