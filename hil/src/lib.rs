@@ -6,6 +6,7 @@ pub mod elf;
 pub mod faults;
 pub mod instructions;
 pub mod link;
+pub mod linuxcnc;
 pub mod planes;
 pub mod programs;
 pub mod rate;
