@@ -539,8 +539,12 @@ fn state(
             proven: proof.is_some_and(|gain| gain.ci95_percent[0] > 0.0),
         },
     );
+    // Where the scatter is assumed, an interval that holds zero shows nothing.
+    let shown = |[low, high]: [f64; 2]| footing.measured_scatter || !(low <= 0.0 && high >= 0.0);
     findings.retain(|finding| {
-        finding.probability > status::TIE && finding.cause.model().allows(finding.estimate.value)
+        finding.probability > status::TIE
+            && finding.cause.model().allows(finding.estimate.value)
+            && shown(finding.estimate.ci95)
     });
     let unexplained = if footing.measured_scatter {
         let mut unexplained = unexplained::describe(found, durations);
