@@ -2,6 +2,13 @@
 use serde::{Deserialize, Serialize};
 
 /// Sense in which a circle is travelled, seen from +Z.
+///
+/// ```
+/// use giotto_shared::Direction;
+///
+/// assert_eq!(Direction::Ccw.sign(), 1);
+/// assert_eq!(Direction::Ccw.reversed(), Direction::Cw);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Direction {

@@ -3,6 +3,17 @@ use super::{Cumulants, number};
 use num_traits::Float;
 
 /// One linear element, the same on both axes. A dead time is not among them: it turns the circle and leaves its radius.
+///
+/// ```
+/// use giotto_shared::model::Element;
+///
+/// // At ω = kv a lag draws circles of 1/√2 of their radius.
+/// let lag = Element::Lag { kv_per_s: 50.0_f64 };
+/// assert!((lag.gain(50.0) - 0.5_f64.sqrt()).abs() < 1e-15);
+/// // Without damping a second-order element makes small circles larger.
+/// let ringing = Element::SecondOrder { omega_n_rad_s: 100.0, zeta: 0.1_f64 };
+/// assert!(ringing.gain(50.0) > 1.3);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Element<T> {

@@ -10,6 +10,16 @@ impl<T: Float> Cumulants<T> {
     /// single lag on the border: ωn⁴ = 12/(6κ2² − κ4), 1 − 2ζ² = −κ2ωn²/2; a² = (ρ − 6)/(ρ + 6), kv² = (1 − a²)/κ2.
     ///
     /// `None` where no such element exists: κ2 ≤ 0 on or above the border, more resonance than any ζ > 0 gives, or not finite.
+    ///
+    /// ```
+    /// use giotto_shared::model::{Cumulants, Element};
+    ///
+    /// let wanted = Cumulants { kappa2_s2: 4e-4, kappa4_s4: 3e-7 };
+    /// let element: Element<f64> = wanted.equivalent().unwrap();
+    /// let has = element.cumulants();
+    /// assert!((has.kappa2_s2 / wanted.kappa2_s2 - 1.0).abs() < 1e-12);
+    /// assert!((has.kappa4_s4 / wanted.kappa4_s4 - 1.0).abs() < 1e-12);
+    /// ```
     pub fn equivalent(&self) -> Option<Equivalent<T>> {
         let n = number::<T>;
         let (k2, k4) = (self.kappa2_s2, self.kappa4_s4);
