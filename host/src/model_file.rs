@@ -96,6 +96,23 @@ impl ModelFile {
     ///
     /// # Errors
     /// As [`Self::load`].
+    ///
+    /// ```
+    /// use giotto::model_file::ModelFile;
+    /// use std::path::Path;
+    ///
+    /// let text = "format = 2\ncampaign = \"lab\"\nmachine = \"mill\"\n\
+    ///             [servo]\nkind = \"lag\"\nkv_per_s = 50.0\n\
+    ///             [valid]\nradius_mm = [50.0, 150.0]\nfeed_mm_s = [20.0, 300.0]\n\
+    ///             [[effect]]\ncause = \"backlash\"\naxis = \"z\"\nvalue = 0.008\n";
+    /// let file = Path::new("model.toml");
+    /// let model = ModelFile::parse(text, file)?;
+    /// assert_eq!(model.effects[0].value(), 0.008);
+    /// // A misspelt key is refused by file, line and name.
+    /// let error = ModelFile::parse(&text.replace("kv_per_s", "kv"), file).unwrap_err().to_string();
+    /// assert!(error.contains("model.toml:") && error.contains("kv"), "{error}");
+    /// # Ok::<(), giotto::toml_file::TomlFileError>(())
+    /// ```
     pub fn parse(text: &str, file: &Path) -> Result<Self, TomlFileError> {
         Self::of_text(&TomlText::new(file, text, EXPECTED))
     }

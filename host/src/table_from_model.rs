@@ -88,6 +88,28 @@ fn share(effect: &Effect) -> Share {
 ///
 /// # Errors
 /// [`ModelTableError`]; a table that is returned passes [`Table::validate`].
+///
+/// ```
+/// use giotto::model_file::{FORMAT, ModelFile, Servo, Valid};
+/// use giotto::table_from_model::{ModelTableError, table_from_model};
+///
+/// let model = ModelFile {
+///     format: FORMAT,
+///     campaign: "lab".into(),
+///     machine: "mill".into(),
+///     delay_s: None,
+///     servo: Servo::Lag { kv_per_s: 50.0 },
+///     valid: Valid { radius_mm: [50.0, 150.0], feed_mm_s: [20.0, 300.0] },
+///     effects: Vec::new(),
+/// };
+/// let made = table_from_model(&model)?;
+/// let zone = &made.table.zones[0];
+/// // κ2 of a lag is τ² = 4e-4 s²; the zone is where the model was fitted.
+/// assert!((zone.cumulants.kappa2_s2 - 4e-4).abs() < 1e-9);
+/// assert_eq!(zone.radius_m, [0.05, 0.15]);
+/// assert!(made.left_out.is_empty());
+/// # Ok::<(), ModelTableError>(())
+/// ```
 pub fn table_from_model(model: &ModelFile) -> Result<ModelTable, ModelTableError> {
     let mut cumulants = cumulants(&model.servo);
     let mut terms: Vec<Term<f64>> = Vec::new();

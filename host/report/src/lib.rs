@@ -48,6 +48,23 @@ pub struct ReportError(#[from] minijinja::Error);
 ///
 /// # Errors
 /// A template that asks for what it is not given: a fault of this build, not of the data.
+///
+/// ```
+/// use giotto::simulation::{self, Plan};
+/// use giotto::diagnosis;
+/// # use std::path::Path;
+/// let plan = Plan::parse(
+///     "[machine]\nboth = { kv_per_s = 50.0 }\ny = { backlash_um = 12.0 }\n\
+///      [grid]\nradii_mm = [50.0, 150.0]\nfeeds_mm_s = [20.0, 100.0, 300.0]",
+///     Path::new("plan.toml"),
+/// )?;
+/// let campaign = simulation::campaign(&plan, 1);
+/// let page = giotto_report::html(&campaign, &diagnosis::diagnose(&campaign, &Default::default())?)?;
+/// // One file: nothing is fetched, and the data's hash says what it was made of.
+/// assert!(page.starts_with("<!DOCTYPE html>") && !page.contains("src=\"http"));
+/// assert!(page.contains(&giotto_report::data_hash(&campaign)[..12]));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn html(campaign: &Campaign, diagnosis: &Diagnosis) -> Result<String, ReportError> {
     let mut page = minijinja::Environment::new();
     // What the template asks for must be there; text is escaped by the name's ending.

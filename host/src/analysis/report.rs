@@ -32,6 +32,24 @@ pub struct Report {
 ///
 /// # Errors
 /// A run through which no circle goes, by index.
+///
+/// ```
+/// use giotto::analysis;
+/// use giotto::simulation::{self, Plan};
+/// # use std::path::Path;
+/// let plan = Plan::parse(
+///     "[machine]\nboth = { kv_per_s = 50.0 }\n[grid]\nradii_mm = [100.0]\nfeeds_mm_s = [300.0]",
+///     Path::new("plan.toml"),
+/// )?;
+/// let report = analysis::of_campaign(&simulation::campaign(&plan, 1)).map_err(|(_, e)| e)?;
+/// // ΔR = −½ τ² f²/R of a lag of 20 ms: −180 µm, in both directions, which make one pair.
+/// for run in &report.runs {
+///     assert!((run.radius_error_m + 180e-6).abs() < 3e-6);
+/// }
+/// assert_eq!(report.iso230_4.len(), 1);
+/// assert!(report.iso230_4[0].g_b_m.is_some_and(|g| g < 15e-6));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn of_campaign(campaign: &Campaign) -> Result<Report, (usize, CircleError)> {
     let runs: Result<Vec<_>, _> = campaign
         .runs

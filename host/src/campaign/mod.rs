@@ -83,6 +83,20 @@ pub struct Campaign {
 }
 
 /// One circular test.
+///
+/// ```
+/// use giotto::simulation::{self, Plan};
+/// # use std::path::Path;
+/// # let plan = Plan::parse("[grid]\nradii_mm = [100.0]\nfeeds_mm_s = [50.0]\ndirections = [\"cw\"]", Path::new("plan.toml"))?;
+/// let campaign = simulation::campaign(&plan, 1);
+///
+/// let run = &campaign.runs[0];
+/// assert_eq!(run.omega_rad_s(), 0.05 / 0.1);
+/// assert_eq!(run.sign(), -1.0);
+/// // A turn of 2π·100 mm at 50 mm/s.
+/// assert!((run.turn_s().unwrap() - 12.566).abs() < 1e-3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run {
     /// File name as the campaign gives it; identifies the run.

@@ -171,6 +171,27 @@ const FEWEST_RUNS: usize = 6;
 ///
 /// # Errors
 /// No runs, or a given model that cannot be simulated.
+///
+/// ```
+/// use giotto::diagnosis::{Action, Options, Status, diagnose};
+/// use giotto::simulation::{self, Plan};
+/// # use std::path::Path;
+/// // A machine whose X is not square to Y by 60 µm/m.
+/// let plan = Plan::parse(
+///     "[machine]\nboth = { kv_per_s = 50.0 }\nsquareness_um_per_m = 60.0\n\
+///      [grid]\nradii_mm = [50.0, 100.0, 150.0]\nfeeds_mm_s = [20.0, 100.0, 300.0]",
+///     Path::new("plan.toml"),
+/// )?;
+/// let found = diagnose(&simulation::campaign(&plan, 1), &Options::default())?;
+/// let first = &found.findings[0];
+/// assert_eq!(first.cause.id(), "squareness");
+/// assert_eq!(first.status, Status::Certain);
+/// let [low, high] = first.estimate.ci95;
+/// assert!(low < 60.0 && 60.0 < high && high - low < 10.0);
+/// // What it says is to be done something about.
+/// assert_ne!(found.recommendation.action, Action::Nothing);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn diagnose(campaign: &Campaign, options: &Options) -> Result<Diagnosis, DiagnosisError> {
     // From within the pool: who stands outside waits for a thread to wake up each time that work is shared.
     rayon::scope(|_| within_pool(campaign, options))

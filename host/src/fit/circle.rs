@@ -39,6 +39,19 @@ impl Points for Parallel<'_> {
 ///
 /// # Errors
 /// As [`circle::fit`]; also [`CircleError::Lengths`].
+///
+/// ```
+/// use giotto::fit::fit_circle;
+///
+/// let (x, y): (Vec<f64>, Vec<f64>) = (0..1000)
+///     .map(|i| f64::from(i) * 0.1)
+///     .map(|angle| (0.3 + 0.1 * angle.cos(), -0.2 + 0.1 * angle.sin()))
+///     .unzip();
+/// let fit = fit_circle(&x, &y)?;
+/// assert!((fit.circle.radius - 0.1).abs() < 1e-12);
+/// assert!((fit.circle.centre[0] - 0.3).abs() < 1e-12);
+/// # Ok::<(), giotto_shared::circle::CircleError>(())
+/// ```
 pub fn fit_circle(x: &[f64], y: &[f64]) -> Result<CircleFit, CircleError> {
     circle::fit(&Parallel(Xy::new(x, y)?))
 }

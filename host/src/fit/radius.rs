@@ -108,6 +108,31 @@ impl Point {
 }
 
 /// The fitted radius model.
+///
+/// ```
+/// use giotto::fit::{FitError, Observation, Options, RadiusFit};
+///
+/// // Sizes as the paper's robot would have them, with half a micrometre that alternates for scatter.
+/// let mut runs = Vec::new();
+/// for radius_m in [0.1, 0.15, 0.3] {
+///     for (i, feed_m_s) in [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7].into_iter().enumerate() {
+///         let (x1, x2) = (feed_m_s * feed_m_s / radius_m, feed_m_s.powi(4) / radius_m.powi(3));
+///         let scatter_m = if i % 2 == 0 { 0.5e-6 } else { -0.5e-6 };
+///         runs.push(Observation {
+///             radius_m,
+///             feed_m_s,
+///             radius_error_m: -23.29e-6 * x1 - 0.23e-6 * x2 + scatter_m,
+///             out_of_roundness_m: None,
+///         });
+///     }
+/// }
+/// // Trained on one radius, it predicts the other two.
+/// let fit = RadiusFit::new(&runs, Options { train_radius_m: Some(0.1), ..Options::default() })?;
+/// assert!((fit.model.beta1_s2 + 23.29e-6).abs() < 0.5e-6);
+/// assert!(fit.ci95[1][0] < -0.23e-6 && -0.23e-6 < fit.ci95[1][1]);
+/// assert!(fit.heldout.is_some_and(|heldout| heldout.rms_m < 1e-6));
+/// # Ok::<(), FitError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct RadiusFit {
     /// How it was fitted.

@@ -148,6 +148,41 @@ pub struct Reason {
 ///
 /// # Errors
 /// The first problem met, in the lines of the foreign file; the campaign is then as it was.
+///
+/// ```
+/// use giotto::campaign::import::{Format, Laps, Options, add};
+/// use giotto::campaign;
+///
+/// let folder = tempfile::tempdir()?;
+/// let file = folder.path().join("export.csv");
+/// let mut rows = String::from("Angle (deg);Deviation (um)\n");
+/// for degree in 0..360 {
+///     rows += &format!("{degree},0;{}\n", -12 + degree % 2);
+/// }
+/// std::fs::write(&file, rows)?;
+///
+/// let options = Options {
+///     radius_m: 0.1,
+///     feed_m_s: 0.05,
+///     direction: Some(campaign::Direction::Ccw),
+///     format: Format::Auto,
+///     columns: None,
+///     start_angle_rad: None,
+///     started_s: None,
+///     temperature_c: None,
+///     centre_m: None,
+///     even_angles: false,
+///     plane: None,
+///     setup: None,
+///     machine: Some("mill".into()),
+///     laps: Laps::First,
+/// };
+/// let target = folder.path().join("campaign");
+/// let added = add(&[file], &target, &options, &|_, _| {})?;
+/// assert_eq!(added[0].rows, 360);
+/// assert_eq!(campaign::read(&target)?.runs[0].samples.deviation_m.len(), 360);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn add(
     files: &[PathBuf],
     dir: &Path,
