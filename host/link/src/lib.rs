@@ -4,7 +4,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`client`] | requests and replies over any [`link`](link::Link): status, slots, runs |
-//! | `series` | requests of which several are on their way at once |
+//! | `pipelined` | requests of which several are on their way at once |
 //! | [`flash`] | a table onto a controller, and the proof that it is there |
 //! | [`recording`] | circles run, set-points received |
 //! | [`program`], [`streaming`] | programs and set-points, sent ahead of the machine |
@@ -39,11 +39,11 @@ pub mod error;
 pub mod flash;
 pub mod image;
 pub mod link;
+mod pipelined;
 pub mod port;
 pub mod program;
 pub mod recording;
 pub mod serial;
-mod series;
 pub mod serve;
 pub mod settings;
 pub mod signing;

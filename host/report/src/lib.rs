@@ -3,28 +3,29 @@
 //! | file | holds |
 //! |---|---|
 //! | `figures`, `forms` | the paper's Figures 8–11 and 2–7 of a campaign, as SVG |
-//! | `view` | what the page says, ready for the template |
+//! | `page_content` | what the page says, ready for the template |
 //! | `cause_view`, `iso`, `plots` | its parts: causes, ISO 230-4, plots of all runs |
 //! | `verdict` | the three sentences |
 //! | `chart` | scatter plots as SVG |
-//! | `map` | misfit over feed and radius |
+//! | `misfit_map` | misfit over feed and radius |
 //! | `polar`, `polar.js` | profiles, the plot that draws them, and what-if |
-//! | `alone` | what each cause does to each circle by itself |
+//! | `each_cause_alone` | what each cause does to each circle by itself |
 //! | `portrait` | one profile as a small picture |
 //! | `pages`, `page.html` | comparison and history |
 //! | `hash` | identity of the data |
 //! | `template.html`, `style.css` | the page |
 #![forbid(unsafe_code)]
 
-mod alone;
 mod cause_view;
 mod chart;
+mod each_cause_alone;
 pub mod figures;
 pub mod forms;
 mod hash;
 mod iso;
-mod map;
+mod misfit_map;
 mod number;
+mod page_content;
 mod pages;
 mod plots;
 mod polar;
@@ -32,7 +33,6 @@ mod portrait;
 #[cfg(test)]
 mod tests;
 mod verdict;
-mod view;
 
 pub use pages::{comparison_page, history_page};
 
@@ -72,7 +72,7 @@ pub fn html(campaign: &Campaign, diagnosis: &Diagnosis) -> Result<String, Report
     page.add_template("style.css", include_str!("style.css"))?;
     page.add_template("polar.js", include_str!("polar.js"))?;
     page.add_template("report.html", include_str!("template.html"))?;
-    let view = minijinja::value::Serde(view::View::of(campaign, diagnosis));
+    let view = minijinja::value::Serde(page_content::PageContent::of(campaign, diagnosis));
     Ok(page.get_template("report.html")?.render(view)?)
 }
 

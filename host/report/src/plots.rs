@@ -1,7 +1,7 @@
 //! Plots of all runs: the collapse test, sizes and forms over the acceleration, what is left.
 use super::chart::{Chart, Point};
 use super::number::{fixed, plain};
-use super::view::ways;
+use super::page_content::ways;
 use giotto::analysis;
 use giotto::campaign::{Campaign, Direction};
 use giotto::diagnosis::Diagnosis;

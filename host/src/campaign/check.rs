@@ -2,8 +2,8 @@
 //! what is odd but possible becomes a note.
 use super::Note;
 use super::clock::Clock;
+use super::column_sums::{bounds, sum};
 use super::error::{CampaignError, Problem};
-use super::lanes::{bounds, sum};
 use super::manifest::Entry;
 use giotto_shared::Direction;
 use std::f64::consts::TAU;

@@ -1,8 +1,8 @@
 //! From a campaign to the set of explanations: prepare, search, refine, and again about the better model.
-use super::column::Column;
+use super::design_column::Column;
 use super::explained::{Explained, chosen_kinds, refit, residual};
-use super::item::Kind;
-use super::ledger::Ledger;
+use super::gram::Gram;
+use super::hypothesis::Kind;
 use super::linear::Solution;
 use super::material::{is_material, prune};
 use super::pattern::Pattern;
@@ -212,7 +212,7 @@ fn pass(
                 .map(|teeth| roughness::energy_m2(teeth, &runs))
                 .sum::<f64>(),
         solution: Solution::default(),
-        ledger: Ledger::open(&runs, &spread, data),
+        gram: Gram::open(&runs, &spread, data),
         runs: runs.into(),
         bases: survey.bases(),
         response,
@@ -241,7 +241,7 @@ fn pass(
             polished = chosen_kinds(&found);
         }
         propose_patterns(&mut found);
-        let products = found.ledger.white(&all);
+        let products = found.gram.white(&all);
         found.chosen = select(
             &products,
             &found.nuisance,
@@ -276,7 +276,7 @@ fn enter(found: &mut Explained, start: &Start, kinds: &[Kind]) {
     };
     found.nuisance.push(
         found
-            .ledger
+            .gram
             .push(Column::within(runs.iter().map(own).collect())),
     );
     let before = kinds
@@ -292,7 +292,7 @@ fn enter(found: &mut Explained, start: &Start, kinds: &[Kind]) {
             shape: Vec::new(),
         };
         let columns = fourth.columns_over(&runs);
-        found.nuisance.extend(found.ledger.push_all(columns));
+        found.nuisance.extend(found.gram.push_all(columns));
     } else if found.response.b_s4 != 0.0 {
         restore_fourth_order(found);
     }
@@ -381,7 +381,7 @@ fn restore_fourth_order(found: &mut Explained) {
             -0.5 * found.response.b_s4 * run.view.radius_m * w.powi(4) * g.powi(3),
         ))
     };
-    let mut data = found.ledger.column(0).clone();
+    let mut data = found.gram.column(0).clone();
     data.add(1.0, &Column::within(found.runs.iter().map(shift).collect()));
-    found.ledger.replace_all([(0, data)]);
+    found.gram.replace_all([(0, data)]);
 }

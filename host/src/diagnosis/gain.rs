@@ -6,7 +6,7 @@
 use super::baseline::{Size, fit_lag};
 use super::duration::Clamp;
 use super::explained::Explained;
-use super::item::Kind;
+use super::hypothesis::Kind;
 use super::linear::solve;
 use super::survey::Response;
 use super::vector::dot;
@@ -88,7 +88,7 @@ pub fn beta(response: &Response) -> Servo {
 fn fitted(found: &Explained, weights: &[f64], set: &[usize]) -> Option<(Response, Vec<Effect>)> {
     // The stated set, as far as these runs determine it.
     let (set, columns) = veto::determined(found, weights, set);
-    let solution = solve(&found.ledger.white(weights), &columns)?;
+    let solution = solve(&found.gram.white(weights), &columns)?;
     let value = |column: usize| {
         columns
             .iter()

@@ -7,34 +7,34 @@
 //! is found is stated with its doubts ([`verdict`], [`unexplained`]) and proven on runs left out ([`veto`], [`gain`]).
 //! What is left must be noise ([`omnibus`]). Before all this come what a session brings along: an override for all runs
 //! ([`feed_override`]), a spoilt run ([`influence`]), a delay that is not known ([`delay`]).
+pub mod angular_bins;
 pub mod baseline;
-pub mod basis;
-pub mod column;
 pub mod delay;
+pub mod design_column;
 pub mod duration;
 pub mod explain;
 pub mod explained;
 pub mod feed_override;
 pub mod finding;
 pub mod gain;
+pub mod gram;
+pub mod hypothesis;
 pub mod influence;
-pub mod item;
-pub mod ledger;
 pub mod linear;
+pub mod low_orders;
 pub mod material;
 pub mod misfit;
 pub mod omnibus;
-pub mod orders;
 pub mod pattern;
 pub mod picture;
 pub mod pitch;
-pub mod places;
 pub mod products;
 pub mod propose;
 pub mod recommendation;
+pub mod residual_waves;
 pub mod roughness;
+pub mod run_order;
 pub mod search;
-pub mod sequence;
 pub mod shape;
 pub mod spread;
 pub mod statement;
@@ -372,7 +372,7 @@ fn spoilt_of(campaign: &Campaign, survey: &Survey, options: &Options) -> Option<
     };
     let (runs, _) = survey.prepare(&response, 0.0);
     let data = survey::misfit(&runs);
-    let profiles = places::place_means(&runs, &data);
+    let profiles = angular_bins::bin_means(&runs, &data);
     let means: Vec<f64> = runs
         .iter()
         .zip(data.low())
@@ -515,7 +515,7 @@ fn prove(
 /// Two names for one thing.
 fn tie_words(found: &Explained, item: usize, other: crate::causes::Cause) -> String {
     let largest = statement::largest(found, item);
-    let item::Kind::Cause { cause, .. } = found.items[item].kind else {
+    let hypothesis::Kind::Cause { cause, .. } = found.items[item].kind else {
         return String::new();
     };
     format!(

@@ -2,8 +2,8 @@
 //!
 //! A ballbar gives time, not angle: the recorded pattern is turned by the lag φ(ω) of the machine. The
 //! set-up offset does not move between runs, so the turn of the first harmonic with speed measures φ.
-use super::basis::{Basis, Low};
-use super::column::Column;
+use super::design_column::Column;
+use super::low_orders::{Basis, Low};
 use crate::campaign::{Campaign, Run};
 use crate::causes::{Harmonics, RunView};
 use crate::model_file::Servo;

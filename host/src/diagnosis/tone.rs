@@ -2,7 +2,7 @@
 //!
 //! Each run has a phase of its own, so power is added, not amplitude; a run counts for at most `CAP`, so
 //! that the sharp harmonics of a few runs cannot pose as a tone that all share.
-use super::column::Column;
+use super::design_column::Column;
 use super::spread::Spread;
 use super::survey::Prepared;
 use super::vector::{axpy, dot, wave_sum};

@@ -2,7 +2,7 @@
 use super::duration::Clamp;
 use super::explained::{Explained, energies};
 use super::finding::{Estimate, Finding, Largest};
-use super::item::Kind;
+use super::hypothesis::Kind;
 use super::linear::solve;
 use super::roughness::{self, Teeth};
 use super::search::{columns_of, evidence, select};
@@ -319,7 +319,7 @@ fn robust_variances(found: &Explained) -> Vec<f64> {
     let n = columns.len();
     let mut meat = nalgebra::DMatrix::<f64>::zeros(n, n);
     for run in 0..found.runs.len() {
-        let white = found.ledger.white_of(run);
+        let white = found.gram.white_of(run);
         let pull: Vec<f64> = columns
             .iter()
             .map(|&a| {
@@ -346,7 +346,7 @@ fn robust_variances(found: &Explained) -> Vec<f64> {
 /// Partial F of the fourth-order term beside all others (variances as estimated between runs), and what kind of
 /// chain has such a response.
 fn dynamics_note(found: &Explained, weights: &[f64], at: usize) -> String {
-    let products = found.ledger.white(weights);
+    let products = found.gram.white(weights);
     let gain = |set: &[usize]| {
         solve(&products, &columns_of(&found.nuisance, &found.items, set))
             .map_or(0.0, |solution| solution.gain)
@@ -382,7 +382,7 @@ fn dynamics_note(found: &Explained, weights: &[f64], at: usize) -> String {
 /// Probability of a chosen explanation: the best set with it against the best set that does without its cause. Both
 /// may take in what is too small to be stated.
 fn probability(found: &Explained, weights: &[f64], at: usize) -> f64 {
-    let products = found.ledger.white(weights);
+    let products = found.gram.white(weights);
     let best = |start: &[usize], barred: &[usize]| {
         let set = select(&products, &found.nuisance, &found.items, start, barred);
         evidence(&products, &found.nuisance, &found.items, &set)
@@ -410,7 +410,7 @@ fn probability(found: &Explained, weights: &[f64], at: usize) -> f64 {
 
 /// Chosen causes in whose place another cause does as well to the last digit, and its name: even odds are no finding.
 pub fn ties(found: &Explained) -> Vec<(usize, Cause)> {
-    let products = found.ledger.white(&found.all());
+    let products = found.gram.white(&found.all());
     let worth = |set: &[usize]| evidence(&products, &found.nuisance, &found.items, set);
     let Some(best) = worth(&found.chosen) else {
         return Vec::new();
@@ -442,7 +442,7 @@ const EVEN: f64 = 0.4;
 
 /// Other causes that would explain these data nearly as well in its place (evidence within 2·ln 20).
 fn look_alikes(found: &Explained, weights: &[f64], at: usize) -> Vec<String> {
-    let products = found.ledger.white(weights);
+    let products = found.gram.white(weights);
     let best = evidence(&products, &found.nuisance, &found.items, &found.chosen).unwrap_or(0.0);
     let own = found.chosen[at];
     let Kind::Cause { cause, .. } = &found.items[own].kind else {

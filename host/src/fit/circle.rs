@@ -1,5 +1,5 @@
 //! The geometric circle fit on all cores.
-use super::lanes;
+use super::simd_sums;
 use giotto_shared::circle::{self, CircleError, CircleFit, Merge, Part, Points, Walk, Xy};
 use rayon::prelude::*;
 
@@ -20,12 +20,12 @@ impl Points for Parallel<'_> {
         let (x, y) = (self.0.x(), self.0.y());
         let chunk = BLOCKS_A_TASK * walk.stride();
         if x.len() <= chunk {
-            return lanes::sum(part, walk, x, y);
+            return simd_sums::sum(part, walk, x, y);
         }
         let parts: Vec<P::Sum> = x
             .par_chunks(chunk)
             .zip(y.par_chunks(chunk))
-            .map(|(x, y)| lanes::sum(part, walk, x, y))
+            .map(|(x, y)| simd_sums::sum(part, walk, x, y))
             .collect();
         let mut total = P::Sum::default();
         for part in &parts {

@@ -3,9 +3,9 @@ use super::axis::{self, AxisPoint, Grid};
 use super::chain::{Chain, Discrete};
 use super::command::Knots;
 use super::geometry::{self, Place};
+use super::hysteresis::Hysteresis;
 use super::machine::{AccDec, Machine};
-use super::memory::Memory;
-use super::orbit::{self, PIECE, Round};
+use super::steady_circle::{self, PIECE, Round};
 use super::wave::Turns;
 use crate::campaign::{Run, Samples};
 use giotto_shared::{Direction, Frame};
@@ -250,7 +250,7 @@ impl Lap<'_> {
                     known.push(Discrete::new(chain, step_s));
                     known.len() - 1
                 });
-                orbit::axis(round, axis, shares, &known[at])
+                steady_circle::axis(round, axis, shares, &known[at])
             })
         });
         let piece = samples.min((PIECE / every).max(1));
@@ -297,7 +297,7 @@ impl Lap<'_> {
     /// Steps from rest, until nothing is left of the start and what remembers reversals has seen one, then the lap.
     fn grid(&self, axis: usize, step_s: f64) -> Grid {
         let machine = self.machine;
-        let reversal_s = if Memory::needed(machine, axis) {
+        let reversal_s = if Hysteresis::needed(machine, axis) {
             ONE_REVERSAL_TURNS * self.turn_s
         } else {
             0.0

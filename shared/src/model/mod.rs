@@ -10,12 +10,12 @@
 //! | `inverse` | what to program so that the wanted circle comes out |
 //! | `class` | which elements a ratio κ4/κ2² allows |
 //! | `equivalent` | the second-order or feed-forward element with given cumulants |
-//! | `third` | the third cumulant that a lag and an average with given cumulants have |
+//! | `third_cumulant` | the third cumulant that a lag and an average with given cumulants have |
 mod class;
 mod element;
 mod equivalent;
 mod inverse;
-mod third;
+mod third_cumulant;
 
 pub use class::{Class, Classes};
 pub use element::Element;
