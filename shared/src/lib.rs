@@ -55,5 +55,5 @@ pub mod term;
 pub mod wire;
 
 pub use actuator::Actuator;
-pub use direction::{Axis, Direction};
+pub use direction::Direction;
 pub use frame::{Frame, Plane};
