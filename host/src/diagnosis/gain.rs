@@ -14,8 +14,9 @@ use super::veto;
 use crate::campaign::{Campaign, Run};
 use crate::causes::{Cause, Effect};
 use crate::model_file::{ModelFile, Servo};
-use crate::simulation::machine::{Machine, PositionLoop};
+use crate::simulation::machine::Machine;
 use crate::simulation::{CircleTest, SAMPLES_PER_TURN, circle};
+use giotto_shared::model::{Element, RadiusModel};
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -51,11 +52,13 @@ const RESAMPLES: usize = 1000;
 pub fn machine(response: &Response, effects: &[Effect], lag_s: Option<f64>) -> Machine {
     let mut machine = Machine::default();
     if response.a_s2 > 0.0 {
-        let servo = PositionLoop {
-            kv_per_s: response.a_s2.powf(-0.5),
-            feed_forward: 0.0,
+        let lag = Response {
+            b_s4: 0.0,
+            ..*response
         };
-        machine.servo = [servo; 3];
+        if let Some(element) = lag.element() {
+            machine.set_servo(element);
+        }
         if response.b_s4 != 0.0 {
             machine.add_beta2(-0.5 * response.b_s4);
         }
@@ -76,10 +79,10 @@ pub fn machine(response: &Response, effects: &[Effect], lag_s: Option<f64>) -> M
 
 /// Eq. 15 with the same κ2 and κ4.
 pub fn beta(response: &Response) -> Servo {
-    let (a, b) = (response.a_s2, response.b_s4);
+    let RadiusModel { beta1_s2, beta2_s4 } = RadiusModel::from(*response);
     Servo::Beta {
-        beta1_s2: -0.5 * a,
-        beta2_s4: 0.375 * a * a - 0.5 * b,
+        beta1_s2,
+        beta2_s4,
         half_width95: [0.0; 2],
     }
 }
@@ -429,19 +432,16 @@ pub fn extended_model(
     let weights = found.all();
     let response =
         fitted(found, &weights, &found.chosen).map_or(found.response, |(response, _)| response);
-    let servo = if response.b_s4 > 0.0 {
-        let omega_n2 = response.b_s4.powf(-0.5);
-        let zeta = (0.5 + 0.25 * response.a_s2 * omega_n2).max(1e-4).sqrt();
-        Servo::SecondOrder {
-            omega_n_rad_s: omega_n2.sqrt(),
+    let servo = match response.element() {
+        Some(Element::SecondOrder {
+            omega_n_rad_s,
             zeta,
-        }
-    } else if response.b_s4 == 0.0 && response.a_s2 > 0.0 {
-        Servo::Lag {
-            kv_per_s: response.a_s2.powf(-0.5),
-        }
-    } else {
-        beta(&response)
+        }) => Servo::SecondOrder {
+            omega_n_rad_s,
+            zeta,
+        },
+        Some(Element::Lag { kv_per_s }) => Servo::Lag { kv_per_s },
+        _ => beta(&response),
     };
     let range = |value: &dyn Fn(&crate::campaign::Run) -> f64| {
         campaign

@@ -195,7 +195,7 @@ mod tests {
     use super::super::hypothesis::Kind;
     use super::super::pattern::Pattern;
     use super::super::spread;
-    use super::super::survey::{Response, Survey, misfit};
+    use super::super::survey::{Survey, misfit};
     use super::*;
     use crate::causes::Cause;
     use crate::causes::Site;
@@ -238,7 +238,7 @@ directions = ["ccw", "cw"]
     fn columns_that_come_or_change_together_are_those_that_did_so_one_by_one() {
         let campaign = simulation::campaign(&Plan::parse(PLAN, Path::new("gram.toml")).unwrap(), 1);
         let (runs, _) =
-            Survey::new(&campaign).prepare(&Response::of(&Servo::Lag { kv_per_s: 90.0 }), 0.0);
+            Survey::new(&campaign).prepare(&Servo::Lag { kv_per_s: 90.0 }.response(), 0.0);
         let data = misfit(&runs);
         let spread = spread::measure(&runs, &data.all_samples(&runs), false);
         let columns: Vec<Column> = kinds()

@@ -65,7 +65,7 @@ use explain::Start;
 use explained::Explained;
 use serde::Serialize;
 use status::Ground;
-use survey::{Response, Survey, believed_feed_m_s};
+use survey::{Survey, believed_feed_m_s};
 
 /// What a diagnosis may be told.
 #[derive(Clone, Debug)]
@@ -301,7 +301,7 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
 fn is_worth_writing(findings: &[Finding], model: &ModelFile, gain: Option<&Gain>) -> bool {
     let Some(gain) = gain else { return false };
     if findings.is_empty() {
-        Response::of(&model.servo).a_s2 != 0.0 && gain.baseline_rms_um < gain.no_model_rms_um
+        model.servo.response().a_s2 != 0.0 && gain.baseline_rms_um < gain.no_model_rms_um
     } else {
         recommendation::is_proven(gain)
     }
@@ -367,7 +367,7 @@ impl Session {
 
 fn spoilt_of(campaign: &Campaign, survey: &Survey, options: &Options) -> Option<influence::Spoilt> {
     let response = match &options.model {
-        Some(model) => Response::of(&model.servo),
+        Some(model) => model.servo.response(),
         None => fit_lag(&sizes(campaign, believed_feed_m_s)),
     };
     let (runs, _) = survey.prepare(&response, 0.0);
@@ -437,7 +437,7 @@ impl Simulation {
         };
         Ok(Self {
             start: Start {
-                response: Response::of(&model.servo),
+                response: model.servo.response(),
                 own_fourth_order: !matches!(model.servo, Servo::Lag { .. }),
                 repeatability_m,
                 more_lag_s: 0.0,

@@ -6,7 +6,6 @@ use super::design_column::Column;
 use super::low_orders::{Basis, Low};
 use crate::campaign::{Campaign, Run};
 use crate::causes::{Harmonics, RunView};
-use crate::model_file::Servo;
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
@@ -32,77 +31,8 @@ pub struct Prepared {
     pub place: Range<usize>,
 }
 
-/// The part of the response that all runs share: (R/Rm)² = 1 + aω² + bω⁴.
-///
-/// Exact for one lag (a = 1/kv², b = 0) and for a second-order response (b = 1/ωn⁴).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Response {
-    /// a = κ2, s².
-    pub a_s2: f64,
-    /// b, s⁴.
-    pub b_s4: f64,
-}
-
-impl Response {
-    /// Of a model file.
-    pub fn of(servo: &Servo) -> Self {
-        match *servo {
-            Servo::Beta {
-                beta1_s2, beta2_s4, ..
-            } => {
-                let a_s2 = -2.0 * beta1_s2;
-                Self {
-                    a_s2,
-                    b_s4: 2.0 * (0.375 * a_s2 * a_s2 - beta2_s4),
-                }
-            }
-            Servo::Lag { kv_per_s } => Self {
-                a_s2: kv_per_s.powi(-2),
-                b_s4: 0.0,
-            },
-            Servo::SecondOrder {
-                omega_n_rad_s,
-                zeta,
-            } => Self {
-                a_s2: -2.0 * (1.0 - 2.0 * zeta * zeta) / omega_n_rad_s.powi(2),
-                b_s4: omega_n_rad_s.powi(-4),
-            },
-        }
-    }
-
-    /// Phase of the simplest chain with this gain, to third order in ω: one lag (b ≤ 0), or a second-order
-    /// response, φ = 2ζr + (2ζ − 8ζ³/3)r³, r = ω/ωn. What a radius alone says of the delay: dead time is not in it.
-    pub fn own_lag(&self) -> Lag {
-        if self.b_s4 > 0.0 {
-            let omega_n = self.b_s4.powf(-0.25);
-            let zeta = (0.5 + 0.25 * self.a_s2 * omega_n * omega_n).max(0.0).sqrt();
-            let tau3_s3 = (8.0 / 3.0 * zeta.powi(3) - 2.0 * zeta) / omega_n.powi(3);
-            Lag {
-                tau_s: 2.0 * zeta / omega_n,
-                tau3_s3,
-                measured: false,
-                se_s: UNSEEN_S,
-            }
-        } else {
-            let tau_s = self.a_s2.max(0.0).sqrt();
-            Lag {
-                tau_s,
-                tau3_s3: tau_s.powi(3) / 3.0,
-                measured: false,
-                se_s: UNSEEN_S,
-            }
-        }
-    }
-
-    /// |G(jω)|.
-    pub fn gain(&self, omega_rad_s: f64) -> f64 {
-        let w2 = omega_rad_s * omega_rad_s;
-        (1.0 + self.a_s2 * w2 + self.b_s4 * w2 * w2)
-            .max(1e-3)
-            .sqrt()
-            .recip()
-    }
-}
+/// The part of the response that all runs share.
+pub type Response = giotto_shared::model::Response<f64>;
 
 impl Prepared {
     /// Takes the recorded pattern as one that runs ahead of the machine by the lag `lag_rad`.
@@ -168,6 +98,17 @@ pub struct Lag {
 }
 
 impl Lag {
+    /// That of the simplest chain with a response: what a radius alone says of the delay. Dead time is not in it.
+    pub fn of(response: &Response) -> Self {
+        let [tau_s, tau3_s3] = response.phase();
+        Self {
+            tau_s,
+            tau3_s3,
+            measured: false,
+            se_s: UNSEEN_S,
+        }
+    }
+
     /// φ(ω), rad.
     pub fn phase(&self, omega_rad_s: f64) -> f64 {
         omega_rad_s * (self.tau_s - self.tau3_s3 * omega_rad_s * omega_rad_s)
@@ -330,7 +271,7 @@ impl Survey {
                 run.turn_to(lag.phase(omega));
             } else {
                 // An angle that was measured holds no lag, but the servo's own phase still turns its signatures.
-                run.view.lag_rad = response.own_lag().phase(omega);
+                run.view.lag_rad = Lag::of(response).phase(omega);
                 run.view.place(Arc::clone(&run.view.psi_rad));
             }
             run
@@ -371,7 +312,7 @@ impl Survey {
             .zip(&self.firsts)
             .map(|(run, first)| (run.view.sign, run.view.omega_rad_s, *first))
             .collect();
-        let unmeasured = response.own_lag();
+        let unmeasured = Lag::of(response);
         let guess = unmeasured.tau_s;
         let cost = |tau: f64, tau3: f64| -> (f64, f64) {
             let (mut re, mut im) = (0.0, 0.0);
@@ -457,23 +398,25 @@ impl Survey {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model_file::Servo;
 
     #[test]
     fn own_lag_is_the_phase_of_the_chain() {
         let (omega_n, zeta) = (38.0_f64, 0.72_f64);
-        let second = Response::of(&Servo::SecondOrder {
+        let second = Servo::SecondOrder {
             omega_n_rad_s: omega_n,
             zeta,
-        });
-        let lag = Response::of(&Servo::Lag { kv_per_s: 90.0 });
+        }
+        .response();
+        let lag = Servo::Lag { kv_per_s: 90.0 }.response();
         for omega in [0.5, 3.0, 7.0] {
             let exact = (2.0 * zeta * omega / omega_n).atan2(1.0 - (omega / omega_n).powi(2));
             assert!(
-                (second.own_lag().phase(omega) - exact).abs() < 2e-4,
+                (Lag::of(&second).phase(omega) - exact).abs() < 2e-4,
                 "{omega}: {exact}"
             );
             assert!(
-                (lag.own_lag().phase(omega) - (omega / 90.0).atan()).abs() < 1e-6,
+                (Lag::of(&lag).phase(omega) - (omega / 90.0).atan()).abs() < 1e-6,
                 "{omega}"
             );
         }

@@ -11,6 +11,7 @@ use super::status::{Status, TIE};
 use super::tangent;
 use super::tone::{Amplitude, Tone};
 use crate::causes::{Cause, Effect, Fitted, Seat, Site};
+use giotto_shared::model::Element;
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::collections::BTreeMap;
@@ -363,18 +364,15 @@ fn dynamics_note(found: &Explained, weights: &[f64], at: usize) -> String {
         .runs
         .len()
         .saturating_sub(columns_of(&found.nuisance, &found.items, &found.chosen).len());
-    let (a, b) = (found.response.a_s2, found.response.b_s4);
-    // κ4 = 24β2 − 3κ2² with β2 = 3κ2²/8 − b/2.
-    let ratio = (6.0 * a * a - 12.0 * b) / (a * a);
-    let class = if b > 0.0 {
-        let omega_n2 = b.powf(-0.5);
-        let zeta = (0.5 + 0.25 * a * omega_n2).max(0.0).sqrt();
-        format!(
-            "a second-order response with ωn = {:.1} rad/s, ζ = {zeta:.2}",
-            omega_n2.sqrt()
-        )
-    } else {
-        "a lag with feed-forward, or friction".to_string()
+    let ratio = found.response.ratio();
+    let class = match found.response.element() {
+        Some(Element::SecondOrder {
+            omega_n_rad_s,
+            zeta,
+        }) => {
+            format!("a second-order response with ωn = {omega_n_rad_s:.1} rad/s, ζ = {zeta:.2}")
+        }
+        _ => "a lag with feed-forward, or friction".to_string(),
     };
     format!("partial F = {partial_f:.1} (1, {dof}); κ4/κ2² = {ratio:.0}: {class}")
 }

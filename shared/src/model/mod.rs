@@ -3,11 +3,14 @@
 //! On a circle at constant rate ω = f/R a linear chain, the same on both axes, only scales: Rm = R·|G(jω)|, and
 //! ln|G(jω)| = −κ2 ω²/2 + κ4 ω⁴/24 − …, κ the cumulants of its impulse response, which add over a cascade.
 //!
+//! Every conversion between elements, cumulants, β and responses is in this folder and nowhere else.
+//!
 //! | file | holds |
 //! |---|---|
 //! | here | [`RadiusModel`] (β of Eq. 15), [`Cumulants`], each from the other; prediction |
 //! | `element` | [`Element`]: lag, filter, feed-forward, moving average, second order, chords; exact gain and cumulants |
 //! | `inverse` | what to program so that the wanted circle comes out |
+//! | `response` | [`Response`]: 1 + aω² + bω⁴, the form that a lag and a second order share; to elements and back |
 //! | `class` | which elements a ratio κ4/κ2² allows |
 //! | `equivalent` | the second-order or feed-forward element with given cumulants |
 //! | `third_cumulant` | the third cumulant that a lag and an average with given cumulants have |
@@ -15,12 +18,14 @@ mod class;
 mod element;
 mod equivalent;
 mod inverse;
+mod response;
 mod third_cumulant;
 
 pub use class::{Class, Classes};
 pub use element::Element;
 pub use equivalent::Equivalent;
 pub use inverse::{InverseError, Programmed};
+pub use response::Response;
 
 use core::ops::{Add, AddAssign, Neg};
 use num_traits::Float;
@@ -71,6 +76,9 @@ pub struct Cumulants<T> {
     /// κ4, s⁴.
     pub kappa4_s4: T,
 }
+
+/// Least ζ² of an element that is made to measure: what is fitted to noise may ask for less than no damping.
+const LEAST_DAMPING_SQUARED: f64 = 1e-4;
 
 /// A small whole number as a float.
 pub(crate) fn number<T: Float>(value: f64) -> T {
