@@ -57,25 +57,23 @@ fn share(effect: &Effect) -> Share {
 /// [`ModelTableError`]; a table that is returned passes [`Table::validate`].
 ///
 /// ```
-/// use giotto::model_file::{FORMAT, ModelFile, Servo, Valid};
-/// use giotto::table_from_model::{ModelTableError, table_from_model};
+/// use giotto::model_file::ModelFile;
+/// # use std::path::Path;
+/// use giotto::table_from_model::table_from_model;
 ///
-/// let model = ModelFile {
-///     format: FORMAT,
-///     campaign: "lab".into(),
-///     machine: "mill".into(),
-///     delay_s: None,
-///     servo: Servo::Lag { kv_per_s: 50.0 },
-///     valid: Valid { radius_mm: [50.0, 150.0], feed_mm_s: [20.0, 300.0] },
-///     effects: Vec::new(),
-/// };
+/// let model = ModelFile::parse(
+///     "format = 2\ncampaign = \"lab\"\nmachine = \"mill\"\n\
+///      [servo]\nkind = \"lag\"\nkv_per_s = 50.0\n\
+///      [valid]\nradius_mm = [50.0, 150.0]\nfeed_mm_s = [20.0, 300.0]",
+///     Path::new("model.toml"),
+/// )?;
 /// let made = table_from_model(&model)?;
 /// let zone = &made.table.zones[0];
 /// // κ2 of a lag is τ² = 4e-4 s²; the zone is where the model was fitted.
 /// assert!((zone.cumulants.kappa2_s2 - 4e-4).abs() < 1e-9);
 /// assert_eq!(zone.radius_m, [0.05, 0.15]);
 /// assert!(made.left_out.is_empty());
-/// # Ok::<(), ModelTableError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn table_from_model(model: &ModelFile) -> Result<ModelTable, ModelTableError> {
     let mut cumulants = model.servo.cumulants();

@@ -74,21 +74,19 @@ impl Controller {
     /// [`ControllerError::ReadBack`], those of the link. The old table is then in use, or returns at the next boot.
     ///
     /// ```
-    /// use giotto::model_file::{FORMAT, ModelFile, Servo, Valid};
+    /// use giotto::model_file::ModelFile;
+    /// # use std::path::Path;
     /// use giotto::table_from_model::table_from_model;
     /// use giotto_link::flash::Verdict;
     /// use giotto_link::{OpenOptions, Port, open};
     /// use giotto_shared::table::{MAX_IMAGE_BYTES, encode};
     ///
-    /// let model = ModelFile {
-    ///     format: FORMAT,
-    ///     campaign: "lab".into(),
-    ///     machine: "mill".into(),
-    ///     delay_s: None,
-    ///     servo: Servo::Lag { kv_per_s: 50.0 },
-    ///     valid: Valid { radius_mm: [50.0, 150.0], feed_mm_s: [20.0, 300.0] },
-    ///     effects: Vec::new(),
-    /// };
+    /// let model = ModelFile::parse(
+    ///     "format = 2\ncampaign = \"lab\"\nmachine = \"mill\"\n\
+    ///      [servo]\nkind = \"lag\"\nkv_per_s = 50.0\n\
+    ///      [valid]\nradius_mm = [50.0, 150.0]\nfeed_mm_s = [20.0, 300.0]",
+    ///     Path::new("model.toml"),
+    /// )?;
     /// let mut image = [0; MAX_IMAGE_BYTES];
     /// let length = encode(&table_from_model(&model)?.table, &mut image)?;
     /// let image = &image[..length];

@@ -145,17 +145,15 @@ pub fn is_program(program: &[u8]) -> bool {
 ///
 /// ```
 /// use giotto_nc::{Fate, Options, compensate};
-/// use giotto::model_file::{FORMAT, ModelFile, Servo, Valid};
+/// use giotto::model_file::ModelFile;
+/// # use std::path::Path;
 ///
-/// let model = ModelFile {
-///     format: FORMAT,
-///     campaign: "lab".into(),
-///     machine: "mill".into(),
-///     delay_s: None,
-///     servo: Servo::Lag { kv_per_s: 43.3 },
-///     valid: Valid { radius_mm: [20.0, 150.0], feed_mm_s: [5.0, 700.0] },
-///     effects: Vec::new(),
-/// };
+/// let model = ModelFile::parse(
+///     "format = 2\ncampaign = \"lab\"\nmachine = \"mill\"\n\
+///      [servo]\nkind = \"lag\"\nkv_per_s = 43.3\n\
+///      [valid]\nradius_mm = [20.0, 150.0]\nfeed_mm_s = [5.0, 700.0]",
+///     Path::new("model.toml"),
+/// )?;
 /// // A quarter of a circle of 50 mm at 15 m/min, between two straight lines that touch it.
 /// let program = "G21 G17 G90\nG0 X-20 Y0\nG1 X0 Y0 F15000\nG3 X50 Y50 I0 J50\nG1 Y80\nM2\n";
 /// let corrected = compensate(program.as_bytes(), &model, &Options::default());
