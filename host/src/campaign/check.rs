@@ -65,6 +65,28 @@ pub(super) fn gaps(
     Ok(())
 }
 
+/// A deviation (m) of a circle of this radius (m) that no machine has, in the words of its column.
+fn implausible(
+    column: &str,
+    deviation_m: f64,
+    radius: f64,
+    hint: String,
+    expected: String,
+) -> Problem {
+    let value = if column == "radius_mm" {
+        format!("{:.6} mm", (deviation_m + radius) * 1e3)
+    } else {
+        format!("{:.1} µm", deviation_m * 1e6)
+    };
+    Problem::Implausible {
+        column: column.to_owned(),
+        value,
+        radius_mm: tidy(radius * 1e3),
+        hint,
+        expected,
+    }
+}
+
 /// Deviations must be those of a circle of the programmed radius. Gives their noise, m.
 pub(super) fn deviation(
     entry: &Entry,
@@ -77,24 +99,8 @@ pub(super) fn deviation(
     let [lowest, highest] = bounds(deviation);
     let far = |v: &f64| (v - mean).abs() > LARGEST_FORM * radius;
     let refuse = |row: usize, hint: String, expected: String| {
-        let value = if column == "radius_mm" {
-            format!("{:.6} mm", (deviation[row] + radius) * 1e3)
-        } else {
-            format!("{:.1} µm", deviation[row] * 1e6)
-        };
-        let (column, radius_mm) = (column.to_owned(), tidy(radius * 1e3));
-        Err(err(
-            entry,
-            row,
-            field,
-            Problem::Implausible {
-                column,
-                value,
-                radius_mm,
-                hint,
-                expected,
-            },
-        ))
+        let problem = implausible(column, deviation[row], radius, hint, expected);
+        Err(err(entry, row, field, problem))
     };
     if mean.abs() > LARGEST_SIZE_ERROR * radius {
         let hint = if column == "radius_mm" {
@@ -424,7 +430,6 @@ pub(super) fn angles(
     notes: &mut Vec<Note>,
 ) -> Result<(), CampaignError> {
     let n = angle.len();
-    let d = f64::from(entry.direction.sign());
     let (lowest, highest) = angle
         .iter()
         .fold((f64::MAX, f64::MIN), |(l, h), &a| (l.min(a), h.max(a)));
@@ -438,6 +443,20 @@ pub(super) fn angles(
             },
         ));
     }
+    sense(entry, angle, field)?;
+    let span = angle[n - 1] - angle[0];
+    let spacing = span.abs() / (n - 1) as f64;
+    *covered = span.abs() + spacing;
+    coverage(entry, angle, field, spacing, *covered)?;
+    hole(entry, angle, field, spacing)?;
+    notes.extend(other_start(entry, angle, field, spacing));
+    Ok(())
+}
+
+/// Angles run as the direction says, and never back.
+fn sense(entry: &Entry, angle: &[f64], field: usize) -> Result<(), CampaignError> {
+    let n = angle.len();
+    let d = f64::from(entry.direction.sign());
     let span = angle[n - 1] - angle[0];
     if span * d < 0.0 {
         let words = |up: bool| {
@@ -469,38 +488,53 @@ pub(super) fn angles(
             Problem::AngleBackwards { back_deg },
         ));
     }
-    let spacing = span.abs() / (n - 1) as f64;
-    *covered = span.abs() + spacing;
+    Ok(())
+}
+
+/// Angles cover what is declared: an arc, or one turn.
+fn coverage(
+    entry: &Entry,
+    angle: &[f64],
+    field: usize,
+    spacing: f64,
+    covered: f64,
+) -> Result<(), CampaignError> {
+    let last = angle.len() - 1;
     let tolerance = 2.0 * spacing + 1f64.to_radians();
     let covered_deg = covered.to_degrees();
     match entry.arc_rad {
-        Some(declared) if (*covered - declared).abs() > tolerance => {
+        Some(declared) if (covered - declared).abs() > tolerance => {
             let problem = Problem::ArcContradicted {
                 covered_deg,
                 declared_deg: tidy(declared.to_degrees()),
             };
-            return Err(err(entry, n - 1, field, problem));
+            return Err(err(entry, last, field, problem));
         }
         Some(_) => {}
-        None if *covered < TAU - tolerance => {
-            return Err(err(entry, n - 1, field, Problem::Arc { covered_deg }));
+        None if covered < TAU - tolerance => {
+            return Err(err(entry, last, field, Problem::Arc { covered_deg }));
         }
-        None if *covered > TAU + tolerance => {
+        None if covered > TAU + tolerance => {
             let row = angle
                 .iter()
                 .position(|a| (a - angle[0]).abs() >= TAU)
-                .unwrap_or(n - 1);
+                .unwrap_or(last);
             return Err(err(
                 entry,
                 row,
                 field,
                 Problem::SeveralTurns {
-                    turns: *covered / TAU,
+                    turns: covered / TAU,
                 },
             ));
         }
         None => {}
     }
+    Ok(())
+}
+
+/// No hole lies between neighbours.
+fn hole(entry: &Entry, angle: &[f64], field: usize, spacing: f64) -> Result<(), CampaignError> {
     if let Some(k) = angle.windows(2).position(|w| {
         let hole = (w[1] - w[0]).abs();
         hole.to_degrees() > LARGEST_GAP_DEG && hole > 3.0 * spacing
@@ -518,18 +552,21 @@ pub(super) fn angles(
             },
         ));
     }
-    if let Some(start) = entry.start_angle_rad {
-        let off = ((angle[0] - start + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0).to_degrees();
-        if off.abs() > 5.0 + spacing.to_degrees() {
-            let (said, found) = (start.to_degrees(), angle[0].to_degrees());
-            let text = format!(
-                "start_angle_deg = {said:.1}, the first sample lies at {found:.1}°: the file is believed"
-            );
-            notes.push(Note {
-                at: entry.place(0, field),
-                text,
-            });
-        }
-    }
     Ok(())
+}
+
+/// A start that is not the one stated.
+fn other_start(entry: &Entry, angle: &[f64], field: usize, spacing: f64) -> Option<Note> {
+    let start = entry.start_angle_rad?;
+    let off = ((angle[0] - start + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0).to_degrees();
+    (off.abs() > 5.0 + spacing.to_degrees()).then(|| {
+        let (said, found) = (start.to_degrees(), angle[0].to_degrees());
+        let text = format!(
+            "start_angle_deg = {said:.1}, the first sample lies at {found:.1}°: the file is believed"
+        );
+        Note {
+            at: entry.place(0, field),
+            text,
+        }
+    })
 }

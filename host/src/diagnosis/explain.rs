@@ -229,19 +229,26 @@ fn pass(
     };
     enter(&mut found, start, kinds);
     let all = found.all();
+    search(&mut found, &all);
+    let longer_s = tangent::finish(&mut found, &all);
+    (found, longer_s)
+}
+
+/// Refits, improves, proposes and selects until the same explanations are chosen again.
+fn search(found: &mut Explained, all: &[f64]) {
     let mut barred: Vec<usize> = Vec::new();
     let mut polished: Vec<Kind> = Vec::new();
     for _ in 0..6 {
-        let before: Vec<Kind> = chosen_kinds(&found);
-        refit(&mut found, &all);
-        shape::improve(&mut found);
-        refit(&mut found, &all);
+        let before: Vec<Kind> = chosen_kinds(found);
+        refit(found, all);
+        shape::improve(found);
+        refit(found, all);
         if before != polished {
-            tangent::polish(&mut found, &all);
-            polished = chosen_kinds(&found);
+            tangent::polish(found, all);
+            polished = chosen_kinds(found);
         }
-        propose_patterns(&mut found);
-        let products = found.gram.white(&all);
+        propose_patterns(found);
+        let products = found.gram.white(all);
         found.chosen = select(
             &products,
             &found.nuisance,
@@ -249,18 +256,16 @@ fn pass(
             &found.chosen,
             &barred,
         );
-        found.chosen = prune(&found, &all, found.chosen.clone(), &mut barred);
-        bar_impossible(&mut found, &all, &mut barred);
-        if chosen_kinds(&found) == before {
+        found.chosen = prune(found, all, found.chosen.clone(), &mut barred);
+        bar_impossible(found, all, &mut barred);
+        if chosen_kinds(found) == before {
             break;
         }
     }
-    refit(&mut found, &all);
-    if chosen_kinds(&found) != polished {
-        tangent::polish(&mut found, &all);
+    refit(found, all);
+    if chosen_kinds(found) != polished {
+        tangent::polish(found, all);
     }
-    let longer_s = tangent::finish(&mut found, &all);
-    (found, longer_s)
 }
 
 /// Enters the columns of the model itself, of what was chosen before, and of everything that may compete.

@@ -8,6 +8,7 @@ use super::duration::Clamp;
 use super::explained::Explained;
 use super::hypothesis::Kind;
 use super::linear::solve;
+use super::low_orders::Basis;
 use super::survey::Response;
 use super::vector::dot;
 use super::veto;
@@ -295,21 +296,8 @@ fn fold(
                 Some(started_s) => test.started_s = started_s - started,
                 None => test.started_s = found.runs[i].view.elapsed * found.runs[i].view.campaign_s,
             }
-            // What the search hid from itself is measured all the same.
-            let basis = &found.bases[i];
+            let left = |prediction: &[f64]| left_of(run, &found.bases[i], prediction);
             let samples = run.samples.deviation_m.len() as f64;
-            let left = |prediction: &[f64]| -> f64 {
-                let rest: Vec<f64> = run
-                    .samples
-                    .deviation_m
-                    .iter()
-                    .zip(prediction)
-                    .map(|(y, p)| y - p)
-                    .collect();
-                // The centre is the operator's.
-                let [cos, sin] = basis.centre(&rest);
-                (dot(&rest, &rest) - cos * cos - sin * sin).max(0.0) / samples
-            };
             let simulated = |machine: &Machine| left(&at_samples(machine, &test, run));
             let base = simulated(&baseline);
             let x = run.feed_m_s.powi(2) / run.radius_m;
@@ -334,6 +322,19 @@ fn fold(
             }
         })
         .collect()
+}
+
+/// Mean square of what a prediction leaves of a run, m². The centre is the operator's, and what the search hid from itself is
+/// measured all the same.
+fn left_of(run: &Run, basis: &Basis, prediction: &[f64]) -> f64 {
+    let deviation = &run.samples.deviation_m;
+    let rest: Vec<f64> = deviation
+        .iter()
+        .zip(prediction)
+        .map(|(y, p)| y - p)
+        .collect();
+    let [cos, sin] = basis.centre(&rest);
+    (dot(&rest, &rest) - cos * cos - sin * sin).max(0.0) / deviation.len() as f64
 }
 
 /// Deviations of a simulated circle where a run has its samples, m. A whole turn by the clock is sampled as the run is;

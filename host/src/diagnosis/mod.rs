@@ -54,7 +54,7 @@ pub use influence::LeftOut;
 pub use recommendation::{Action, Recommendation};
 pub use status::Status;
 
-use crate::campaign::Campaign;
+use crate::campaign::{Campaign, Run};
 use crate::causes::Effect;
 use crate::model_file::{ModelFile, Servo};
 use crate::simulation::machine::{Machine, MachineError};
@@ -164,6 +164,8 @@ pub enum DiagnosisError {
     Empty,
 }
 
+/// Fewest samples of a run that can show a form.
+const FEWEST_SAMPLES: usize = 16;
 /// Fewest runs whose scatter says anything.
 const FEWEST_RUNS: usize = 6;
 
@@ -198,11 +200,8 @@ pub fn diagnose(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Dia
 }
 
 fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, DiagnosisError> {
-    if !campaign
-        .runs
-        .iter()
-        .any(|run| run.samples.deviation_m.len() >= 16)
-    {
+    let long_enough = |run: &Run| run.samples.deviation_m.len() >= FEWEST_SAMPLES;
+    if !campaign.runs.iter().any(long_enough) {
         return Err(DiagnosisError::Empty);
     }
     let session = Session::of(campaign, options);
@@ -249,33 +248,24 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
         ties.iter()
             .map(|(item, other)| tie_words(found, *item, *other)),
     );
-    let in_sample = misfit::rms_um(found);
-    let (heldout_base, heldout_extended) = proof.as_ref().map_or((in_sample, in_sample), |gain| {
-        (gain.baseline_rms_um, gain.extended_rms_um)
-    });
-    let effects: Vec<Effect> = baseline
-        .known
-        .iter()
-        .cloned()
-        .chain(stated.findings.iter().flat_map(|f| f.effects.clone()))
-        .collect();
-    // The delay with which the gain was proven.
-    let delay_s = survey.inferred().then_some(found.lag.tau_s.max(0.0));
-    let model = gain::extended_model(&session.campaign, found, effects, delay_s);
+    let model = extended_model(&session.campaign, &survey, found, &baseline, &stated);
     let mut picture = picture::draw(&session.campaign, &seen, found);
     picture
         .iter_mut()
         .for_each(|run| run.index = session.places[run.index]);
+    // Where no run can be left out, what the search leaves of the runs it saw.
+    let in_sample_um = misfit::rms_um(found);
+    let heldout_um = |of: &dyn Fn(&Gain) -> f64| proof.as_ref().map_or(in_sample_um, of);
     let mut diagnosis = Diagnosis {
         noise_um: found.spread.noise_m() * 1e6,
         spread_um: found.spread.order_m2[0].sqrt() * 1e6,
         baseline: Baseline {
             name: baseline.name,
-            heldout_rms_um: heldout_base,
+            heldout_rms_um: heldout_um(&|gain| gain.baseline_rms_um),
         },
         unexplained: stated.unexplained,
         extended: Extended {
-            heldout_rms_um: heldout_extended,
+            heldout_rms_um: heldout_um(&|gain| gain.extended_rms_um),
         },
         gain_percent: proof.as_ref().map_or(0.0, |gain| gain.percent),
         misfit: misfit::split(found),
@@ -381,12 +371,28 @@ fn spoilt_of(campaign: &Campaign, survey: &Survey, options: &Options) -> Option<
     influence::find(&runs, &profiles, &means)
 }
 
-fn sizes(campaign: &Campaign, feed_m_s: impl Fn(&crate::campaign::Run) -> f64) -> Vec<Size> {
+fn sizes(campaign: &Campaign, feed_m_s: impl Fn(&Run) -> f64) -> Vec<Size> {
     campaign
         .runs
         .iter()
         .map(|run| Size::of(run, feed_m_s(run)))
         .collect()
+}
+
+/// What was known and what was found, as one model with the delay with which its gain was proven.
+fn extended_model(
+    campaign: &Campaign,
+    survey: &Survey,
+    found: &Explained,
+    baseline: &Simulation,
+    stated: &Stated,
+) -> ModelFile {
+    let known = baseline.known.iter().cloned();
+    let effects = known
+        .chain(stated.findings.iter().flat_map(|f| f.effects.clone()))
+        .collect();
+    let delay_s = survey.inferred().then_some(found.lag.tau_s.max(0.0));
+    gain::extended_model(campaign, found, effects, delay_s)
 }
 
 /// The simulation as it stands.
@@ -622,7 +628,7 @@ fn without_known(campaign: &Campaign, baseline: &Simulation) -> Option<Campaign>
 
 /// What the campaign is too poor to tell.
 fn poverty(campaign: &Campaign, repeatability_m: f64) -> Vec<String> {
-    let distinct = |key: &dyn Fn(&crate::campaign::Run) -> f64| {
+    let distinct = |key: &dyn Fn(&Run) -> f64| {
         let mut values: Vec<f64> = campaign.runs.iter().map(key).collect();
         values.sort_by(f64::total_cmp);
         values.dedup_by(|a, b| (*a - *b).abs() < 1e-6 * b.abs().max(1e-12));

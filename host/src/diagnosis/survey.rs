@@ -145,9 +145,18 @@ pub struct Survey {
     inferred: bool,
 }
 
-impl Survey {
-    /// Reads a campaign.
-    pub fn new(campaign: &Campaign) -> Self {
+/// When the runs of a campaign were measured.
+struct CampaignClock {
+    /// Of each run, s; its number where the campaign has no times.
+    starts: Vec<f64>,
+    began: f64,
+    span: f64,
+    /// Whether every run states its start.
+    timed: bool,
+}
+
+impl CampaignClock {
+    fn of(campaign: &Campaign) -> Self {
         let starts: Vec<f64> = campaign
             .runs
             .iter()
@@ -156,12 +165,41 @@ impl Survey {
             .collect();
         let began = starts.iter().copied().fold(f64::INFINITY, f64::min);
         let span = starts.iter().copied().fold(f64::NEG_INFINITY, f64::max) - began;
-        let timed = campaign.runs.iter().all(|run| run.started_s.is_some());
-        // What a run shows of a drift is that of its middle.
-        let middle = |index: usize, omega: f64| match campaign.runs[index].started_s {
-            Some(started_s) => started_s + std::f64::consts::PI / omega,
-            None => starts[index],
+        Self {
+            began,
+            span,
+            timed: campaign.runs.iter().all(|run| run.started_s.is_some()),
+            starts,
+        }
+    }
+
+    /// Share of the campaign that had passed at a run. What it shows of a drift is that of its middle.
+    fn elapsed(&self, run: &Run, index: usize, omega_rad_s: f64) -> f64 {
+        let middle = match run.started_s {
+            Some(started_s) => started_s + std::f64::consts::PI / omega_rad_s,
+            None => self.starts[index],
         };
+        if self.span > 0.0 {
+            (middle - self.began) / self.span
+        } else {
+            0.0
+        }
+    }
+
+    /// Duration of the campaign, s.
+    fn campaign_s(&self) -> f64 {
+        if self.timed && self.span > 0.0 {
+            self.span
+        } else {
+            UNTIMED_S
+        }
+    }
+}
+
+impl Survey {
+    /// Reads a campaign.
+    pub fn new(campaign: &Campaign) -> Self {
+        let clock = CampaignClock::of(campaign);
         let largest = campaign
             .runs
             .iter()
@@ -209,12 +247,8 @@ impl Survey {
                         sign: run.sign(),
                         frame: run.frame,
                         centre_m: run.centre_m.unwrap_or_default(),
-                        elapsed: if span > 0.0 {
-                            (middle(index, omega) - began) / span
-                        } else {
-                            0.0
-                        },
-                        campaign_s: if timed && span > 0.0 { span } else { UNTIMED_S },
+                        elapsed: clock.elapsed(run, index, omega),
+                        campaign_s: clock.campaign_s(),
                         largest_radius_m: largest,
                         psi_rad: theta.as_slice().into(),
                         direction: Arc::default(),
@@ -340,45 +374,15 @@ impl Survey {
         }
         // A phase beyond ±π at the fastest run would be another branch.
         let widest = (std::f64::consts::PI / fastest).min(0.2);
-        let mut tau = (0..=80)
+        let tau = (0..=80)
             .map(|i| -0.1 * widest + 1.1 * widest * f64::from(i) / 80.0)
             .min_by(|l, r| cost(*l, 0.0).0.total_cmp(&cost(*r, 0.0).0))
             .unwrap_or(guess);
-        let mut tau3 = 0.0;
-        let mut step = [
+        let steps = [
             widest / 80.0,
             0.2 * tau.abs().max(1e-3) / (fastest * fastest),
         ];
-        #[allow(
-            clippy::needless_range_loop,
-            reason = "the axis is a choice of parameter"
-        )]
-        for _ in 0..60 {
-            for axis in 0..2 {
-                let at = |delta: f64| {
-                    if axis == 0 {
-                        cost(tau + delta, tau3).0
-                    } else {
-                        cost(tau, tau3 + delta).0
-                    }
-                };
-                let (low, mid, high) = (at(-step[axis]), at(0.0), at(step[axis]));
-                let bend = low - 2.0 * mid + high;
-                let delta = if bend > 0.0 {
-                    (0.5 * step[axis] * (low - high) / bend).clamp(-step[axis], step[axis])
-                } else {
-                    0.0
-                };
-                if at(delta) <= mid {
-                    if axis == 0 {
-                        tau += delta
-                    } else {
-                        tau3 += delta
-                    }
-                }
-                step[axis] *= 0.85;
-            }
-        }
+        let [tau, tau3] = lowest_by_parabolas([tau, 0.0], steps, &|[tau, tau3]| cost(tau, tau3).0);
         let (left, eccentricity) = cost(tau, tau3);
         // Standard error of the phase at the fastest run, rad.
         let se = (left / points.len() as f64).sqrt() / eccentricity.max(1e-12);
@@ -393,6 +397,37 @@ impl Survey {
             se_s: 2.0 * se / fastest,
         }
     }
+}
+
+/// The lowest place near `at`, one parameter after the other, by parabolas through three points whose steps shrink.
+fn lowest_by_parabolas(
+    mut at: [f64; 2],
+    mut steps: [f64; 2],
+    cost: &dyn Fn([f64; 2]) -> f64,
+) -> [f64; 2] {
+    for _ in 0..60 {
+        for which in 0..2 {
+            let moved = |delta: f64| {
+                let mut place = at;
+                place[which] += delta;
+                place
+            };
+            let step = steps[which];
+            let [low, mid, high] = [-step, 0.0, step].map(|delta| cost(moved(delta)));
+            let bend = low - 2.0 * mid + high;
+            let delta = if bend > 0.0 {
+                (0.5 * step * (low - high) / bend).clamp(-step, step)
+            } else {
+                0.0
+            };
+            let to = moved(delta);
+            if cost(to) <= mid {
+                at = to;
+            }
+            steps[which] *= 0.85;
+        }
+    }
+    at
 }
 
 #[cfg(test)]

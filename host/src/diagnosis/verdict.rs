@@ -19,117 +19,146 @@ use std::collections::BTreeMap;
 /// No probability is certain: a statement about a machine from one campaign.
 const HIGHEST: f64 = 0.999;
 
+/// What the parts of an explanation take of the misfit.
+struct Shares {
+    /// Energy of everything that is explained, m².
+    total: f64,
+    /// Samples of all runs.
+    samples: f64,
+}
+
+impl Shares {
+    /// Of an energy, %.
+    fn percent(&self, energy: f64) -> f64 {
+        if self.total > 0.0 {
+            100.0 * energy / self.total
+        } else {
+            0.0
+        }
+    }
+
+    /// Root mean square over all samples, µm.
+    fn rms_um(&self, energy: f64) -> f64 {
+        (energy / self.samples).sqrt() * 1e6
+    }
+
+    /// A finding by evidence of its own, with what it takes.
+    fn plain(&self, effect: Effect, probability: f64, energy: f64) -> Finding {
+        let (share, rms) = (self.percent(energy), self.rms_um(energy));
+        plain(effect, probability, share, rms)
+    }
+}
+
 /// Findings, largest share first. `clamp_energy_m2` is what the clamp's slower feed explains.
 pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> {
     let weights = found.all();
-    let samples: f64 = found
-        .runs
-        .iter()
-        .map(|run| run.deviation_m.len() as f64)
-        .sum();
     let (each, _) = energies(found, &weights);
     let tone_energies: Vec<f64> = found.tones.iter().map(Tone::whole_energy_m2).collect();
     let tone_energy: f64 = tone_energies.iter().sum();
-    let teeth_energy: Vec<f64> = found
+    let teeth_energies: Vec<f64> = found
         .teeth
         .iter()
         .map(|teeth| roughness::energy_m2(teeth, &found.runs))
         .collect();
-    let total = each.iter().sum::<f64>()
-        + tone_energy
-        + teeth_energy.iter().sum::<f64>()
-        + clamp.map_or(0.0, |(_, energy)| energy);
-    let share = |energy: f64| {
-        if total > 0.0 {
-            100.0 * energy / total
-        } else {
-            0.0
-        }
-    };
-    let rms = |energy: f64| (energy / samples).sqrt() * 1e6;
-    let stated = |(at, &item): (usize, &usize)| {
-        let Kind::Cause { cause, site, .. } = &found.items[item].kind else {
-            return None;
-        };
-        if found.tied.contains(&item) {
-            return None;
-        }
-        let words = cause.model().words();
-        let (value, half) = estimate(found, item);
-        let ci95 = [value - half, value + half];
-        // Beyond what a machine can have, it is something else.
-        let effect = effect_of(found, item, value, ci95)?;
-        let params = named(&effect);
-        Some(Finding {
-            cause: *cause,
-            axis: site.axis(),
-            actuators: site.actuators(),
-            probability: probability(found, &weights, at),
-            status: Status::default(),
-            effect_um: statement::largest(found, item),
-            remedy: statement::remedy(*cause, &site.actuators(), value),
-            estimate: Estimate {
-                value,
-                ci95,
-                unit: words.unit,
-            },
-            share_percent: share(each[at]),
-            rms_um: rms(each[at]),
-            indistinguishable_from: look_alikes(found, &weights, at),
-            compensable: compensable(&effect),
-            next_measurement: words.next.to_string(),
-            note: (*cause == Cause::HigherOrderDynamics)
-                .then(|| dynamics_note(found, &weights, at)),
-            params,
-            effects: vec![effect],
-        })
+    let shares = Shares {
+        total: each.iter().sum::<f64>()
+            + tone_energy
+            + teeth_energies.iter().sum::<f64>()
+            + clamp.map_or(0.0, |(_, energy)| energy),
+        samples: found
+            .runs
+            .iter()
+            .map(|run| run.deviation_m.len() as f64)
+            .sum(),
     };
     let out = found
         .chosen
         .par_iter()
         .enumerate()
-        .filter_map(stated)
+        .filter_map(|(at, _)| of_signature(found, &weights, at, each[at], &shares))
         .collect();
-    let out = without_bent(out, unexplained_energy(found, &each), found);
+    let (pieces, unexplained) = unexplained_energy(found, &each);
+    let out = without_bent(out, (pieces, unexplained), found);
     let mut out = join_axes(out);
-    if let Some((clamp, energy)) = clamp {
-        let value = clamp.limit_m_s2 * 1e3;
-        let half = 2.0 * clamp.se_m_s2 * 1e3;
-        let ci95 = [value - half, value + half];
-        let effect = Effect::new(Cause::FeedClamp, Site::Machine, value, ci95, []);
-        let finding = effect
-            .ok()
-            .map(|effect| plain(effect, HIGHEST, share(energy), rms(energy)));
-        out.extend(finding.map(|finding| Finding {
-            effect_um: statement::of_slower_feed(found),
-            ..finding
+    out.extend(clamp.and_then(|(clamp, energy)| of_clamp(found, clamp, energy, &shares)));
+    let hidden_by_pieces = pieces >= PIECES && tone_energy < 9.0 * unexplained;
+    if !hidden_by_pieces {
+        let tones = found.tones.iter().zip(tone_energies);
+        out.extend(tones.filter_map(|(tone, energy)| {
+            let finding = tone_finding(tone, shares.percent(energy), shares.rms_um(energy))?;
+            Some(Finding {
+                effect_um: statement::of_tone(found, tone),
+                ..finding
+            })
         }));
     }
-    let (pieces, energy) = unexplained_energy(found, &each);
-    let hidden_by_pieces = pieces >= PIECES && tone_energy < 9.0 * energy;
-    for (tone, energy) in found
-        .tones
-        .iter()
-        .zip(tone_energies)
-        .filter(|_| !hidden_by_pieces)
-    {
-        let finding = tone_finding(tone, share(energy), rms(energy));
-        out.extend(finding.map(|finding| Finding {
-            effect_um: statement::of_tone(found, tone),
-            ..finding
-        }));
-    }
-    for (teeth, energy) in found.teeth.iter().zip(teeth_energy) {
+    let teeth = found.teeth.iter().zip(teeth_energies);
+    out.extend(teeth.filter_map(|(teeth, energy)| {
         let odds = 0.5 * teeth.significance.powi(2) - 14.0;
-        let effect = teeth_effect(teeth);
-        let finding = effect.map(|effect| plain(effect, sigmoid(odds), share(energy), rms(energy)));
-        out.extend(finding.map(|finding| Finding {
+        Some(Finding {
             effect_um: statement::of_teeth(found, teeth),
-            ..finding
-        }));
-    }
+            ..shares.plain(teeth_effect(teeth)?, sigmoid(odds), energy)
+        })
+    }));
     out.sort_by(|a, b| b.share_percent.total_cmp(&a.share_percent));
     out
+}
+
+/// A chosen explanation that is a cause with one name.
+fn of_signature(
+    found: &Explained,
+    weights: &[f64],
+    at: usize,
+    energy: f64,
+    shares: &Shares,
+) -> Option<Finding> {
+    let item = found.chosen[at];
+    let Kind::Cause { cause, site, .. } = &found.items[item].kind else {
+        return None;
+    };
+    if found.tied.contains(&item) {
+        return None;
+    }
+    let words = cause.model().words();
+    let (value, half) = estimate(found, item);
+    let ci95 = [value - half, value + half];
+    // Beyond what a machine can have, it is something else.
+    let effect = effect_of(found, item, value, ci95)?;
+    let params = named(&effect);
+    Some(Finding {
+        cause: *cause,
+        axis: site.axis(),
+        actuators: site.actuators(),
+        probability: probability(found, weights, at),
+        status: Status::default(),
+        effect_um: statement::largest(found, item),
+        remedy: statement::remedy(*cause, &site.actuators(), value),
+        estimate: Estimate {
+            value,
+            ci95,
+            unit: words.unit,
+        },
+        share_percent: shares.percent(energy),
+        rms_um: shares.rms_um(energy),
+        indistinguishable_from: look_alikes(found, weights, at),
+        compensable: compensable(&effect),
+        next_measurement: words.next.to_string(),
+        note: (*cause == Cause::HigherOrderDynamics).then(|| dynamics_note(found, weights, at)),
+        params,
+        effects: vec![effect],
+    })
+}
+
+/// A clamp on the feed, which the clock shows.
+fn of_clamp(found: &Explained, clamp: Clamp, energy: f64, shares: &Shares) -> Option<Finding> {
+    let value = clamp.limit_m_s2 * 1e3;
+    let half = 2.0 * clamp.se_m_s2 * 1e3;
+    let ci95 = [value - half, value + half];
+    let effect = Effect::new(Cause::FeedClamp, Site::Machine, value, ci95, []).ok()?;
+    Some(Finding {
+        effect_um: statement::of_slower_feed(found),
+        ..shares.plain(effect, HIGHEST, energy)
+    })
 }
 
 /// Number of patterns and their energy, m².

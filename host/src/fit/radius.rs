@@ -336,6 +336,44 @@ fn not_finite<'a>(observations: impl Iterator<Item = &'a Observation> + Clone) -
     })
 }
 
+/// Why nothing is left to be fitted.
+fn nothing_to_fit(groups: &[OfRadius<'_>], options: &Options) -> FitError {
+    match options.train_radius_m {
+        Some(wanted) => FitError::NoSuchRadius {
+            wanted_mm: wanted * 1e3,
+            present_mm: groups
+                .iter()
+                .map(|g| (g.radius_m * 1e9).round() / 1e6)
+                .collect(),
+        },
+        None => FitError::TooFew {
+            observations: 0,
+            parameters: 3,
+        },
+    }
+}
+
+/// How well the other radii predict one; `None` where they alone cannot determine the model.
+fn of_the_others(
+    group: &OfRadius<'_>,
+    own: &Reduction,
+    train: &[&Reduction],
+    options: &Options,
+) -> Result<Option<Sums>, FitError> {
+    let others: Vec<&Reduction> = train
+        .iter()
+        .copied()
+        .filter(|radius| !std::ptr::eq(*radius, own))
+        .collect();
+    match core_of(&others, options) {
+        Ok(fold) => Ok(Some(
+            Beside::not_fitted(group, &fold.model, options.offset).score(group),
+        )),
+        Err(FitError::TooFew { .. } | FitError::Collinear { .. }) => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
 impl RadiusFit {
     /// Fits the model to `observations`.
     ///
@@ -361,19 +399,7 @@ impl RadiusFit {
         let reductions: Vec<Option<Reduction>> = groups.iter().map(reduction).collect();
         let train: Vec<&Reduction> = reductions.iter().flatten().collect();
         if train.is_empty() {
-            return Err(match options.train_radius_m {
-                Some(wanted) => FitError::NoSuchRadius {
-                    wanted_mm: wanted * 1e3,
-                    present_mm: groups
-                        .iter()
-                        .map(|g| (g.radius_m * 1e9).round() / 1e6)
-                        .collect(),
-                },
-                None => FitError::TooFew {
-                    observations: 0,
-                    parameters: 3,
-                },
-            });
+            return Err(nothing_to_fit(&groups, &options));
         }
         if train.iter().any(|radius| !radius.is_finite())
             && let Some(error) = not_finite(observations.iter().filter(|o| fitted(o)))
@@ -395,19 +421,7 @@ impl RadiusFit {
             let predicted = match own {
                 None => Some(beside.score(group)),
                 Some(own) if options.train_radius_m.is_none() && groups.len() > 1 => {
-                    let others: Vec<&Reduction> = train
-                        .iter()
-                        .copied()
-                        .filter(|radius| !std::ptr::eq(*radius, own))
-                        .collect();
-                    // What the other radii alone cannot determine is not predicted.
-                    match core_of(&others, &options) {
-                        Ok(fold) => Some(
-                            Beside::not_fitted(group, &fold.model, options.offset).score(group),
-                        ),
-                        Err(FitError::TooFew { .. } | FitError::Collinear { .. }) => None,
-                        Err(error) => return Err(error),
-                    }
+                    of_the_others(group, own, &train, &options)?
                 }
                 Some(_) => None,
             };

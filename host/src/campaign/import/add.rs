@@ -364,27 +364,20 @@ fn lap(
     };
     let start = options.start_angle_rad.unwrap_or(0.0) + turn.from_rad;
     let shifted = turn.from_rad != 0.0;
-    let start_angle_rad = options
-        .start_angle_rad
-        .or(shifted.then_some(0.0))
-        .map(|_| start.rem_euclid(std::f64::consts::TAU));
+    let start_angle_rad = if shifted {
+        Some(start.rem_euclid(std::f64::consts::TAU))
+    } else {
+        options.start_angle_rad
+    };
     Ok(Lap {
         added: Added {
-            start_angle_rad: if shifted {
-                start_angle_rad
-            } else {
-                options.start_angle_rad
-            },
+            start_angle_rad,
             ..added
         },
         entry: Entry {
             direction,
             arc_rad: turn.arc_rad,
-            start_angle_rad: if shifted {
-                start_angle_rad
-            } else {
-                options.start_angle_rad
-            },
+            start_angle_rad,
             ..options.entry(path, slice)
         },
     })
@@ -543,17 +536,15 @@ fn first_of(entry: &Entry, field: usize) -> Result<f64, CampaignError> {
     Ok(first)
 }
 
-/// Gives the staged files their names and writes `campaign.toml`, its old text kept to the letter.
-fn commit(
+/// The text of a campaign that is there, or the head of a new one.
+fn document(
     dir: &Path,
-    old: Option<&Manifest>,
+    path: &Path,
+    there: bool,
     machine: Option<&str>,
-    staged: Vec<Staged>,
-) -> Result<Vec<Added>, CampaignError> {
-    let path = dir.join("campaign.toml");
-    let io = |e: std::io::Error| CampaignError::io(&path, "written", "a place for a file", &e);
-    let mut document = match old {
-        None => {
+) -> Result<DocumentMut, CampaignError> {
+    Ok(match there {
+        false => {
             let mut document = DocumentMut::new();
             let name = dir
                 .canonicalize()
@@ -565,19 +556,32 @@ fn commit(
             document["campaign"] = Item::Table(head);
             document
         }
-        Some(_) => {
-            let text = std::fs::read_to_string(&path).map_err(io)?;
+        true => {
+            let text = std::fs::read_to_string(path)
+                .map_err(|e| CampaignError::io(path, "written", "a place for a file", &e))?;
             let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
             text.parse().map_err(|e: toml_edit::TomlError| {
                 CampaignError::new(
-                    Place::file(&path),
+                    Place::file(path),
                     Problem::Toml {
                         reason: e.message().to_owned(),
                     },
                 )
             })?
         }
-    };
+    })
+}
+
+/// Gives the staged files their names and writes `campaign.toml`, its old text kept to the letter.
+fn commit(
+    dir: &Path,
+    old: Option<&Manifest>,
+    machine: Option<&str>,
+    staged: Vec<Staged>,
+) -> Result<Vec<Added>, CampaignError> {
+    let path = dir.join("campaign.toml");
+    let io = |e: std::io::Error| CampaignError::io(&path, "written", "a place for a file", &e);
+    let mut document = document(dir, &path, old.is_some(), machine)?;
     let list = document
         .entry("run")
         .or_insert(Item::ArrayOfTables(ArrayOfTables::new()));
