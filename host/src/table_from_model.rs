@@ -43,12 +43,10 @@ enum Share {
 }
 
 fn share(effect: &Effect) -> Share {
-    let cause = effect.cause();
-    match (cause, cause.model().term(effect)) {
-        (Cause::HigherOrderDynamics, _) => Share::Kappa4(24.0 * effect.value()),
-        (_, Some(term)) => Share::Term(term),
-        (_, None) => Share::Nothing,
-    }
+    let model = effect.cause().model();
+    let term = model.term(effect).map(Share::Term);
+    term.or_else(|| model.kappa4_s4(effect).map(Share::Kappa4))
+        .unwrap_or(Share::Nothing)
 }
 
 /// The table of a model.

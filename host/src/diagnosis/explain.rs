@@ -14,7 +14,7 @@ use super::spread;
 use super::survey::{Lag, Prepared, Response, Survey, misfit};
 use super::tangent;
 use super::tone::{self, Tone};
-use crate::causes::{ALL, Cause, Evidence, Harmonics, RunView, Site};
+use crate::causes::{ALL, Evidence, Harmonics, RunView, Site, of_response};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -114,13 +114,10 @@ fn refined_response(found: &Explained, response: Response) -> Response {
         }
     }
     for &item in &found.chosen {
-        let Kind::Cause {
-            cause: Cause::HigherOrderDynamics,
-            ..
-        } = found.items[item].kind
-        else {
-            continue;
-        };
+        match &found.items[item].kind {
+            Kind::Cause { cause, .. } if cause.model().is_response() => {}
+            _ => continue,
+        }
         if let Some(at) = columns
             .iter()
             .position(|&c| c == found.items[item].columns[0])
@@ -291,22 +288,22 @@ fn enter(found: &mut Explained, start: &Start, kinds: &[Kind]) {
     found.chosen = found.enter(before).collect();
     // The data no longer hold what the response has taken in; its column still does.
     if start.own_fourth_order {
-        let fourth = Kind::Cause {
-            cause: Cause::HigherOrderDynamics,
-            site: Site::Machine,
-            shape: Vec::new(),
-        };
-        let columns = fourth.columns_over(&runs);
-        found.nuisance.extend(found.gram.push_all(columns));
+        if let Some(model) = of_response() {
+            let fourth = Kind::Cause {
+                cause: model.cause(),
+                site: Site::Machine,
+                shape: Vec::new(),
+            };
+            let columns = fourth.columns_over(&runs);
+            found.nuisance.extend(found.gram.push_all(columns));
+        }
     } else if found.response.b_s4 != 0.0 {
         restore_fourth_order(found);
     }
     let mut further = Vec::new();
     let no_fourth = start.own_fourth_order || !shows_fourth_order(&views);
     for model in ALL {
-        if model.evidence() != Evidence::Signature
-            || (no_fourth && model.cause() == Cause::HigherOrderDynamics)
-        {
+        if model.evidence() != Evidence::Signature || (no_fourth && model.is_response()) {
             continue;
         }
         let shapes = model.shapes(&views);

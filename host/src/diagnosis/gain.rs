@@ -13,7 +13,7 @@ use super::survey::Response;
 use super::vector::dot;
 use super::veto;
 use crate::campaign::{Campaign, Run};
-use crate::causes::{Cause, Effect};
+use crate::causes::Effect;
 use crate::model_file::{ModelFile, Servo};
 use crate::simulation::machine::Machine;
 use crate::simulation::{CircleTest, SAMPLES_PER_TURN, circle};
@@ -71,7 +71,7 @@ pub fn machine(response: &Response, effects: &[Effect], lag_s: Option<f64>) -> M
     }
     for effect in effects {
         // Already in the response.
-        if effect.cause() != Cause::HigherOrderDynamics {
+        if !effect.cause().model().is_response() {
             effect.cause().model().apply(effect, &mut machine);
         }
     }
@@ -130,7 +130,7 @@ fn fitted(found: &Explained, weights: &[f64], set: &[usize]) -> Option<(Response
             .iter()
             .map(|&c| value(c))
             .collect();
-        if *cause == Cause::HigherOrderDynamics {
+        if cause.model().is_response() {
             response.b_s4 = -2.0 * values[0];
         }
         let size = if values.len() == 2 {
@@ -160,13 +160,7 @@ fn fitted(found: &Explained, weights: &[f64], set: &[usize]) -> Option<(Response
 const CLEAR: f64 = 3.0;
 
 fn is_fourth_order(found: &Explained, item: usize) -> bool {
-    matches!(
-        found.items[item].kind,
-        Kind::Cause {
-            cause: Cause::HigherOrderDynamics,
-            ..
-        }
-    )
+    matches!(&found.items[item].kind, Kind::Cause { cause, .. } if cause.model().is_response())
 }
 
 /// Measures the gain. `start` is the baseline if a model was given; else kv is fitted in each fold.
@@ -464,7 +458,7 @@ pub fn extended_model(
         },
         effects: effects
             .into_iter()
-            .filter(|e| e.cause() != Cause::HigherOrderDynamics)
+            .filter(|e| !e.cause().model().is_response())
             .collect(),
         delay_s,
     }

@@ -55,7 +55,7 @@ pub use recommendation::{Action, Recommendation};
 pub use status::Status;
 
 use crate::campaign::{Campaign, Run};
-use crate::causes::Effect;
+use crate::causes::{Effect, Evidence};
 use crate::model_file::{ModelFile, Servo};
 use crate::simulation::machine::{Machine, MachineError};
 use baseline::{Size, fit_lag};
@@ -598,7 +598,7 @@ fn clamp_energy_m2(campaign: &Campaign, found: &Explained) -> f64 {
 fn knows_clamp(known: &[Effect]) -> bool {
     known
         .iter()
-        .any(|effect| effect.cause() == crate::causes::Cause::FeedClamp)
+        .any(|effect| effect.cause().model().evidence() == Evidence::Duration)
 }
 
 /// The campaign with what the given effects do taken out, by the simulation with and without them.

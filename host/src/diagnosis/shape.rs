@@ -179,18 +179,15 @@ impl<'a> Fit<'a> {
         } else {
             // A scan of a part of the runs sees that part of the gain.
             let share = self.runs.len() as f64 / self.sample.len().max(1) as f64;
-            let best = match (task.cause, task.site) {
-                (Cause::CyclicError, Site::One(axis)) => {
-                    let finest = crate::causes::cyclic_error::finest_wave_per_m(&self.views);
-                    pitch::scan(
-                        &self.runs,
-                        &self.whitened,
-                        self.found.spread.noise_m2,
-                        axis,
-                        finest,
-                    )
-                    .map(|found| (found.gain / share, vec![found.pitch_m]))
-                }
+            let best = match (model.finest_wave_per_m(&self.views), task.site) {
+                (Some(finest), Site::One(axis)) => pitch::scan(
+                    &self.runs,
+                    &self.whitened,
+                    self.found.spread.noise_m2,
+                    axis,
+                    finest,
+                )
+                .map(|found| (found.gain / share, vec![found.pitch_m])),
                 _ => best_of(model.shapes(&self.views), &self.sample),
             };
             match best {

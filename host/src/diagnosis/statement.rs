@@ -4,8 +4,8 @@ use super::finding::Largest;
 use super::roughness::Teeth;
 use super::search::columns_of;
 use super::survey::Prepared;
-use super::tone::{Amplitude, Tone};
-use crate::causes::Cause;
+use super::tone::Tone;
+use crate::causes::{Amplitude, Cause};
 use giotto_shared::Actuator;
 
 /// What to set right, and which way.

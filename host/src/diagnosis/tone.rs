@@ -6,21 +6,13 @@ use super::design_column::Column;
 use super::spread::Spread;
 use super::survey::Prepared;
 use super::vector::{axpy, dot, wave_sum};
+use crate::causes::Amplitude;
 use giotto_shared::Actuator;
 use rayon::prelude::*;
 use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// How the amplitude depends on the run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Amplitude {
-    /// The same in each run: a vibration.
-    Constant,
-    /// ∝ f²/R: the height of a chord's arc, an interpolator.
-    Centripetal,
-}
 
 /// A tone shared by the runs.
 #[derive(Clone, Debug)]

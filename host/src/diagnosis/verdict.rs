@@ -9,8 +9,8 @@ use super::search::{columns_of, evidence, select};
 use super::statement;
 use super::status::{Status, TIE};
 use super::tangent;
-use super::tone::{Amplitude, Tone};
-use crate::causes::{Cause, Effect, Fitted, Seat, Site};
+use super::tone::Tone;
+use crate::causes::{Cause, Effect, Evidence, Fitted, Seat, Site, shown_by};
 use giotto_shared::model::Element;
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -141,9 +141,12 @@ fn of_signature(
         share_percent: shares.percent(energy),
         rms_um: shares.rms_um(energy),
         indistinguishable_from: look_alikes(found, weights, at),
-        compensable: compensable(&effect),
+        compensable: effect.cause().model().is_compensable(&effect),
         next_measurement: words.next.to_string(),
-        note: (*cause == Cause::HigherOrderDynamics).then(|| dynamics_note(found, weights, at)),
+        note: cause
+            .model()
+            .is_response()
+            .then(|| dynamics_note(found, weights, at)),
         params,
         effects: vec![effect],
     })
@@ -154,7 +157,8 @@ fn of_clamp(found: &Explained, clamp: Clamp, energy: f64, shares: &Shares) -> Op
     let value = clamp.limit_m_s2 * 1e3;
     let half = 2.0 * clamp.se_m_s2 * 1e3;
     let ci95 = [value - half, value + half];
-    let effect = Effect::new(Cause::FeedClamp, Site::Machine, value, ci95, []).ok()?;
+    let cause = shown_by(Evidence::Duration)?.cause();
+    let effect = Effect::new(cause, Site::Machine, value, ci95, []).ok()?;
     Some(Finding {
         effect_um: statement::of_slower_feed(found),
         ..shares.plain(effect, HIGHEST, energy)
@@ -242,7 +246,7 @@ fn plain(effect: Effect, probability: f64, share_percent: f64, rms_um: f64) -> F
             .iter()
             .map(|s| (*s).to_string())
             .collect(),
-        compensable: compensable(&effect),
+        compensable: effect.cause().model().is_compensable(&effect),
         next_measurement: words.next.to_string(),
         note: None,
         params: named(&effect),
@@ -260,7 +264,8 @@ pub fn teeth_effect(teeth: &Teeth) -> Option<Effect> {
     let (value, half) = (teeth.height_m * 1e6, 2.0 * teeth.se_m * 1e6);
     let ci95 = [value - half, value + half];
     let below = [("below_mm_s", teeth.below_m_s * 1e3)];
-    Effect::new(Cause::StickSlip, Site::One(teeth.axis), value, ci95, below).ok()
+    let cause = shown_by(Evidence::Roughness)?.cause();
+    Effect::new(cause, Site::One(teeth.axis), value, ci95, below).ok()
 }
 
 fn tone_finding(tone: &Tone, share: f64, rms: f64) -> Option<Finding> {
@@ -271,30 +276,22 @@ fn tone_finding(tone: &Tone, share: f64, rms: f64) -> Option<Finding> {
     let law = sigmoid(tone.law_evidence.min(50.0));
     // The frequency is sharper than the model of it: a part in 1e5 for the clock of the instrument.
     let se_hz = tone.se_hz.hypot(1e-5 * tone.frequency_hz);
-    let on_axis = tone.axis.map_or(Site::Machine, Site::One);
-    let (cause, site, value, half) = match tone.amplitude {
-        Amplitude::Constant => (Cause::Vibration, on_axis, tone.frequency_hz, 2.0 * se_hz),
-        Amplitude::Centripetal => {
-            let period = 1.0 / tone.frequency_hz;
-            let half = 2.0 * se_hz * period * period;
-            (Cause::InterpolationChord, Site::Machine, period, half)
-        }
-    };
-    let other = match tone.amplitude {
-        Amplitude::Constant => Cause::InterpolationChord,
-        Amplitude::Centripetal => Cause::Vibration,
-    };
-    let effect = Effect::new(cause, site, value, [value - half, value + half], params).ok()?;
+    let model = shown_by(Evidence::Tone(tone.amplitude))?;
+    let site = tone
+        .axis
+        .map(Site::One)
+        .filter(|site| model.seat().takes(*site))
+        .unwrap_or(Site::Machine);
+    let [value, half] = model.of_frequency(tone.frequency_hz, se_hz);
+    let ci95 = [value - half, value + half];
+    let effect = Effect::new(model.cause(), site, value, ci95, params).ok()?;
     let mut finding = plain(effect, law, share, rms);
     if tone.law_evidence < 3.0 {
-        finding.indistinguishable_from.push(other.id().to_string());
+        let other = shown_by(Evidence::Tone(tone.amplitude.other()));
+        let name = other.map(|other| other.cause().id().to_string());
+        finding.indistinguishable_from.extend(name);
     }
     Some(finding)
-}
-
-/// Through a term of the table, or through its κ4.
-fn compensable(effect: &Effect) -> bool {
-    effect.cause() == Cause::HigherOrderDynamics || effect.cause().model().term(effect).is_some()
 }
 
 fn sigmoid(log_odds: f64) -> f64 {
