@@ -67,6 +67,7 @@
 //! Programs of machines are rewritten by `giotto-nc`, controllers are spoken to by `giotto-link`, reports are made by
 //! `giotto-report`.
 #![forbid(unsafe_code)]
+#![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 pub mod analysis;
 pub mod campaign;

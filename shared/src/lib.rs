@@ -35,6 +35,7 @@
 //! industrial robots", Trans. CSME 36(1), 2012. SI units throughout unless a name says otherwise.
 #![no_std]
 #![forbid(unsafe_code)]
+#![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 #[cfg(any(test, feature = "std"))]
 extern crate std;

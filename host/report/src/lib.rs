@@ -15,6 +15,7 @@
 //! | `hash` | identity of the data |
 //! | `template.html`, `style.css` | the page |
 #![forbid(unsafe_code)]
+#![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 mod cause_view;
 mod chart;
