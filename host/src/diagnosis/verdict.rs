@@ -1,4 +1,10 @@
 //! From the chosen explanations to findings: estimate, interval, probability, share, look-alikes.
+mod estimate;
+mod joined;
+
+use estimate::estimate;
+use joined::join_axes;
+
 use super::duration::Clamp;
 use super::explained::{Explained, energies};
 use super::finding::{Estimate, Finding, Largest};
@@ -8,12 +14,10 @@ use super::roughness::{self, Teeth};
 use super::search::{columns_of, evidence, select};
 use super::statement;
 use super::status::{Status, TIE};
-use super::tangent;
 use super::tone::Tone;
-use crate::causes::{Cause, Effect, Evidence, Fitted, Seat, Site, shown_by};
+use crate::causes::{Cause, Effect, Evidence, Fitted, Site, shown_by};
 use giotto_shared::model::Element;
 use rayon::prelude::*;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::collections::BTreeMap;
 
 /// No probability is certain: a statement about a machine from one campaign.
@@ -298,78 +302,6 @@ fn sigmoid(log_odds: f64) -> f64 {
     (1.0 / (1.0 + (-log_odds).exp())).min(HIGHEST)
 }
 
-/// Ratio of variances, by the runs and by the model, above which the former is believed.
-const ROBUST: f64 = 1.5;
-
-/// Value and half-width of its 95 % interval, in the contract's unit.
-fn estimate(found: &Explained, item: usize) -> (f64, f64) {
-    let columns = columns_of(&found.nuisance, &found.items, &found.chosen);
-    let own = &found.items[item].columns;
-    let at: Vec<usize> = own
-        .iter()
-        .filter_map(|c| columns.iter().position(|other| other == c))
-        .collect();
-    let dof = (found.runs.len().saturating_sub(columns.len())).max(1) as f64;
-    let t = StudentsT::new(0.0, 1.0, dof).map_or(2.0, |t| t.inverse_cdf(0.975));
-    // Nuisance and chosen come first with the tangents, too.
-    let (covariance, ..) = tangent::covariance(found);
-    let robust = robust_variances(found);
-    let value: Vec<f64> = at.iter().map(|&i| found.solution.coefficients[i]).collect();
-    // The scatter of the runs' pulls is itself uncertain by a quarter or so: it counts where it says clearly more.
-    let variance = |i: usize| {
-        let robust = robust.get(i).copied().unwrap_or(0.0);
-        if robust > ROBUST * covariance[(i, i)] {
-            robust
-        } else {
-            covariance[(i, i)]
-        }
-    };
-    let doubt = match &found.items[item].kind {
-        Kind::Cause { cause, .. } => cause.model().relative_doubt(),
-        Kind::Pattern(_) => 0.0,
-    };
-    let half = |value: f64, se: f64| (t * se).hypot(1.96 * doubt * value);
-    match (value.as_slice(), at.as_slice()) {
-        ([only], [i]) => (*only, half(*only, variance(*i).sqrt())),
-        ([a, b], [i, j]) => {
-            let size = a.hypot(*b).max(f64::MIN_POSITIVE);
-            let se = ((a / size).powi(2) * variance(*i) + (b / size).powi(2) * variance(*j)).sqrt();
-            (size, half(size, se))
-        }
-        _ => (f64::NAN, f64::NAN),
-    }
-}
-
-/// Variances of the coefficients by the scatter of the runs' pulls (sandwich, with the run as the cluster).
-fn robust_variances(found: &Explained) -> Vec<f64> {
-    let (bread, columns, coefficients) = tangent::covariance(found);
-    let n = columns.len();
-    let mut meat = nalgebra::DMatrix::<f64>::zeros(n, n);
-    for run in 0..found.runs.len() {
-        let white = found.gram.white_of(run);
-        let pull: Vec<f64> = columns
-            .iter()
-            .map(|&a| {
-                let fitted: f64 = columns
-                    .iter()
-                    .zip(&coefficients)
-                    .map(|(&b, x)| white.at(a, b) * x)
-                    .sum();
-                white.at(a, 0) - fitted
-            })
-            .collect();
-        for i in 0..n {
-            for j in 0..n {
-                meat[(i, j)] += pull[i] * pull[j];
-            }
-        }
-    }
-    let runs = found.runs.len() as f64;
-    let small = runs / (runs - n as f64).max(1.0);
-    let sandwich = bread * meat * bread * small;
-    (0..n).map(|i| sandwich[(i, i)]).collect()
-}
-
 /// Partial F of the fourth-order term beside all others (variances as estimated between runs), and what kind of
 /// chain has such a response.
 fn dynamics_note(found: &Explained, weights: &[f64], at: usize) -> String {
@@ -530,51 +462,6 @@ pub fn effect_with(
         .into_iter()
         .map(|(parameter, value)| (parameter.name, value));
     Effect::new(*cause, *site, value, ci95, stated).ok()
-}
-
-/// One finding where both axes show the same cause of the same size.
-fn join_axes(findings: Vec<Finding>) -> Vec<Finding> {
-    let mut out: Vec<Finding> = Vec::new();
-    for finding in findings {
-        let twin = out.iter_mut().find(|other| {
-            let one_of_several = other.axis.is_some() || other.actuators.len() > 1;
-            // Where circles tell the slides apart, each keeps its own.
-            let apart = finding.cause.model().seat() == Seat::MachineOrOne;
-            !apart && other.cause == finding.cause && one_of_several && finding.axis.is_some()
-        });
-        match twin {
-            Some(twin) if alike(twin, &finding) => {
-                let halves =
-                    [&twin.estimate, &finding.estimate].map(|e| 0.5 * (e.ci95[1] - e.ci95[0]));
-                let value = 0.5 * (twin.estimate.value + finding.estimate.value);
-                let half = 0.5 * halves[0].hypot(halves[1]);
-                twin.axis = None;
-                for actuator in finding.actuators {
-                    if !twin.actuators.contains(&actuator) {
-                        twin.actuators.push(actuator);
-                    }
-                }
-                if finding.effect_um.max > twin.effect_um.max {
-                    twin.effect_um = finding.effect_um;
-                }
-                twin.remedy = statement::remedy(twin.cause, &twin.actuators, value);
-                twin.estimate.value = value;
-                twin.estimate.ci95 = [value - half, value + half];
-                twin.share_percent += finding.share_percent;
-                twin.rms_um = twin.rms_um.hypot(finding.rms_um);
-                twin.probability = twin.probability.max(finding.probability);
-                twin.effects.extend(finding.effects);
-            }
-            _ => out.push(finding),
-        }
-    }
-    out
-}
-
-fn alike(a: &Finding, b: &Finding) -> bool {
-    let width = |f: &Finding| f.estimate.ci95[1] - f.estimate.ci95[0];
-    let off = (a.estimate.value - b.estimate.value).abs();
-    off < width(a) + width(b) || off < 0.1 * a.estimate.value.abs()
 }
 
 #[cfg(test)]
