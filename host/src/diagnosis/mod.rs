@@ -249,10 +249,7 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
             .map(|(item, other)| tie_words(found, *item, *other)),
     );
     let model = extended_model(&session.campaign, &survey, found, &baseline, &stated);
-    let mut picture = picture::draw(&session.campaign, &seen, found);
-    picture
-        .iter_mut()
-        .for_each(|run| run.index = session.places[run.index]);
+    let picture = pictured(&session.campaign, &session.places, &seen, found);
     // Where no run can be left out, what the search leaves of the runs it saw.
     let in_sample_um = misfit::rms_um(found);
     let heldout_um = |of: &dyn Fn(&Gain) -> f64| proof.as_ref().map_or(in_sample_um, of);
@@ -284,6 +281,20 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
     };
     diagnosis.recommendation = recommendation::of(&diagnosis);
     Ok(diagnosis)
+}
+
+/// What the plots of a report draw, run by run; `places` are those of the runs in the given campaign.
+fn pictured(
+    campaign: &Campaign,
+    places: &[usize],
+    seen: &Campaign,
+    found: &Explained,
+) -> Vec<picture::RunPicture> {
+    let mut picture = picture::draw(campaign, seen, found);
+    for run in &mut picture {
+        run.index = places[run.index];
+    }
+    picture
 }
 
 /// Whether a model holds something that can be called real: causes that are proven on runs left out, or, without any, a
