@@ -83,6 +83,9 @@ fn plants() -> [(&'static str, Plant, ModelFile, f64); 3] {
     ]
 }
 
+/// The machine goes no deeper into the material than before, µm.
+const DEEPER_UM: f64 = 1.0;
+
 #[test]
 fn contour_errors_are_within_their_bars() {
     let mut failed = Vec::new();
@@ -106,17 +109,7 @@ fn contour_errors_are_within_their_bars() {
             );
             let before = deviations(plant, &program, &program);
             let after = deviations(plant, &text, &program);
-            let bar = match (plant_name, name) {
-                // A single lag goes straight on to the place where its command stands still: the chord of what it is
-                // behind lies δ/4 off the arc, and no shape of the last stretch leaves less than two thirds of that.
-                ("lag", _) if stop => 25.0,
-                (_, _) if stop => 10.0,
-                // The offset changes its side in one joint: twice the step.
-                ("lag and average", "S chain") => 8.0,
-                // A half turn of 5 mm takes four times as long as the machine answers.
-                (_, "slot") => bar + 0.5,
-                _ => bar,
-            };
+            let bar = if stop { 10.0 } else { bar };
             for (was, is) in before.iter().zip(&after) {
                 if was.most_um() < 1.0 {
                     continue;
@@ -130,15 +123,10 @@ fn contour_errors_are_within_their_bars() {
                     "{plant_name}, {name}: {was:.2?} -> {is:.2?}: {share:.2} %, {said:.2} % said"
                 );
                 let deeper = (is.left_um - was.left_um).max(is.right_um - was.right_um);
-                let room = if stop && plant_name == "lag" {
-                    4.0
-                } else {
-                    2.0
-                };
                 if share > bar {
                     failed.push(format!("{plant_name}, {name}: {share:.2} % of {bar} %"));
                 }
-                if deeper > room {
+                if deeper > DEEPER_UM {
                     failed.push(format!("{plant_name}, {name}: {deeper:.2} µm deeper"));
                 }
             }

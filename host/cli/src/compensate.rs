@@ -45,6 +45,9 @@ pub struct Args {
     /// A code of the machine's own that moves nothing, as M150 or G77; may be given again.
     #[arg(long, value_name = "CODE", value_parser = |text: &str| text.parse::<Code>())]
     harmless: Vec<Code>,
+    /// Keep F to the last where an arc ends at a stop; up to a quarter of a lag's correction then remains there.
+    #[arg(long)]
+    full_feed_to_stops: bool,
     /// Hold the output against the rules of the controller it is for; exit 5 where it would be refused.
     #[arg(long, value_enum)]
     check: Option<Target>,
@@ -104,6 +107,7 @@ impl Args {
             absolute_centres: self.centres == Centres::Absolute,
             printer: matches!(self.purpose, Some(Purpose::Printer)),
             harmless: self.harmless.clone(),
+            slow_to_stops: !self.full_feed_to_stops,
         };
         for (name, value) in [
             ("--acceleration", options.acceleration_mm_s2),

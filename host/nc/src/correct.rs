@@ -3,7 +3,6 @@ use super::blend::{Entry, Exit, Piece, pieces};
 use super::inverse::{Inverse, Twin};
 use super::state::{Action, Arc, Plane, Straight};
 use super::steps::{Meeting, Side, Step};
-use super::transition::Transition;
 use super::word::{Line, Sort};
 use super::{Fate, Left, Options};
 
@@ -28,10 +27,9 @@ impl Plan {
         let share = |remaining_mm: f64| remaining_mm / self.twin.delta_mm.abs();
         let exit = match self.exit {
             Exit::Held => 0.0,
-            Exit::RunOut { remaining_mm, .. } => share(remaining_mm),
-            Exit::Inside { remaining_mm, .. } => share(remaining_mm),
+            Exit::RunOut { step, .. } | Exit::Inside { step, .. } => share(step.remaining_mm),
         };
-        share(self.entry.remaining_mm).max(exit)
+        share(self.entry.step.remaining_mm).max(exit)
     }
 
     pub(super) fn fate(&self, arc: &Arc, blocks: usize) -> Fate {
@@ -47,6 +45,8 @@ impl Plan {
 
 /// A line keeps at least this much of its length behind a run-out, mm.
 const LINE_LEFT_MM: f64 = 0.1;
+/// What a step at one end of an arc may take of its length, so that one at the other end has room.
+const ROOM_SHARE: f64 = 0.45;
 
 /// A line as it is run, and what the law makes of its arc.
 #[derive(Clone, Debug)]
@@ -142,7 +142,7 @@ impl Room<'_, '_> {
             return None;
         };
         let (entry, exit) = (self.entry(i, arc, twin), self.exit(i, arc, twin));
-        let room = entry.length_mm + exit.inside_mm() < arc.length_mm();
+        let room = entry.step.length_mm + exit.inside_mm() < arc.length_mm();
         let long = |piece: &Piece| piece.length_mm >= self.law.least_mm;
         let fits = room && pieces(arc, twin.delta_mm, entry, exit).iter().all(long);
         Some(if fits {
@@ -160,12 +160,14 @@ impl Room<'_, '_> {
         (side * faster * faster / arc.radius_mm, -side * delta_mm)
     }
 
-    fn step(&self, f: f64, before: (f64, f64), behind: (f64, f64), side: Side) -> Step {
+    /// The step on a stretch of `room_mm` where two stretches meet, each a curvature and an offset.
+    fn step(&self, f: f64, stretches: [(f64, f64); 2], side: Side, room_mm: f64) -> Step {
         self.law.inverse.step(&Meeting {
             feed_mm_s: f,
-            curvature: [before.0, behind.0],
-            offset_mm: [before.1, behind.1],
+            curvature: stretches.map(|s| s.0),
+            offset_mm: stretches.map(|s| s.1),
             side,
+            room_mm,
         })
     }
 
@@ -173,6 +175,7 @@ impl Room<'_, '_> {
         let f = arc.feed_mm_s;
         let own = Self::left(arc, twin.delta_mm, f);
         let straight = (0.0, 0.0);
+        let room = ROOM_SHARE * arc.length_mm();
         let (from_mm, held, step) = match self.neighbour(i, arc, false) {
             Neighbour::Corrected(before, other) => {
                 // The same offset in space is outward of one and inward of the other where the turn changes.
@@ -180,25 +183,24 @@ impl Room<'_, '_> {
                 if (twin.delta_mm - from_mm).abs() < SAME_OFFSET_MM {
                     return Entry {
                         from_mm,
-                        length_mm: 0.0,
-                        shape: Transition::SMOOTH,
-                        remaining_mm: 0.0,
+                        step: Step::NONE,
                         held: true,
                     };
                 }
                 let before = Self::left(before, other.delta_mm, f);
-                (from_mm, true, self.step(f, before, own, Side::Behind))
+                (from_mm, true, self.step(f, [before, own], Side::Behind, room))
             }
             Neighbour::Line { .. } | Neighbour::OtherArc => {
-                (0.0, false, self.step(f, straight, own, Side::Behind))
+                (0.0, false, self.step(f, [straight, own], Side::Behind, room))
             }
-            Neighbour::Rest => (0.0, false, self.step(f, (own.0, 0.0), own, Side::FromRest)),
+            Neighbour::Rest => {
+                let stretches = [(own.0, 0.0), own];
+                (0.0, false, self.step(f, stretches, Side::FromRest, room))
+            }
         };
         Entry {
             from_mm,
-            length_mm: step.length_mm,
-            shape: step.shape,
-            remaining_mm: step.remaining_mm,
+            step,
             held,
         }
     }
@@ -207,43 +209,34 @@ impl Room<'_, '_> {
         let f = arc.feed_mm_s;
         let own = Self::left(arc, twin.delta_mm, f);
         let inside = |curvature: f64, side: Side| {
-            let step = self.step(f, own, (curvature, 0.0), side);
+            let room = ROOM_SHARE * arc.length_mm();
             Exit::Inside {
-                length_mm: step.length_mm,
-                shape: step.shape,
-                remaining_mm: step.remaining_mm,
+                step: self.step(f, [own, (curvature, 0.0)], side, room),
                 tail_mm: self.law.tail_mm,
             }
         };
         match self.neighbour(i, arc, true) {
             Neighbour::Corrected(..) => Exit::Held,
             Neighbour::Line { line, along, clean } => {
-                let step = self.step(f, own, (0.0, 0.0), Side::Behind);
                 let [first, second, third] = arc.plane.axes();
-                let long = |s: f64, e: f64, t: f64, u: f64| {
-                    (e - s).hypot(u - t) > step.length_mm + LINE_LEFT_MM
-                };
-                let reaches = match (
+                let length = match (
                     line.start[first],
                     line.end[first],
                     line.start[second],
                     line.end[second],
                 ) {
-                    (Some(s), Some(e), Some(t), Some(u)) => long(s, e, t, u),
-                    _ => false,
+                    (Some(s), Some(e), Some(t), Some(u)) => (e - s).hypot(u - t),
+                    _ => 0.0,
                 };
+                let room = length - LINE_LEFT_MM;
+                let step = self.step(f, [own, (0.0, 0.0)], Side::Behind, room);
                 let level = line.start[third] == line.end[third];
                 let as_fast = line
                     .feed_mm_s
                     .is_none_or(|speed| (speed / f - 1.0).abs() < 1e-9);
                 let plain = line.bare && clean && line.absolute && arc.modes.absolute;
-                if plain && level && reaches && as_fast {
-                    Exit::RunOut {
-                        length_mm: step.length_mm,
-                        shape: step.shape,
-                        remaining_mm: step.remaining_mm,
-                        along,
-                    }
+                if plain && level && step.length_mm < room && as_fast {
+                    Exit::RunOut { step, along }
                 } else {
                     inside(0.0, Side::Before)
                 }

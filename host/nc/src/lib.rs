@@ -21,6 +21,8 @@ mod emit;
 mod engine;
 mod flow;
 mod inverse;
+mod joint;
+mod least_squares;
 mod left;
 mod mark;
 #[cfg(test)]
@@ -68,6 +70,9 @@ pub struct Options {
     pub printer: bool,
     /// Codes of the machine's own that move nothing.
     pub harmless: Vec<Code>,
+    /// The last stretch of an arc before a stop may be run more slowly than F says, where the machine would leave the
+    /// circle otherwise.
+    pub slow_to_stops: bool,
 }
 
 impl Default for Options {
@@ -80,6 +85,7 @@ impl Default for Options {
             absolute_centres: false,
             printer: false,
             harmless: Vec::new(),
+            slow_to_stops: true,
         }
     }
 }

@@ -227,7 +227,7 @@ fn blocks(
             motion.pose
         )
     };
-    let speed = match plan.twin.feed_factor {
+    let speed_of = |piece: &Piece| match plan.twin.feed_factor * piece.speed {
         1.0 => motion.speed.clone(),
         factor => format!(
             "[{},{}]",
@@ -244,6 +244,7 @@ fn blocks(
     let mut from = start;
     for (k, piece) in pieces.iter().enumerate() {
         let last = k + 1 == pieces.len();
+        let speed = speed_of(piece);
         // The end of the arc, if it is where it was, as it was written.
         let to = if last && piece.end == arc.end {
             motion.to.clone()
