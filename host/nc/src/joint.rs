@@ -104,29 +104,37 @@ pub(super) struct Corner {
     /// The step begins so far before the joint.
     pub(super) lead: f64,
     pub(super) pace: Pace,
-    /// Way along the path in a unit of the command's own way, before the step and behind it: where the command runs beside
-    /// a circle at the feed, it turns about its centre at another rate.
-    pub(super) rates: [f64; 2],
+    /// The command runs at the feed, beside a circle as well, and so turns about its centre at another rate.
+    pub(super) at_feed: bool,
 }
 
 impl Corner {
-    /// Way along the path where the command has made so much behind the joint; the rate changes evenly along the step.
-    fn along(&self, way: f64, length: f64) -> f64 {
-        let [before, behind] = self.rates;
-        let change = 0.5 * (behind - before) / length;
-        if self.lead > 0.0 {
-            let inside = way.clamp(-length, 0.0);
-            let outside = before * (way - inside).min(0.0) + behind * way.max(0.0);
-            behind * inside + change * inside * inside + outside
-        } else {
-            let inside = way.clamp(0.0, length);
-            let outside = before * way.min(0.0) + behind * (way - inside).max(0.0);
-            before * inside + change * inside * inside + outside
+    /// Ways along the path where the command has made these ways, 0 at the joint, with a step of a length and a shape.
+    fn along(&self, ways: &[f64], length: f64, shape: Transition) -> Vec<f64> {
+        if !self.at_feed {
+            return ways.to_vec();
         }
+        let rise = self.offset[1] - self.offset[0];
+        let rate = |way: f64| {
+            let offset = self.offset[0] + rise * shape.at((way + self.lead) / length);
+            (1.0 - self.curvature_at(way) * offset).recip()
+        };
+        let joint = ways.partition_point(|way| *way < 0.0);
+        let mut along = vec![0.0; ways.len()];
+        let (mut from, mut place) = (0.0, 0.0);
+        for k in joint..ways.len() {
+            place += (ways[k] - from) * rate(place);
+            (from, along[k]) = (ways[k], place);
+        }
+        (from, place) = (0.0, 0.0);
+        for k in (0..joint).rev() {
+            // The rate before the joint.
+            place += (ways[k] - from) * rate(place.min(-f64::MIN_POSITIVE));
+            (from, along[k]) = (ways[k], place);
+        }
+        along
     }
-}
 
-impl Corner {
     fn curvature_at(&self, way: f64) -> f64 {
         self.curvature[usize::from(way >= 0.0)]
     }
@@ -168,8 +176,8 @@ pub(super) struct Joint {
 }
 
 impl Joint {
-    /// Of a step over `length` units.
-    pub(super) fn new(chain: Chain, corner: Corner, length: f64) -> Self {
+    /// Of a step over `length` units, along which the command makes its way as along a step of shape `guess`.
+    pub(super) fn new(chain: Chain, corner: Corner, length: f64, guess: Transition) -> Self {
         let pace = corner.pace;
         let begin = pace.time_before(corner.lead);
         // A line is travelled straight on; a circle must be in its stride.
@@ -180,13 +188,14 @@ impl Joint {
         let end = pace.time_behind(length - corner.lead) + 3.0 * chain.delay() + 1.0;
         let all = ((end - begin + settling) / STEP) as usize + 1;
         let skipped = (settling / STEP) as usize;
-        let way = |k: usize| {
-            let time = k as f64 * STEP + begin - settling;
-            corner.along(pace.way(time), length)
-        };
-        let command: Vec<([f64; 2], [f64; 2])> = (0..all)
-            .map(|k| {
-                let (p, n) = corner.path(way(k));
+        let ways: Vec<f64> = (0..all)
+            .map(|k| pace.way(k as f64 * STEP + begin - settling))
+            .collect();
+        let ways = corner.along(&ways, length, guess);
+        let command: Vec<([f64; 2], [f64; 2])> = ways
+            .iter()
+            .map(|way| {
+                let (p, n) = corner.path(*way);
                 let o = corner.offset[0];
                 ([p[0] + o * n[0], p[1] + o * n[1]], n)
             })
@@ -208,7 +217,7 @@ impl Joint {
             chain,
             corner,
             length,
-            ways: (skipped..all).map(way).collect(),
+            ways: ways[skipped..].to_vec(),
             missing,
             normals,
         }

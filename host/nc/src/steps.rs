@@ -129,10 +129,10 @@ pub(super) fn base_length(chain: Chain) -> f64 {
                 offset: [0.0, -0.5 * kappa2 * k],
                 lead: 0.0,
                 pace: Pace::Through,
-                rates: [1.0; 2],
+                at_feed: true,
             };
             let errors = [2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0]
-                .map(|length| (length, Joint::new(chain, corner, length).best(&even(2)).1));
+                .map(|length| (length, Joint::new(chain, corner, length, Transition::SMOOTH).best(&even(2)).1));
             let least = errors.iter().map(|e| e.1).fold(f64::INFINITY, f64::min);
             errors
                 .iter()
@@ -292,7 +292,7 @@ impl Search {
         found
     }
 
-    fn joint(&self, length: f64, speed: f64) -> Joint {
+    fn joint(&self, length: f64, speed: f64, guess: Transition) -> Joint {
         let ramp = self.ramp;
         let (lead, pace) = match self.side {
             Side::Behind => (0.0, Pace::Through),
@@ -312,13 +312,9 @@ impl Search {
             offset: self.offset,
             lead,
             pace,
-            rates: if self.at_feed {
-                [0, 1].map(|i| (1.0 - self.curvature[i] * self.offset[i]).recip())
-            } else {
-                [1.0; 2]
-            },
+            at_feed: self.at_feed,
         };
-        Joint::new(self.chain, corner, length)
+        Joint::new(self.chain, corner, length, guess)
     }
 
     /// The best of the candidates that keep the acceleration, longer ones where none does.
@@ -333,9 +329,19 @@ impl Search {
                 if best.is_some() && length > self.room {
                     continue;
                 }
-                let (shape, left) = self.joint(length, speed).best(&even(*nodes));
-                let gentle = shape.curvature() <= limit * length * length;
-                if gentle && best.is_none_or(|b| left < WORTH * b.left) {
+                let (guess, _) = self
+                    .joint(length, speed, Transition::SMOOTH)
+                    .best(&even(*nodes));
+                let (shape, left) = self.joint(length, speed, guess).best(&even(*nodes));
+                let fits = |shape: Transition| shape.curvature() <= limit * length * length;
+                let (shape, left) = if fits(shape) {
+                    (shape, left)
+                } else {
+                    let smooth = Transition::SMOOTH;
+                    let joint = self.joint(length, speed, smooth);
+                    (smooth, joint.remaining(smooth))
+                };
+                if fits(shape) && best.is_none_or(|b| left < WORTH * b.left) {
                     best = Some(Found {
                         length,
                         shape,
@@ -354,7 +360,7 @@ impl Search {
         let shape = Transition::SMOOTH;
         let length = (shape.curvature() / limit).sqrt();
         // What is longer than the machine remembers is as good as steady.
-        let left = self.joint(length.min(64.0), speed).remaining(shape);
+        let left = self.joint(length.min(64.0), speed, shape).remaining(shape);
         Found {
             length,
             shape,

@@ -384,15 +384,15 @@ fn halves_of_a_circle_share_their_offset() {
     let [
         Fate::Corrected {
             delta_mm,
-            blocks: 7,
+            blocks: 9,
             ..
         },
-        Fate::Corrected { blocks: 6, .. },
+        Fate::Corrected { blocks: 8, .. },
     ] = fates[..]
     else {
         panic!("{fates:?}")
     };
-    let first = &arcs(&text)[6];
+    let first = &arcs(&text)[8];
     assert!((first.end[0] + 20.0 + delta_mm).abs() < 1e-5, "{text}");
     let last = arcs(&text).last().unwrap().end;
     assert_eq!(last, [20.0, 0.0]);
