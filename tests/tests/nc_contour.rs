@@ -1,7 +1,7 @@
 //! What is left of contour errors, on a plant whose laws are not the host's: a lag, a lag behind an average, second order.
 use giotto::model_file::{ModelFile, Servo};
-use giotto_nc::{Fate, Options};
-use giotto_tests::nc::contour::{Plant, deviations};
+use giotto_nc::{Fate, FreeSide, Leads, Led, Options};
+use giotto_tests::nc::contour::{Plant, deviations, wall_um};
 use giotto_tests::nc::model;
 
 /// A shape, whether it begins or ends at a stop on its arc, and its moves.
@@ -133,4 +133,44 @@ fn contour_errors_are_within_their_bars() {
         }
     }
     assert!(failed.is_empty(), "{failed:#?}");
+}
+
+/// With leads a hole and a boss that begin and end at a stop are round, as far as the plain part of a circle is.
+#[test]
+fn leads_make_the_wall_round() {
+    for (plant_name, plant, model, bar) in plants() {
+        for (side, code, radius) in [
+            (FreeSide::Inside, "G3", 12.0),
+            (FreeSide::Inside, "G2", 8.0),
+            (FreeSide::Outside, "G2", 10.0),
+            (FreeSide::Outside, "G3", 15.0),
+        ] {
+            let hole = side == FreeSide::Inside;
+            let far = if hole { 0.0 } else { radius + 8.0 };
+            let program = format!(
+                "G21 G90 G17 G94 F1500\nG0 X{far} Y0\nG1 X{radius}\n{code} X{radius} Y0 I-{radius} J0\nG1 X{far}\n"
+            );
+            let options = Options {
+                acceleration_mm_s2: 5000.0,
+                leads: Leads::On(side),
+                ..Options::default()
+            };
+            let result = giotto_nc::compensate(program.as_bytes(), &model, &options);
+            let text = String::from_utf8(result.program).unwrap();
+            assert!(
+                matches!(result.arcs[0].fate, Fate::Corrected { led: Led::Tangent, .. }),
+                "{:?}",
+                result.arcs
+            );
+            let was = wall_um(plant, &program, [0.0; 2], radius, hole);
+            let is = wall_um(plant, &text, [0.0; 2], radius, hole);
+            let most = |[least, most]: [f64; 2]| f64::max(-least, most);
+            let share = 100.0 * most(is) / most(was);
+            println!("{plant_name}, {side:?} {radius}: {was:.2?} -> {is:.2?}: {share:.2} %");
+            assert!(share <= bar, "{plant_name}, {side:?}: {share:.2} %\n{text}");
+            // No deeper than before, or than the circle itself.
+            let deeper = (-is[0]) - f64::max(-was[0], 0.0);
+            assert!(deeper <= DEEPER_UM, "{plant_name}, {side:?}: {deeper:.2} µm deeper");
+        }
+    }
 }

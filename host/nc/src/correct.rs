@@ -4,7 +4,7 @@ use super::inverse::{Inverse, Twin};
 use super::state::{Action, Arc, Plane, Straight};
 use super::steps::{Meeting, Side, Step};
 use super::word::{Line, Sort};
-use super::{Fate, Left, Options};
+use super::{Fate, FreeSide, Led, Left, Options};
 
 /// Smallest correction worth a block, mm.
 const NEGLIGIBLE_MM: f64 = 5e-4;
@@ -19,6 +19,8 @@ pub(super) struct Plan {
     pub(super) twin: Twin,
     pub(super) entry: Entry,
     pub(super) exit: Exit,
+    /// The machine stands where it begins, and where it ends.
+    pub(super) rests: [bool; 2],
 }
 
 impl Plan {
@@ -32,13 +34,14 @@ impl Plan {
         share(self.entry.step.remaining_mm).max(exit)
     }
 
-    pub(super) fn fate(&self, arc: &Arc, blocks: usize) -> Fate {
+    pub(super) fn fate(&self, arc: &Arc, blocks: usize, led: Led) -> Fate {
         Fate::Corrected {
             radius_mm: arc.radius_mm,
             feed_mm_s: arc.feed_mm_s,
             delta_mm: self.twin.delta_mm,
             blocks,
             joint_share: self.joint_share(),
+            led,
         }
     }
 }
@@ -56,6 +59,8 @@ pub(super) struct Visit<'a> {
     pub(super) line: Line<'a>,
     pub(super) action: Action,
     pub(super) twin: Option<Result<Twin, Left>>,
+    /// Where the comment before it says that there is no material.
+    pub(super) free_side: Option<FreeSide>,
 }
 
 impl<'a> Visit<'a> {
@@ -70,6 +75,7 @@ impl<'a> Visit<'a> {
             line,
             action,
             twin,
+            free_side: None,
         }
     }
 
@@ -146,7 +152,14 @@ impl Room<'_, '_> {
         let long = |piece: &Piece| piece.length_mm >= self.law.least_mm;
         let fits = room && pieces(arc, twin.delta_mm, entry, exit).iter().all(long);
         Some(if fits {
-            Ok(Plan { twin, entry, exit })
+            let rests = [false, true]
+                .map(|after| matches!(self.neighbour(i, arc, after), Neighbour::Rest));
+            Ok(Plan {
+                twin,
+                entry,
+                exit,
+                rests,
+            })
         } else {
             Err(Left::TooShort)
         })

@@ -22,6 +22,7 @@ mod engine;
 mod flow;
 mod inverse;
 mod joint;
+mod lead;
 mod least_squares;
 mod left;
 mod mark;
@@ -39,6 +40,7 @@ mod transition;
 mod word;
 
 use giotto::model_file::ModelFile;
+pub use lead::{FreeSide, Leads, Led};
 pub use left::{Because, Code, Left};
 pub use mark::{Mark, marked};
 use std::io;
@@ -73,6 +75,8 @@ pub struct Options {
     /// The last stretch of an arc before a stop may be run more slowly than F says, where the machine would leave the
     /// circle otherwise.
     pub slow_to_stops: bool,
+    /// Leads of full circles that begin or end at a stop; not in RAPID.
+    pub leads: Leads,
 }
 
 impl Default for Options {
@@ -86,6 +90,7 @@ impl Default for Options {
             printer: false,
             harmless: Vec::new(),
             slow_to_stops: true,
+            leads: Leads::No,
         }
     }
 }
@@ -114,6 +119,8 @@ pub enum Fate {
         blocks: usize,
         /// Largest share of `delta_mm` that is expected to remain as an error where the arc meets its neighbours.
         joint_share: f64,
+        /// Its leads.
+        led: Led,
     },
     /// As it was.
     Left(Left),

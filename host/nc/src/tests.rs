@@ -20,7 +20,7 @@ pub(super) fn model(servo: Servo) -> ModelFile {
 }
 
 /// κ2 = 533e-6 s², as a lag of 23 ms.
-fn lag() -> ModelFile {
+pub(super) fn lag() -> ModelFile {
     model(Servo::Lag { kv_per_s: 43.3 })
 }
 

@@ -312,3 +312,31 @@ pub fn deviations(plant: Plant, program: &str, nominal: &str) -> Vec<Deviation> 
     };
     driven_chains.iter().zip(&meant).map(one).collect()
 }
+
+/// What the plant leaves of the wall of a circle about a centre, µm, positive where material is left, negative where it goes
+/// too deep; the wall is cut by all moves but rapids. `hole`: the material lies outside.
+///
+/// # Panics
+/// The program does not go all the way round.
+pub fn wall_um(plant: Plant, program: &str, centre: [f64; 2], radius: f64, hole: bool) -> [f64; 2] {
+    const PARTS: usize = 720;
+    let mut reached = [f64::NAN; PARTS];
+    for chain in chains(program) {
+        for p in driven(plant, &chain) {
+            let [x, y] = [p[0] - centre[0], p[1] - centre[1]];
+            let turn = y.atan2(x) / std::f64::consts::TAU;
+            let part = (turn.rem_euclid(1.0) * PARTS as f64) as usize % PARTS;
+            let off = if hole {
+                radius - x.hypot(y)
+            } else {
+                x.hypot(y) - radius
+            };
+            // NaN is below all.
+            reached[part] = off.min(reached[part]);
+        }
+    }
+    reached.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], off| {
+        assert!(!off.is_nan(), "not all the way round in\n{program}");
+        [least.min(off * 1e3), most.max(off * 1e3)]
+    })
+}

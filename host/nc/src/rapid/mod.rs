@@ -14,7 +14,7 @@ use super::correct::{Law, Plan, Visit, decide};
 use super::mark::{self, Mark};
 use super::state::{Action, Arc};
 use super::word::{Line, Sort};
-use super::{Compensated, Fate, Options, Report, inverse::Inverse};
+use super::{Compensated, Fate, Led, Options, Report, inverse::Inverse};
 use giotto::model_file::ModelFile;
 use read::{Motion, Reader};
 use std::io;
@@ -174,7 +174,7 @@ pub fn compensate(program: &[u8], model: &ModelFile, options: &Options) -> Compe
                 );
                 out.program.extend_from_slice(&text);
                 from = pieces.last().map(|p| p.end);
-                Some(plan.fate(arc, pieces.len()))
+                Some(plan.fate(arc, pieces.len(), Led::Not))
             }
             (action, plan, _) => {
                 out.program.extend_from_slice(line);
