@@ -29,7 +29,8 @@ impl Step {
 
 /// Curvatures, heights, limits and the like share a shape where they differ by less than a part in so many.
 const CURVATURE_GRAIN: f64 = 32.0;
-const HEIGHT_GRAIN: f64 = 256.0;
+/// Curvatures and heights against the greatest curvature: what they are off by is an error all along the arc.
+const RATIO_GRAIN: f64 = 1024.0;
 const COARSE_GRAIN: f64 = 8.0;
 /// A step with so little of its height left is as good as needed.
 const GOOD: f64 = 0.007;
@@ -49,7 +50,10 @@ const MOST_SHAPES: usize = 16_384;
 struct Key {
     side: Side,
     ramp: i32,
+    greatest: i32,
+    /// In units of the greatest.
     curvature: [i32; 2],
+    /// In units of what the greatest curvature asks for.
     height: [i32; 2],
     limit: i32,
     room: i32,
@@ -197,16 +201,16 @@ impl Steps {
         let key = Key {
             side: meeting.side,
             ramp: grain(ramp, COARSE_GRAIN),
-            curvature: curvature.map(|k| grain(k, CURVATURE_GRAIN)),
-            // In units of what the curvature asks for.
+            greatest: grain(greatest, CURVATURE_GRAIN),
+            curvature: curvature.map(|k| grain(k / greatest, RATIO_GRAIN)),
             height: meeting
                 .offset_mm
-                .map(|o| grain(o / unit_mm / greatest, HEIGHT_GRAIN)),
+                .map(|o| grain(o / unit_mm / greatest, RATIO_GRAIN)),
             limit: below(self.acceleration_mm_s2 * unit_s * unit_s / rise_mm),
             room: below((meeting.room_mm / unit_mm).min(20.0 * self.base)),
         };
-        let rounded = key.curvature.map(|k| back(k, CURVATURE_GRAIN));
-        let scale = rounded.iter().fold(0.0, |m, k: &f64| f64::max(m, k.abs()));
+        let scale = back(key.greatest, CURVATURE_GRAIN);
+        let rounded = key.curvature.map(|k| back(k, RATIO_GRAIN) * scale);
         let known = self.shapes.borrow().get(&key).copied();
         let mut found = known.unwrap_or_else(|| {
             let search = Search {
@@ -214,7 +218,7 @@ impl Steps {
                 base: self.base,
                 side: meeting.side,
                 curvature: rounded,
-                offset: key.height.map(|h| back(h, HEIGHT_GRAIN) * scale),
+                offset: key.height.map(|h| back(h, RATIO_GRAIN) * scale),
                 ramp: back(key.ramp, COARSE_GRAIN),
                 at_feed: self.at_feed,
                 limit: back(key.limit, COARSE_GRAIN),

@@ -313,13 +313,21 @@ pub fn deviations(plant: Plant, program: &str, nominal: &str) -> Vec<Deviation> 
     driven_chains.iter().zip(&meant).map(one).collect()
 }
 
-/// What the plant leaves of the wall of a circle about a centre, µm, positive where material is left, negative where it goes
-/// too deep; the wall is cut by all moves but rapids. `hole`: the material lies outside.
+/// Parts of a circle whose walls are told apart.
+const PARTS: usize = 720;
+
+/// What the plant leaves of the wall of a circle about a centre, µm: the least and the most, positive where material is left,
+/// negative where it goes too deep. The wall is cut by all moves but rapids. `hole`: the material lies outside.
 ///
 /// # Panics
 /// The program does not go all the way round.
-pub fn wall_um(plant: Plant, program: &str, centre: [f64; 2], radius: f64, hole: bool) -> [f64; 2] {
-    const PARTS: usize = 720;
+pub fn wall_um(
+    plant: Plant,
+    program: &str,
+    centre: [f64; 2],
+    radius: f64,
+    hole: bool,
+) -> [f64; 2] {
     let mut reached = [f64::NAN; PARTS];
     for chain in chains(program) {
         for p in driven(plant, &chain) {
@@ -331,11 +339,12 @@ pub fn wall_um(plant: Plant, program: &str, centre: [f64; 2], radius: f64, hole:
             } else {
                 x.hypot(y) - radius
             };
-            // NaN is below all.
+            // The minimum of a number and NaN is the number.
             reached[part] = off.min(reached[part]);
         }
     }
-    reached.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], off| {
+    let start = [f64::INFINITY, f64::NEG_INFINITY];
+    reached.iter().fold(start, |[least, most], off| {
         assert!(!off.is_nan(), "not all the way round in\n{program}");
         [least.min(off * 1e3), most.max(off * 1e3)]
     })
