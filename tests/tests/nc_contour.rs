@@ -158,7 +158,13 @@ fn leads_make_the_wall_round() {
             let result = giotto_nc::compensate(program.as_bytes(), &model, &options);
             let text = String::from_utf8(result.program).unwrap();
             assert!(
-                matches!(result.arcs[0].fate, Fate::Corrected { led: Led::Tangent, .. }),
+                matches!(
+                    result.arcs[0].fate,
+                    Fate::Corrected {
+                        led: Led::Tangent,
+                        ..
+                    }
+                ),
                 "{:?}",
                 result.arcs
             );
@@ -170,7 +176,10 @@ fn leads_make_the_wall_round() {
             assert!(share <= bar, "{plant_name}, {side:?}: {share:.2} %\n{text}");
             // No deeper than before, or than the circle itself.
             let deeper = (-is[0]) - f64::max(-was[0], 0.0);
-            assert!(deeper <= DEEPER_UM, "{plant_name}, {side:?}: {deeper:.2} µm deeper");
+            assert!(
+                deeper <= DEEPER_UM,
+                "{plant_name}, {side:?}: {deeper:.2} µm deeper"
+            );
         }
     }
 }

@@ -152,8 +152,8 @@ impl Room<'_, '_> {
         let long = |piece: &Piece| piece.length_mm >= self.law.least_mm;
         let fits = room && pieces(arc, twin.delta_mm, entry, exit).iter().all(long);
         Some(if fits {
-            let rests = [false, true]
-                .map(|after| matches!(self.neighbour(i, arc, after), Neighbour::Rest));
+            let rests =
+                [false, true].map(|after| matches!(self.neighbour(i, arc, after), Neighbour::Rest));
             Ok(Plan {
                 twin,
                 entry,
@@ -201,11 +201,17 @@ impl Room<'_, '_> {
                     };
                 }
                 let before = Self::left(before, other.delta_mm, f);
-                (from_mm, true, self.step(f, [before, own], Side::Behind, room))
+                (
+                    from_mm,
+                    true,
+                    self.step(f, [before, own], Side::Behind, room),
+                )
             }
-            Neighbour::Line { .. } | Neighbour::OtherArc => {
-                (0.0, false, self.step(f, [straight, own], Side::Behind, room))
-            }
+            Neighbour::Line { .. } | Neighbour::OtherArc => (
+                0.0,
+                false,
+                self.step(f, [straight, own], Side::Behind, room),
+            ),
             Neighbour::Rest => {
                 let stretches = [(own.0, 0.0), own];
                 (0.0, false, self.step(f, stretches, Side::FromRest, room))

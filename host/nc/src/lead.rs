@@ -48,13 +48,7 @@ pub enum Led {
 
 /// Words of comments that name a hole or a boss, in capitals.
 const HOLES: [&str; 7] = [
-    "HOLE",
-    "BORE",
-    "POCKET",
-    "BOHRUNG",
-    "TASCHE",
-    "PERÇAGE",
-    "ALÉSAGE",
+    "HOLE", "BORE", "POCKET", "BOHRUNG", "TASCHE", "PERÇAGE", "ALÉSAGE",
 ];
 const BOSSES: [&str; 6] = ["BOSS", "STUD", "ISLAND", "ZAPFEN", "INSEL", "BOSSAGE"];
 

@@ -135,8 +135,14 @@ pub(super) fn base_length(chain: Chain) -> f64 {
                 pace: Pace::Through,
                 at_feed: true,
             };
-            let errors = [2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0]
-                .map(|length| (length, Joint::new(chain, corner, length, Transition::SMOOTH).best(&even(2)).1));
+            let errors = [2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0].map(|length| {
+                (
+                    length,
+                    Joint::new(chain, corner, length, Transition::SMOOTH)
+                        .best(&even(2))
+                        .1,
+                )
+            });
             let least = errors.iter().map(|e| e.1).fold(f64::INFINITY, f64::min);
             errors
                 .iter()

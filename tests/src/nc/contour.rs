@@ -321,13 +321,7 @@ const PARTS: usize = 720;
 ///
 /// # Panics
 /// The program does not go all the way round.
-pub fn wall_um(
-    plant: Plant,
-    program: &str,
-    centre: [f64; 2],
-    radius: f64,
-    hole: bool,
-) -> [f64; 2] {
+pub fn wall_um(plant: Plant, program: &str, centre: [f64; 2], radius: f64, hole: bool) -> [f64; 2] {
     let mut reached = [f64::NAN; PARTS];
     for chain in chains(program) {
         for p in driven(plant, &chain) {
