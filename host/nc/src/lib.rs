@@ -16,6 +16,7 @@ mod chain;
 pub mod check;
 mod codes;
 mod correct;
+mod dialect;
 mod digits;
 mod emit;
 mod engine;
@@ -142,7 +143,7 @@ pub fn is_program(program: &[u8]) -> bool {
             !line.words.is_empty() && line.words.iter().any(|w| !w.value.is_nan())
         }
         word::Sort::Flow(_) | word::Sort::Setting => true,
-        word::Sort::Unread => false,
+        word::Sort::Unread => dialect::arc(line.text).is_some(),
     };
     word::lines(program).any(block)
 }
