@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 /// One drive of a machine. Coordinates of slides are metres, those of joints radians (of a SCARA's third joint, a
 /// slide along Z, metres).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[serde(rename_all = "lowercase")]
 pub enum Actuator {
     /// Slide along the machine's X.
