@@ -202,7 +202,8 @@ impl Brake {
 /// Farthest that a brake from a velocity and its change leads on one axis, nm; `speed` is that along the path. All per tick.
 pub(crate) fn farthest_nm(limits: [f32; 2], speed: f32, velocity: f32, change: f32) -> f32 {
     let [acceleration, jerk] = limits;
-    let (velocity, change) = (velocity.abs(), change.clamp(0.0, acceleration));
+    // Not `clamp`: it panics at a limit that is no number.
+    let (velocity, change) = (velocity.abs(), change.max(0.0).min(acceleration));
     // While the acceleration is taken back the speed still grows.
     let gained = velocity + 0.5 * change * change / jerk;
     let growing = change / jerk * (velocity + change * change / (3.0 * jerk));
