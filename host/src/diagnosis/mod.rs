@@ -657,6 +657,15 @@ fn poverty(campaign: &Campaign, repeatability_m: f64) -> Vec<String> {
             repeatability_m * 1e6
         ));
     }
+    if distinct(&|run| run.feed_m_s) < 2 {
+        let sizes = sizes(campaign, |run| run.feed_m_s);
+        let mean_m = sizes.iter().map(|size| size.error_m).sum::<f64>() / sizes.len().max(1) as f64;
+        out.push(format!(
+            "the circles are {:.0} µm too {}, and at one speed a servo that lags, an offset of the radius and a scale look alike",
+            (mean_m * 1e6).abs(),
+            if mean_m < 0.0 { "small" } else { "large" }
+        ));
+    }
     if distinct(&|run| run.radius_m) < 2 {
         out.push("one radius: an offset of the radius, a scale error and a misfit of the servo's size law look alike; measure a second radius, at least half or twice as large".into());
     }
