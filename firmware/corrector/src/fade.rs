@@ -4,6 +4,7 @@ use crate::law::Law;
 use crate::senses::smooth;
 use crate::settings::Settings;
 use crate::voice::{Place, Voice};
+use core::cmp::Ordering;
 
 /// Corrections nearer to each other than this are exchanged at once, m.
 const SAME_M: f64 = 1e-9;
@@ -76,7 +77,7 @@ impl Fade {
         let apart = to
             .iter()
             .zip(from)
-            .any(|(to, from)| !((to - from).abs() < SAME_M));
+            .any(|(to, from)| (to - from).abs().partial_cmp(&SAME_M) != Some(Ordering::Less));
         self.done = if begins && !apart {
             1.0
         } else {
