@@ -1,5 +1,5 @@
 //! The circle to program so that the machine makes the wanted one.
-use super::chain::{Response, element};
+use super::chain::Response;
 use super::steps::{Meeting, Step, Steps};
 use super::{Keep, Left, Options};
 use giotto::model_file::{ModelFile, Servo};
@@ -50,7 +50,7 @@ impl Inverse {
     pub(super) fn twin(&self, radius_mm: f64, feed_mm_s: f64) -> Result<Twin, Left> {
         let omega = feed_mm_s / radius_mm;
         let (r, f) = (radius_mm * 1e-3, feed_mm_s * 1e-3);
-        let solved = match (self.servo, element(&self.servo)) {
+        let solved = match (self.servo, self.servo.element()) {
             (
                 Servo::Beta {
                     beta1_s2, beta2_s4, ..

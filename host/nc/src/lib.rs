@@ -137,6 +137,13 @@ pub struct Compensated {
 }
 
 /// Whether any line is a block: words that were understood, or what steers a program.
+///
+/// ```
+/// use giotto_nc::is_program;
+///
+/// assert!(is_program(b"G21\nG1 X10 F300\nM2\n"));
+/// assert!(!is_program(b"Dear machine, please draw a circle.\n"));
+/// ```
 pub fn is_program(program: &[u8]) -> bool {
     let block = |line: word::Line<'_>| match line.sort {
         word::Sort::Plain | word::Sort::Optional => {
@@ -149,6 +156,32 @@ pub fn is_program(program: &[u8]) -> bool {
 }
 
 /// Rewrites the arcs of a program. The text need not be UTF-8; bytes outside rewritten arcs are copied.
+///
+/// ```
+/// use giotto_nc::{Fate, Options, compensate};
+/// use giotto::model_file::ModelFile;
+/// # use std::path::Path;
+///
+/// let model = ModelFile::parse(
+///     "format = 2\ncampaign = \"lab\"\nmachine = \"mill\"\n\
+///      [servo]\nkind = \"lag\"\nkv_per_s = 43.3\n\
+///      [valid]\nradius_mm = [20.0, 150.0]\nfeed_mm_s = [5.0, 700.0]",
+///     Path::new("model.toml"),
+/// )?;
+/// // A quarter of a circle of 50 mm at 15 m/min, between two straight lines that touch it.
+/// let program = "G21 G17 G90\nG0 X-20 Y0\nG1 X0 Y0 F15000\nG3 X50 Y50 I0 J50\nG1 Y80\nM2\n";
+/// let corrected = compensate(program.as_bytes(), &model, &Options::default());
+/// let Fate::Corrected { radius_mm, delta_mm, .. } = corrected.arcs[0].fate else {
+///     unreachable!("{:?}", corrected.arcs)
+/// };
+/// // The machine draws it 333 µm too small: it is programmed larger.
+/// assert_eq!(radius_mm, 50.0);
+/// assert!(delta_mm > 0.3 && delta_mm < 0.4, "{delta_mm}");
+/// // Everything but the arc is copied to the letter.
+/// let text = String::from_utf8(corrected.program)?;
+/// assert!(text.starts_with("G21 G17 G90\nG0 X-20 Y0\n") && text.ends_with("G1 Y80\nM2\n"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn compensate(program: &[u8], model: &ModelFile, options: &Options) -> Compensated {
     let mut text = Vec::with_capacity(program.len());
     // Writing into memory does not fail.

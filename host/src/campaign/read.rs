@@ -13,6 +13,33 @@ use std::path::Path;
 ///
 /// # Errors
 /// The first problem in file order, with file, line and column.
+///
+/// ```
+/// use giotto::campaign;
+///
+/// let folder = tempfile::tempdir()?;
+/// std::fs::write(
+///     folder.path().join("campaign.toml"),
+///     "[campaign]\nname = \"lab\"\nmachine = \"mill\"\n[[run]]\nfile = \"a.csv\"\n\
+///      radius_mm = 100.0\nfeed_mm_s = 50.0\ndirection = \"ccw\"\n",
+/// )?;
+/// let mut rows = String::from("angle_deg,deviation_um\n");
+/// for degree in 0..360 {
+///     let deviation_um = -25.0 + 3.0 * f64::from(2 * degree).to_radians().cos();
+///     rows += &format!("{degree},{deviation_um:.3}\n");
+/// }
+/// std::fs::write(folder.path().join("a.csv"), rows)?;
+///
+/// let campaign = campaign::read(folder.path())?;
+/// let run = &campaign.runs[0];
+/// // Metres and radians inside, whatever the file has.
+/// assert_eq!(run.radius_m, 0.1);
+/// assert!((run.samples.deviation_m[0] + 22e-6).abs() < 1e-12);
+/// // A file that is not there is refused with its place.
+/// std::fs::remove_file(folder.path().join("a.csv"))?;
+/// assert!(campaign::read(folder.path()).is_err_and(|error| error.to_string().contains("a.csv")));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn read(path: &Path) -> Result<Campaign, CampaignError> {
     read_with_notes(path).map(|(campaign, _)| campaign)
 }

@@ -1,8 +1,8 @@
 //! The veto of the runs left out: a cause without which they are foretold better has no place in the model.
 //!
 //! Each radius is left out once, then each speed (of two speeds each in one direction: what one speed says of another is
-//! nothing, so that every law of the speed would fail for want of runs). The set is fitted on the runs that stay, shapes as they are. All of it
-//! are small sums of the ledger's products, so that every cause can be tried without.
+//! nothing, so that every law of the speed would fail for want of runs). The set is fitted on the runs that stay, shapes as
+//! they are. All of it are small sums of Gram matrices, so that every cause can be tried without.
 use super::explained::{Explained, refit};
 use super::linear::{Factor, solve};
 use super::search::columns_of;
@@ -58,7 +58,7 @@ pub fn folds_of(found: &Explained) -> Vec<Vec<usize>> {
 /// model's own parameters among them as far as they are determined beside the members. With one speed left, a static
 /// error of the size cannot be told from the servo, which then stays as all runs have it.
 pub fn determined(found: &Explained, weights: &[f64], set: &[usize]) -> (Vec<usize>, Vec<usize>) {
-    let products = found.ledger.white(weights);
+    let products = found.gram.white(weights);
     let whole = columns_of(&found.nuisance, &found.items, set);
     if Factor::new(&products, &whole).is_some() {
         return (set.to_vec(), whole);
@@ -90,11 +90,11 @@ fn failed_m2(found: &Explained, folds: &[Vec<usize>], set: &[usize]) -> f64 {
         let mut weights = found.all();
         out.iter().for_each(|&run| weights[run] = 0.0);
         let (_, columns) = determined(found, &weights, set);
-        let coefficients = solve(&found.ledger.white(&weights), &columns)
+        let coefficients = solve(&found.gram.white(&weights), &columns)
             .map_or_else(Vec::new, |solution| solution.coefficients);
         let mut only = vec![0.0; found.runs.len()];
         out.iter().for_each(|&run| only[run] = 1.0);
-        let plain = found.ledger.plain(&only);
+        let plain = found.gram.plain(&only);
         let mut left = plain.at(0, 0);
         for (&a, x) in columns.iter().zip(&coefficients) {
             left -= 2.0 * x * plain.at(a, 0);

@@ -28,6 +28,13 @@ const LEAST_TURN_RAD: f64 = 4.1 * std::f64::consts::PI / 180.0;
 const MOST_TURN_RAD: f64 = 239.0 * std::f64::consts::PI / 180.0;
 
 /// Whether a program is RAPID: a module or a procedure, behind the head of a backup or not.
+///
+/// ```
+/// use giotto_nc::rapid::is_rapid;
+///
+/// assert!(is_rapid(b"MODULE part\n  PROC main()\n  ENDPROC\nENDMODULE\n"));
+/// assert!(!is_rapid(b"G21\nG1 X10 F300\n"));
+/// ```
 pub fn is_rapid(program: &[u8]) -> bool {
     let mut words = program
         .split(|b| *b == b'\n')
