@@ -88,6 +88,7 @@ pub fn campaign(plan: &Plan, seed: u64) -> Campaign {
         machine: plan.machine_name.clone(),
         repeatability_m: None,
         table: None,
+        kinematics: None,
         runs: tests.par_iter().enumerate().map(run).collect(),
     }
 }

@@ -380,6 +380,7 @@ pub fn open(
             machine,
             repeatability_m: None,
             table: None,
+            kinematics: None,
             runs,
             notes: Vec::new(),
         },
