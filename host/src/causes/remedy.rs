@@ -46,7 +46,7 @@ pub enum Knob {
 }
 
 /// Every cause with its words.
-pub const ALL: [Entry; 19] = [
+pub const ALL: [Entry; 23] = [
     Entry {
         cause: Cause::HigherOrderDynamics,
         positive: "at the highest speeds circles come out larger than the lag alone would make them: the machine swings out; lower the \
@@ -162,6 +162,30 @@ pub const ALL: [Entry; 19] = [
         cause: Cause::JointReversal,
         positive: "{a} sticks where it turns back, {size} at the tool: raise its friction compensation, look at its gear",
         negative: "{a} is pushed too far where it turns back, {size} at the tool: lower its friction compensation",
+        knob: None,
+    },
+    Entry {
+        cause: Cause::JointBacklash,
+        positive: "the gear of {a} has {size} of play: take it up, or have the gear overhauled",
+        negative: "{a} jumps ahead by {size} where it turns back: lower its backlash compensation by {size}",
+        knob: None,
+    },
+    Entry {
+        cause: Cause::JointCyclicError,
+        positive: "the gear of {a} is off by up to {size} within each turn of its input: map it, or have it overhauled",
+        negative: "the gear of {a} is off by up to {size} within each turn of its input: map it, or have it overhauled",
+        knob: None,
+    },
+    Entry {
+        cause: Cause::JointZero,
+        positive: "{a} stands {size} further than its controller reads: set its zero again, {size} less",
+        negative: "{a} stands {size} less far than its controller reads: set its zero again, {size} more",
+        knob: None,
+    },
+    Entry {
+        cause: Cause::LinkLength,
+        positive: "the link behind {a} is {size} longer than the controller has it: enter its calibrated length",
+        negative: "the link behind {a} is {size} shorter than the controller has it: enter its calibrated length",
         knob: None,
     },
 ];

@@ -7,6 +7,7 @@
 //! is found is stated with its doubts ([`verdict`], [`unexplained`]) and proven on runs left out ([`veto`], [`gain`]).
 //! What is left must be noise ([`omnibus`]). Before all this come what a session brings along: an override for all runs
 //! ([`feed_override`]), a spoilt run ([`influence`]), a delay that is not known ([`delay`]).
+pub mod arm;
 pub mod baseline;
 pub mod basis;
 pub mod column;
@@ -17,9 +18,11 @@ pub mod explained;
 pub mod feed_override;
 pub mod finding;
 pub mod gain;
+pub mod gear;
 pub mod influence;
 pub mod item;
 pub mod ledger;
+pub mod like_arm;
 pub mod linear;
 pub mod material;
 pub mod misfit;
@@ -57,8 +60,8 @@ pub use status::Status;
 use crate::campaign::Campaign;
 use crate::causes::Effect;
 use crate::model_file::{ModelFile, Servo};
+use crate::simulation::Arm;
 use crate::simulation::machine::{Machine, MachineError};
-use baseline::{Size, fit_lag};
 use delay::{Explanation, explain_all};
 use duration::{Clamp, Durations};
 use explain::Start;
@@ -203,6 +206,11 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
         baseline.start.repeatability_m,
     );
     let mut explanation = explain_all(&survey, &baseline.start, baseline.delay_s);
+    let like_arm = like_arm::is_like_arm(&explanation.found);
+    if like_arm {
+        like_arm::take_out_slides(&mut explanation.found);
+    }
+    let clamp = clamp.filter(|_| !like_arm);
     let ties = verdict::ties(&explanation.found);
     explanation.found.tied = ties.iter().map(|(item, _)| *item).collect();
     let proof = prove(
@@ -223,6 +231,9 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
         proof.as_ref(),
     );
     let mut cannot_tell = ground.cannot_tell;
+    if like_arm {
+        cannot_tell.insert(0, like_arm::WORDS.to_owned());
+    }
     cannot_tell.extend(explanation.words());
     cannot_tell.extend(
         ties.iter()
@@ -272,6 +283,10 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
         findings: stated.findings,
     };
     diagnosis.recommendation = recommendation::of(&diagnosis);
+    if like_arm {
+        diagnosis.unexplained.present = true;
+        diagnosis.recommendation = like_arm::recommendation();
+    }
     Ok(diagnosis)
 }
 
@@ -347,7 +362,7 @@ impl Session {
 fn spoilt_of(campaign: &Campaign, survey: &Survey, options: &Options) -> Option<influence::Spoilt> {
     let response = match &options.model {
         Some(model) => Response::of(&model.servo),
-        None => fit_lag(&sizes(campaign, believed_feed_m_s)),
+        None => arm::fit_lag_of(campaign),
     };
     let (runs, _) = survey.prepare(&response, 0.0);
     let data = survey::misfit(&runs);
@@ -358,14 +373,6 @@ fn spoilt_of(campaign: &Campaign, survey: &Survey, options: &Options) -> Option<
         .map(|(run, low)| low[0] / (run.visible().max(1) as f64).sqrt())
         .collect();
     influence::find(&runs, &profiles, &means)
-}
-
-fn sizes(campaign: &Campaign, feed_m_s: impl Fn(&crate::campaign::Run) -> f64) -> Vec<Size> {
-    campaign
-        .runs
-        .iter()
-        .map(|run| Size::of(run, feed_m_s(run)))
-        .collect()
 }
 
 /// The simulation as it stands.
@@ -387,7 +394,7 @@ impl Simulation {
         let assumed = (campaign.runs.len() < FEWEST_RUNS).then_some(ASSUMED_REPEATABILITY_M);
         let repeatability_m = stated.or(assumed).unwrap_or(0.0);
         let Some(model) = &options.model else {
-            let response = fit_lag(&sizes(campaign, believed_feed_m_s));
+            let response = arm::fit_lag_of(campaign);
             let name = if response.a_s2 > 0.0 {
                 format!("one servo lag, kv = {:.1} /s", response.a_s2.powf(-0.5))
             } else if response.a_s2 < 0.0 {
@@ -422,7 +429,10 @@ impl Simulation {
                 more_lag_s: 0.0,
             },
             name: format!("the given model of {}", model.machine),
-            given: Some(Machine::from_model(&bare)?),
+            given: Some(Machine {
+                arm: model.kinematics.or(campaign.kinematics).map(Arm::sound),
+                ..Machine::from_model(&bare)?
+            }),
             known: model.effects.clone(),
             delay_s: model.delay_s,
         })
@@ -532,6 +542,7 @@ fn state(
         clamp.map(|clamp| (clamp, clamp_energy_m2(campaign, found))),
     );
     explanation.doubt(&mut findings);
+    arm::name_both(&mut findings, campaign.kinematics.as_ref());
     status::settle(
         &mut findings,
         Ground {
@@ -579,8 +590,11 @@ fn without_known(campaign: &Campaign, baseline: &Simulation) -> Option<Campaign>
     if baseline.known.is_empty() {
         return None;
     }
-    let plain = gain::machine(&baseline.start.response, &[], baseline.delay_s);
-    let with = gain::machine(&baseline.start.response, &baseline.known, baseline.delay_s);
+    let machine = |effects: &[Effect]| {
+        let response = &baseline.start.response;
+        gain::machine(response, effects, baseline.delay_s, campaign.kinematics)
+    };
+    let (plain, with) = (machine(&[]), machine(&baseline.known));
     let mut out = campaign.clone();
     for run in &mut out.runs {
         let test = crate::simulation::CircleTest::of(run);

@@ -5,6 +5,7 @@
 use super::basis::{COLUMNS, Low};
 use super::column::Column;
 use super::explained::{Explained, residual};
+use super::gear;
 use super::item::Kind;
 use super::ledger::kept;
 use super::linear::{Factor, solve};
@@ -191,6 +192,14 @@ impl<'a> Fit<'a> {
                     )
                     .map(|found| (found.gain / share, vec![found.pitch_m]))
                 }
+                (Cause::JointCyclicError, Site::One(joint)) => gear::scan(
+                    &self.runs,
+                    &self.views,
+                    &self.whitened,
+                    self.found.spread.noise_m2,
+                    joint.index(),
+                )
+                .map(|found| (found.gain / share, vec![found.ratio])),
                 _ => best_of(model.shapes(&self.views), &self.sample),
             };
             match best {
