@@ -40,6 +40,9 @@ const BOARDS: [Memory; 3] = [
 /// Most text and most RAM, stack and all, of an image: a quarter of what the STM32F405 has, so that what is too large does
 /// not link.
 const ROOM: [u32; 2] = [256 * 1024, 48 * 1024];
+/// Of that RAM, the stack. It lies below the variables, where memory begins: one that grows too long leaves memory, which is a
+/// fault, and never writes into variables. Variables that do not fit above it do not link.
+const STACK: u32 = 8 * 1024;
 
 /// Version of the package and, in a git work tree, the commit: what an image says of itself.
 fn build() -> String {
@@ -81,14 +84,19 @@ fn main() {
     let [text, ram] = ROOM;
     let (flash, ram) = (
         region("FLASH", (board.flash, text)),
-        region("RAM", (board.ram, ram)),
+        region("RAM", (board.ram + STACK, ram - STACK)),
+    );
+    let stack = format!(
+        "_stack_start = {:#010x};\n_stack_end = {:#010x};\n",
+        board.ram + STACK,
+        board.ram
     );
     let code = if board.code > 0 {
         format!("_stext = {:#010x};\n", board.code)
     } else {
         String::new()
     };
-    let memory = format!("MEMORY\n{{\n{flash}{ram}}}\n{code}");
+    let memory = format!("MEMORY\n{{\n{flash}{ram}}}\n{code}{stack}");
     for (name, text) in [
         ("memory.x", memory.as_str()),
         ("device.x", "/* the vector table names its handlers */\n"),

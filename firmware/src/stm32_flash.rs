@@ -66,6 +66,15 @@ pub trait Part {
     fn write(&mut self, address: u32, word: u32);
 }
 
+/// Ticks that fall due in so many cycles of the core, the first of them `into` cycles after the last tick.
+pub const fn ticks_due(cycles: u32, into: u32, period: u32) -> u32 {
+    // Both are below 2³², and so is the quotient.
+    match (cycles as u64 + into as u64).checked_div(period as u64) {
+        Some(ticks) => ticks as u32,
+        None => 0,
+    }
+}
+
 /// Why a flash operation failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FlashError {
@@ -380,6 +389,24 @@ mod tests {
         }
         assert_eq!(units.part.erased, [1, 2, 3, 10, 11]);
         assert!(units.part.control & LOCK != 0 && units.part.access & DATA_CACHE != 0);
+    }
+
+    #[test]
+    fn lost_ticks_are_those_that_fell_due() {
+        const PERIOD: u32 = 168_000;
+        for begin in [0, 1, PERIOD / 2, PERIOD - 1] {
+            for cycles in [0, 1, PERIOD - 1, PERIOD, 5 * PERIOD + 7, 336_000_000] {
+                let due = (u64::from(begin) + 1..=u64::from(begin) + u64::from(cycles))
+                    .filter(|cycle| cycle % u64::from(PERIOD) == 0)
+                    .count();
+                assert_eq!(
+                    ticks_due(cycles, begin, PERIOD) as usize,
+                    due,
+                    "{begin} {cycles}"
+                );
+            }
+        }
+        assert_eq!(ticks_due(u32::MAX, 5, 0), 0);
     }
 
     /// An error of one operation is told once, and the next one works.

@@ -31,6 +31,15 @@ impl Plane {
         }
     }
 
+    /// Places of its two axes in the coordinates of a machine of three slides.
+    pub const fn slides(self) -> [usize; 2] {
+        match self {
+            Self::Xy => [0, 1],
+            Self::Yz => [1, 2],
+            Self::Zx => [2, 0],
+        }
+    }
+
     /// The axis across the plane.
     pub const fn normal(self) -> Actuator {
         match self {

@@ -42,7 +42,6 @@ fn none_wrong(wrong: Vec<String>) {
 }
 
 #[test]
-#[ignore = "needs the plane in the diagnosis"]
 fn effects_of_z_are_named_on_z_from_zx_and_yz_circles() {
     let names = ["backlash", "reversal_spike", "cyclic_error", "straightness"];
     let planes = [vec![Plane::ZX], vec![Plane::YZ], vec![Plane::YZ, Plane::ZX]];
@@ -88,7 +87,6 @@ fn circles_in_xy_say_nothing_of_z() {
 }
 
 #[test]
-#[ignore = "needs the plane in the diagnosis"]
 fn one_campaign_of_three_planes_holds_three_right_angles_and_three_scales() {
     let names = [
         "squareness",
@@ -109,7 +107,6 @@ fn one_campaign_of_three_planes_holds_three_right_angles_and_three_scales() {
 }
 
 #[test]
-#[ignore = "needs the plane in the diagnosis"]
 fn a_slide_seen_in_two_planes_is_one_finding() {
     none_wrong(
         ["backlash", "servo_mismatch", "bandwidth_mismatch"]
@@ -129,7 +126,6 @@ fn a_slide_seen_in_two_planes_is_one_finding() {
 }
 
 #[test]
-#[ignore = "needs the plane in the diagnosis"]
 fn a_tilted_circle_shows_backlash_of_the_slide_that_has_it() {
     let planes = [
         Plane::XY,
@@ -145,7 +141,6 @@ fn a_tilted_circle_shows_backlash_of_the_slide_that_has_it() {
 }
 
 #[test]
-#[ignore = "needs the plane in the diagnosis"]
 fn nothing_is_found_in_three_planes_of_a_healthy_machine() {
     none_wrong(
         (600_u64..604)

@@ -351,7 +351,7 @@ where
         if let Job::Points(points) = &mut job {
             streamed.read(bytes, points)?;
             let count = usize::from(points.count);
-            for place_nm in points.place_nm.iter().take(count) {
+            for place_nm in points.place_nm.get(..count).unwrap_or(&[]) {
                 self.planner.soft_place(place_nm).map_err(in_words)?;
             }
         }

@@ -10,6 +10,7 @@
 //!
 //! Either end of a queue has one owner. The words of [`Shared`] are written by one side each; a table and a
 //! segment cross whole, inside the queue.
+mod alive;
 pub mod bench;
 mod desk;
 mod job;
@@ -18,6 +19,7 @@ mod ports;
 mod shared;
 mod tick;
 
+pub use alive::Alive;
 pub use desk::Desk;
 pub use job::{BATCH, Job};
 pub use ports::{Receiver, Sender};

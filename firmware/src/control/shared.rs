@@ -48,6 +48,8 @@ pub struct Shared {
     pub(super) every: AtomicU16,
     // Written by the board.
     pub(super) stop_input: AtomicBool,
+    /// Ticks that fell due while the core stood still.
+    pub(super) lost: AtomicU32,
 }
 
 impl Default for Shared {
@@ -110,6 +112,7 @@ impl Shared {
             stop: AtomicBool::new(false),
             every: AtomicU16::new(0),
             stop_input: AtomicBool::new(false),
+            lost: AtomicU32::new(0),
         }
     }
 
@@ -117,6 +120,15 @@ impl Shared {
     /// nothing starts.
     pub fn set_stop_input(&self, active: bool) {
         self.stop_input.store(active, Relaxed);
+    }
+
+    /// So many ticks fell due while the core stood still, as it does while its flash is erased: they have passed, and nothing
+    /// moved in them. To be called with the tick's interrupt masked, at rest.
+    pub fn lose(&self, ticks: u32) {
+        self.lost
+            .store(self.lost.load(Relaxed).wrapping_add(ticks), Relaxed);
+        // Whoever asks before the next tick knows of them as well.
+        self.pass(self.now().wrapping_add(ticks));
     }
 
     /// Before the first tick: where the machine stands, and how that is known. The executor has to begin there too.
@@ -218,7 +230,7 @@ impl Shared {
 
     /// Ticks since boot.
     #[inline]
-    pub(super) fn now(&self) -> u32 {
+    pub fn now(&self) -> u32 {
         self.tick.load(Relaxed)
     }
 

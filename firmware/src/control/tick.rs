@@ -20,6 +20,8 @@ pub struct Tick<S, I, O> {
     jobs: Jobs<I>,
     set_points: O,
     now: u32,
+    /// Ticks that were lost so far, as the board counts them.
+    lost: u32,
     bypass: bool,
     pause: bool,
     stop_input: bool,
@@ -44,6 +46,7 @@ where
             jobs: Jobs::new(jobs),
             set_points,
             now: 0,
+            lost: 0,
             bypass: true,
             pause: false,
             stop_input: false,
@@ -68,7 +71,9 @@ where
             self.streaming = true;
             self.executor.count_uncorrected(!plan.corrected());
         }
-        self.now = self.now.wrapping_add(1);
+        let lost = self.shared.lost.load(Relaxed);
+        let passed = lost.wrapping_sub(self.lost).wrapping_add(1);
+        (self.now, self.lost) = (self.now.wrapping_add(passed), lost);
         let state = self.state();
         self.record(&output, state);
         let (epoch, fault) = (self.executor.epoch(), self.executor.fault());

@@ -62,13 +62,25 @@ impl Events {
         }
     }
 
+    /// Number of the next one.
+    #[inline]
+    pub(super) fn next(&self) -> u32 {
+        self.first.wrapping_add(self.kept.len() as u32)
+    }
+
     /// From a number on, as many as a message takes; with the number of the first.
     pub(super) fn from(&self, from: u32) -> (u32, heapless::Vec<Event, EVENTS>) {
         let ahead = from.wrapping_sub(self.first);
         // What is older than the memory begins with the oldest.
         let skip = if (ahead as i32) < 0 { 0 } else { ahead };
-        let events = self.kept.iter().skip(skip as usize).take(EVENTS);
-        (self.first.wrapping_add(skip), events.copied().collect())
+        // One by one: the queue's iterator carries a bounds check into the image.
+        let mut events = heapless::Vec::new();
+        while let Some(&event) = self.kept.get((skip as usize).saturating_add(events.len())) {
+            if events.push(event).is_err() {
+                break;
+            }
+        }
+        (self.first.wrapping_add(skip), events)
     }
 }
 
@@ -90,6 +102,7 @@ mod tests {
                 .zip(first..)
                 .all(|(event, tick)| event.tick == tick)
         );
+        assert_eq!(events.next(), 100);
         let (first, some) = events.from(98);
         assert_eq!((first, some.len()), (98, 2));
         assert_eq!(events.from(100), (100, heapless::Vec::new()));

@@ -10,6 +10,20 @@ const PIECE: usize = 32;
 /// the watchdog.
 const PIECES: usize = 16;
 
+/// As `write_all`, but a port that takes no byte loses the frame, as a line would, instead of a panic.
+///
+/// # Errors
+/// Those of the port.
+pub fn write_whole<L: Write>(port: &mut L, mut bytes: &[u8]) -> Result<(), L::Error> {
+    while !bytes.is_empty() {
+        match port.write(bytes)? {
+            0 => break,
+            count => bytes = bytes.get(count..).unwrap_or(&[]),
+        }
+    }
+    Ok(())
+}
+
 impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     /// Answers what has arrived, so many bytes at most, and sends the set-points that are due; to be called again and again.
     ///
@@ -25,7 +39,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             let count = link.read(&mut bytes)?;
             for &byte in bytes.iter().take(count) {
                 if let Some(frame) = self.receive(byte) {
-                    link.write_all(frame)?;
+                    write_whole(link, frame)?;
                 }
             }
             if count == 0 {
@@ -34,7 +48,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
         }
         if self.on_link {
             while let Some(frame) = self.set_points() {
-                link.write_all(frame)?;
+                write_whole(link, frame)?;
             }
         }
         link.flush()
@@ -47,7 +61,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     pub fn stream<L: Write>(&mut self, port: &mut L) -> Result<(), L::Error> {
         if !self.on_link {
             while let Some(frame) = self.set_points() {
-                port.write_all(frame)?;
+                write_whole(port, frame)?;
             }
         }
         port.flush()

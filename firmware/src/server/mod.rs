@@ -31,8 +31,8 @@ use embedded_storage::nor_flash::NorFlash;
 use events::Events;
 use giotto_shared::table::{FORMAT_VERSION, MAX_IMAGE_BYTES, SCHEMA_HASH};
 use giotto_shared::wire::{
-    self, Accumulator, CHUNK, Chunk, ClockSource, Command, Counters, ExactCircle, ExactSegment,
-    FromController, Identity, MAX_FRAME, MachineConfig, MotionRefusal, MotionState,
+    self, Accumulator, CHUNK, Chunk, ClockSource, Command, Counters, Event, ExactCircle,
+    ExactSegment, FromController, Identity, MAX_FRAME, MachineConfig, MotionRefusal, MotionState,
     PROTOCOL_VERSION, Probation, Refusal, Reply, ResetCause, SET_POINTS, SUPERVISE_MS, SetPoints,
     Status, What,
 };
@@ -393,6 +393,18 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     fn events(&self, from: u32) -> Reply {
         let (first, events) = self.events.from(from);
         Reply::Events { first, events }
+    }
+
+    /// Whether something has happened since the event before this number.
+    #[inline]
+    pub fn has_event(&self, number: u32) -> bool {
+        self.events.next() != number
+    }
+
+    /// The event of this number, or the oldest one still known, with its own; for a board's log.
+    pub fn event(&self, number: u32) -> Option<(u32, Event)> {
+        let (first, events) = self.events.from(number);
+        events.first().map(|event| (first, *event))
     }
 
     fn set_override(&mut self, percent: u8) -> Result<(), Refusal> {

@@ -173,7 +173,13 @@ fn the_page_says_what_the_diagnosis_says() {
 fn a_poor_campaign_gets_a_page_that_says_what_is_missing() {
     let (campaign, diagnosis) = measured(&[0.1], &[0.1], 400);
     let page = html(&campaign, &diagnosis).unwrap();
-    assert!(page.contains("Nothing can be named from these runs"));
+    let sentences = super::verdict::sentences(&diagnosis, None);
+    assert!(
+        page.contains("Nothing can be named from these runs"),
+        "{sentences:?} {:?} {:?}",
+        diagnosis.cannot_tell,
+        diagnosis.recommendation
+    );
     assert!(page.contains("one radius"));
     elements(&page);
 }

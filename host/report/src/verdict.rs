@@ -2,6 +2,8 @@
 use super::number::{fixed, plain};
 use giotto::analysis::{Report, RunAnalysis};
 use giotto::causes::Cause;
+use giotto::diagnosis::recommendation::{self, Action};
+use giotto::diagnosis::status::Status;
 use giotto::diagnosis::{Diagnosis, Estimate, Finding};
 use giotto::units::{self, Shown};
 use giotto_shared::Direction;
@@ -85,8 +87,13 @@ fn cause(d: &Diagnosis) -> String {
         _ => format!(", then {}", others.join(", ")),
     };
     let shown = shown(&first.estimate);
+    let sure = match first.status {
+        Status::Provisional => " provisionally",
+        Status::Likely => " likely",
+        Status::Certain => "",
+    };
     format!(
-        "{} % of what a lag does not explain is {}, {} {} (95 %: {} to {}){more}{rest}.",
+        "{} % of what a lag does not explain is{sure} {}, {} {} (95 %: {} to {}){more}{rest}.",
         fixed(first.share_percent, 0),
         title(first),
         shown.value,
@@ -96,37 +103,36 @@ fn cause(d: &Diagnosis) -> String {
     )
 }
 
+/// What the diagnosis recommends, for a person: without commands and their placeholders.
 fn action(d: &Diagnosis) -> String {
-    let correctable = d.findings.iter().any(|f| f.compensable);
-    let what = match d.findings.first() {
-        Some(_) if correctable => "Write the extended model into the controller".to_string(),
-        Some(first) => format!(
-            "No controller corrects this: {}",
-            first.cause.model().words().adjust
-        ),
-        None if d.gain.is_none() => "Measure what is missing first".to_string(),
-        None if d.unexplained.present => {
-            "Look at the place and the law of what has no name, further down".to_string()
-        }
-        None => "Write the fitted radius model into the controller".to_string(),
-    };
-    match &d.gain {
-        Some(g) if correctable => {
-            // What no controller corrects stays.
-            let stays = d.findings.iter().filter(|f| !f.compensable);
-            let stays: f64 = stays.map(|f| f.rms_um.powi(2)).sum();
-            let then = (g.extended_rms_um.powi(2) + stays).sqrt();
-            if then >= g.no_model_rms_um {
-                return format!("{what}.");
+    match d.recommendation.action {
+        Action::Flash => {
+            let what = "Write the extended model into the controller";
+            match recommendation::expected_um(d) {
+                Some([now, then]) if then < now => format!(
+                    "{what}: circles that it has not seen are off by {} µm rms now, by {} µm with it.",
+                    fixed(now, 1),
+                    fixed(then, 1),
+                ),
+                _ => format!("{what}."),
             }
-            format!(
-                "{what}: circles that it has not seen are off by {} µm rms now, by {} µm with it.",
-                fixed(g.no_model_rms_um, 1),
-                fixed(then, 1),
-            )
         }
-        _ => format!("{what}."),
+        Action::Adjust => format!("{}.", capitalised(&d.recommendation.words)),
+        Action::Measure => "Measure what is missing first: the next runs stand further down.".into(),
+        Action::Look => {
+            "Look at the place and the law of what has no name, further down.".into()
+        }
+        Action::Nothing => {
+            "Nothing is to be done beyond the fitted radius model, which corrects what shrinks with speed.".into()
+        }
     }
+}
+
+fn capitalised(words: &str) -> String {
+    let mut letters = words.chars();
+    letters.next().map_or_else(String::new, |first| {
+        first.to_uppercase().chain(letters).collect()
+    })
 }
 
 /// An estimate in the units that a person reads, with a true minus sign.

@@ -3,6 +3,7 @@ use serde::{Deserialize, Serialize};
 
 /// Which number of a path an error speaks of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[allow(
     missing_docs,
     reason = "the message of each variant is its documentation"

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// Which number of a table an error speaks of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[allow(missing_docs, reason = "the name is the field of the table")]
 pub enum Field {
     LimitOffset,
@@ -42,6 +43,7 @@ impl core::fmt::Display for Field {
 
 /// Zone an error speaks of, 1-based in words; [`Where::HEAD`] for the table itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Where(pub Option<u8>);
 
 impl Where {
@@ -60,6 +62,7 @@ impl core::fmt::Display for Where {
 
 /// Why bytes are not a table that may be used.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum TableError {
     /// The first bytes are not those of a table.
     #[error("not a giotto table")]

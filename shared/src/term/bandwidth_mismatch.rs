@@ -3,9 +3,9 @@
 use super::check::{Number, magnitude};
 use super::reach::number;
 use super::{Extent, Kind, Reach, Term};
+use crate::Plane;
 use crate::bounds::KAPPA2_MAX_S2;
 use crate::law::{Profile, Unmergeable, finite};
-use crate::{Actuator, Plane};
 use num_traits::Float;
 
 #[derive(Clone, Copy)]
@@ -34,7 +34,7 @@ impl<T: Float> Kind<T> for BandwidthMismatch<T> {
 
     fn add(self, profile: &mut Profile<T>) -> Result<(), Unmergeable> {
         let quarter = number::<T>(0.25) * finite(self.delta_kappa2_s2)?;
-        let [first, second] = self.plane.axes().map(Actuator::index);
+        let [first, second] = self.plane.slides();
         profile.acceleration_s2[first] = profile.acceleration_s2[first] + quarter;
         profile.acceleration_s2[second] = profile.acceleration_s2[second] - quarter;
         Ok(())

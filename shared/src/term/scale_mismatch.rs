@@ -4,8 +4,8 @@ use super::check::{Number, magnitude};
 use super::reach::number;
 use super::scale_error::RELATIVE_MAX;
 use super::{Extent, Kind, Reach, Term};
+use crate::Plane;
 use crate::law::{Profile, Unmergeable, finite};
-use crate::{Actuator, Plane};
 use num_traits::Float;
 
 #[derive(Clone, Copy)]
@@ -33,7 +33,7 @@ impl<T: Float> Kind<T> for ScaleMismatch<T> {
 
     fn add(self, profile: &mut Profile<T>) -> Result<(), Unmergeable> {
         let half = number::<T>(0.5) * finite(self.relative)?;
-        let [first, second] = self.plane.axes().map(Actuator::index);
+        let [first, second] = self.plane.slides();
         profile.position[first][first] = profile.position[first][first] + half;
         profile.position[second][second] = profile.position[second][second] - half;
         Ok(())

@@ -3,8 +3,8 @@
 use super::check::{Number, magnitude};
 use super::reach::number;
 use super::{Extent, Kind, Reach, Term};
+use crate::Plane;
 use crate::law::{Profile, Unmergeable, finite};
-use crate::{Actuator, Plane};
 use num_traits::Float;
 
 /// Largest difference of lags, s.
@@ -35,7 +35,7 @@ impl<T: Float> Kind<T> for ServoMismatch<T> {
 
     fn add(self, profile: &mut Profile<T>) -> Result<(), Unmergeable> {
         let half = number::<T>(0.5) * finite(self.delta_tau_s)?;
-        let [first, second] = self.plane.axes().map(Actuator::index);
+        let [first, second] = self.plane.slides();
         profile.velocity_s[first] = profile.velocity_s[first] - half;
         profile.velocity_s[second] = profile.velocity_s[second] + half;
         Ok(())

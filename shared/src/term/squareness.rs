@@ -3,8 +3,8 @@
 use super::check::{Number, magnitude};
 use super::reach::number;
 use super::{Extent, Kind, Reach, Term};
+use crate::Plane;
 use crate::law::{Profile, Unmergeable, finite};
-use crate::{Actuator, Plane};
 use num_traits::Float;
 
 /// Largest squareness error, rad: 1 % of the arm, as that of a length.
@@ -35,7 +35,7 @@ impl<T: Float> Kind<T> for Squareness<T> {
 
     fn add(self, profile: &mut Profile<T>) -> Result<(), Unmergeable> {
         let half = number::<T>(0.5) * finite(self.shear_rad)?;
-        let [first, second] = self.plane.axes().map(Actuator::index);
+        let [first, second] = self.plane.slides();
         profile.position[first][second] = profile.position[first][second] + half;
         profile.position[second][first] = profile.position[second][first] + half;
         Ok(())

@@ -7,6 +7,7 @@ pub const EVENTS: usize = 4;
 
 /// Something that happened, and when.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Event {
     /// Ticks since boot, wrapping.
     pub tick: u32,
@@ -16,6 +17,7 @@ pub struct Event {
 
 /// What happened.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum What {
     /// The controller started.
     Booted {
@@ -86,6 +88,7 @@ pub enum What {
 
 /// Why the controller started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ResetCause {
     /// The board cannot tell.
     Unknown,
@@ -101,6 +104,7 @@ pub enum ResetCause {
 
 /// What the ticks are counted by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ClockSource {
     /// A crystal, or an emulator.
     Crystal,

@@ -63,6 +63,7 @@ fn close(length: usize, out: &mut [u8]) -> Result<&mut [u8], TooLong> {
 
 /// What was thrown away since the start; wrapping.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FrameCounts {
     /// Frames whose CRC did not hold.
     pub crc_errors: u32,

@@ -3,6 +3,7 @@ use serde::{Deserialize, Serialize};
 
 /// Limits of the machine. SI, single precision.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MachineConfig {
     /// Largest feed, m/s.
     pub feed_m_s: f32,
@@ -26,6 +27,7 @@ pub struct MachineConfig {
 
 /// A number of the configuration by its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[allow(
     missing_docs,
     reason = "the message of each variant is its documentation"

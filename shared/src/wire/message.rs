@@ -268,6 +268,7 @@ pub struct Identity {
 
 /// A whole table in a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TableInfo {
     /// Length of the image, bytes.
     pub length: u16,
@@ -279,6 +280,7 @@ pub struct TableInfo {
 
 /// What a slot holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SlotState {
     /// Erased.
     Empty,
@@ -295,6 +297,7 @@ pub enum SlotState {
 
 /// Where a table committed but not confirmed stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Probation {
     /// No table is on probation.
     None,
@@ -306,6 +309,7 @@ pub enum Probation {
 
 /// What the engine is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum MotionState {
     /// At rest, ready.
     Idle,
@@ -328,6 +332,7 @@ impl MotionState {
 
 /// What is known of where the machine stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum PositionState {
     /// Nothing: no run starts and no set-point is meant for a drive, before it is declared, or adopted from the first
     /// set-point of a stream.
@@ -340,6 +345,7 @@ pub enum PositionState {
 
 /// Why the engine is in fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FaultCause {
     /// A tick was not finished when the next was due.
     Overrun,
@@ -351,6 +357,7 @@ pub enum FaultCause {
 
 /// Everything that went wrong and was survived; all count from boot and wrap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Counters {
     /// Ticks that were not finished when the next was due.
     pub tick_overruns: u32,
@@ -393,6 +400,7 @@ pub type Pose = [i32; 3];
 
 /// The controller's state.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Status {
     /// The engine.
     pub motion: MotionState,
@@ -438,6 +446,7 @@ pub struct Status {
 
 /// A set-point before and after the correction.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SetPoint {
     /// Programmed position, nm.
     pub raw_nm: Pose,

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// Why a command was not carried out.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Refusal {
     /// The CRC held but this build has no such command.
     #[error("the controller does not know this command")]
@@ -80,6 +81,7 @@ pub enum Refusal {
 
 /// How a flash failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FlashFault {
     /// Erasing failed.
     #[error("erase failed")]
@@ -103,6 +105,7 @@ pub enum FlashFault {
 
 /// Why the engine does not start.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum MotionRefusal {
     /// A number beyond the bounds of the image, or not a number.
     #[error("{quantity} is {value}, allowed are {lo} to {hi}")]

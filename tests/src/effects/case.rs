@@ -192,6 +192,9 @@ impl Case {
             });
         }
         together(&mut truth);
+        if lab.grid.planes.len() > 1 {
+            scales_by_slide(&mut truth, &machine, &base);
+        }
         let measured_with = seed ^ 0x6d65_6173;
         let mut campaign = instrument.measure(&machine, &plan, measured_with);
         if matches!(kind, Kind::Permuted(_)) {
@@ -231,6 +234,32 @@ fn together(truth: &mut [Truth]) {
         });
         // A pair has the number of its first slide.
         t.value = values[pair[0]];
+    }
+}
+
+/// Circles of several planes tell the scale of each slide that they move, and differences of scales are no thing beside those.
+fn scales_by_slide(truth: &mut Vec<Truth>, machine: &Machine, base: &Machine) {
+    /// Below this share of the largest a scale is that of a slide that nothing was done to.
+    const SOMETHING: f64 = 1e-3;
+    let is_scale = |t: &Truth| matches!(t.effect.as_str(), "scale_error" | "scale_mismatch");
+    let Some(first) = truth.iter().find(|t| is_scale(t)).cloned() else {
+        return;
+    };
+    let scale = [0, 1, 2].map(|k| 1e6 * (machine.geometry.scale[k] - base.geometry.scale[k]));
+    let largest = scale.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
+    truth.retain(|t| !is_scale(t));
+    for (slide, value) in scale.into_iter().enumerate() {
+        if value.abs() > SOMETHING * largest {
+            truth.push(Truth {
+                effect: "scale_error".into(),
+                accept: vec!["scale_error".into()],
+                seat: Seat::Slide(slide),
+                value,
+                by_pair: None,
+                unit: "um/m".into(),
+                ..first.clone()
+            });
+        }
     }
 }
 

@@ -104,9 +104,11 @@ pub fn judge(case: &Hidden, outcome: &Outcome) -> Verdict {
             continue;
         };
         if truth.seat != Seat::Whole {
-            let right = |f: &Finding| sits(truth, &f.actuators);
-            // Each right angle is one of its own; scales and lags of three slides are told by two differences.
-            let named = truth.effect != "squareness" || same.clone().any(|f| own(truth, f));
+            let alike = || case.truth.iter().filter(|t| t.effect == truth.effect);
+            let right = |f: &Finding| alike().any(|t| sits(t, &f.actuators));
+            // Each right angle and each slide is one of its own; lags of three slides are told by two differences.
+            let single = truth.effect == "squareness" || matches!(truth.seat, Seat::Slide(_));
+            let named = !single || same.clone().any(|f| own(truth, f));
             verdict.axis.push(named && same.clone().all(right));
         }
         let at = same

@@ -3,6 +3,7 @@
 use core::cell::{Cell, RefCell};
 use critical_section::{Mutex, RestoreState};
 use embedded_io::Write;
+use giotto_firmware::server::link::write_whole;
 use heapless::Deque;
 
 /// Bytes that wait to be sent, at most.
@@ -66,6 +67,6 @@ pub fn drain<W: Write>(port: &mut W) {
             critical_section::with(|token| BYTES.borrow(token).try_borrow_mut().ok()?.pop_front());
         let Some(byte) = byte else { return };
         // A log that cannot be sent is a log that is lost.
-        let _ = port.write_all(&[byte]);
+        let _ = write_whole(port, &[byte]);
     }
 }

@@ -7,7 +7,8 @@
 //! | thread | server, flash, set-points out, log, watchdog; sleeps when there is nothing to do | – |
 //!
 //! A tick that is due while the last one still runs is late: it is counted, the run stops within its limits, and
-//! nothing starts before a reset. A background that hangs is ended by the watchdog. The stop input (`super::stop`) is
+//! nothing starts before the fault is cleared. The watchdog is fed by the background, and only if there has been a tick since: it ends
+//! a background that hangs and a timer that does. The stop input (`super::stop`) is
 //! read in every tick.
 //!
 //! RTIC would prove that no lock is held across priorities. There is no lock: tick and background meet in two
@@ -20,6 +21,7 @@ pub mod interrupt;
 pub mod kept;
 pub mod log;
 pub mod port;
+pub mod record;
 pub mod stack;
 #[cfg(feature = "stepped")]
 pub mod steps;
@@ -34,7 +36,7 @@ use cortex_m_rt::exception;
 use critical_section::Mutex;
 use embedded_io::{Read, ReadReady, Write};
 use embedded_storage::nor_flash::NorFlash;
-use giotto_firmware::control::{self, Desk, Job, Shared, Tick};
+use giotto_firmware::control::{self, Alive, Desk, Job, Shared, Tick};
 use giotto_firmware::engine::{Config, Executor, Planner};
 use giotto_firmware::server::{Board, Buffers, Server, TimedSetPoint};
 use giotto_firmware::store::Layout;
@@ -69,8 +71,13 @@ type BoardDesk = Desk<
 >;
 
 static SHARED: Shared = Shared::new();
+/// What the watchdog is fed by.
+static ALIVE: Alive = Alive::new();
 /// Where the tick is made; the interrupt keeps a reference to it.
 static TICK: Mutex<Cell<Option<&'static mut BoardTick>>> = Mutex::new(Cell::new(None));
+
+// Ticks since boot, those included in which the core stood still.
+defmt::timestamp!("{=u32:ms}", SHARED.now() / (TICK_HZ / 1000));
 
 /// The tick's owner once it has begun. See the table above for its contract; the late flag is the next tick's
 /// own request, already pending.
@@ -94,6 +101,13 @@ fn SysTick() {
         WORST_TICK.store(used, Relaxed);
     }
     *LATE = SCB::is_pendst_pending();
+    ALIVE.ticked();
+}
+
+/// So many ticks fell due in which the core stood still; with interrupts masked.
+#[allow(dead_code, reason = "not every board stands still")]
+pub fn lose(ticks: u32) {
+    SHARED.lose(ticks);
 }
 
 /// Longest tick so far, by SysTick's count.
@@ -180,10 +194,13 @@ where
     G: Write,
 {
     let mut server = Server::boot(board, flash, layout, desk, buffers);
-    match server.active() {
-        Some(slot) => defmt::info!("boot: table in slot {=u8}", slot),
-        None => defmt::info!("boot: no confirmed table, bypass"),
-    }
+    defmt::info!(
+        "{=str} {=str}, {=u32} ticks a second",
+        board.name,
+        board.build,
+        board.tick_hz
+    );
+    let mut record = record::Record::new();
     if ports.stream.is_some() {
         server.subscribe(1, false);
     }
@@ -198,7 +215,7 @@ where
         ports.link
     };
     loop {
-        (ports.feed)();
+        ALIVE.feed(ports.feed);
         server.count_lost_bytes((ports.lost)());
         if rounds == 0 {
             let (worst, left) = stack::worst_and_left_bytes();
@@ -211,6 +228,7 @@ where
         if let Some(stream) = &mut ports.stream {
             let _ = server.stream(stream);
         }
+        record.say(&server);
         log::drain(&mut ports.log);
         if server.reset_requested() {
             defmt::info!("reset");

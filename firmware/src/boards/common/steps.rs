@@ -11,6 +11,7 @@
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use cortex_m::peripheral::SYST;
 use embedded_io::{ErrorType, Read, ReadReady, Write};
+use giotto_firmware::server::link::write_whole;
 
 /// First byte of a grant and of its answer.
 const MARK: u8 = 0xff;
@@ -141,7 +142,7 @@ impl<L: Read + ReadReady + Write> Stepped<L> {
     fn answer(&mut self, [sequence, ticks]: [u8; 2]) {
         self.owed = None;
         // The host asks again for what did not get through.
-        let _ = self.link.write_all(&[MARK, sequence, ticks, 0]);
+        let _ = write_whole(&mut self.link, &[MARK, sequence, ticks, 0]);
     }
 
     /// Whether the core may sleep until an interrupt. To be asked with interrupts masked.

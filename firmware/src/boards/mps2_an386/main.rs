@@ -36,6 +36,7 @@ mod image {
     use cortex_m_rt::entry;
     use embedded_io::{Read, Write};
     use giotto_firmware::server::Board;
+    use giotto_firmware::server::link::write_whole;
     use giotto_shared::wire::{ClockSource, PositionState, ResetCause};
 
     /// Clock of core and peripherals (DAI0386 2.5).
@@ -55,7 +56,7 @@ mod image {
         loop {
             let sent = link
                 .read(&mut bytes)
-                .map(|count| link.write_all(bytes.get(..count).unwrap_or(&[])));
+                .map(|count| write_whole(&mut link, bytes.get(..count).unwrap_or(&[])));
             if !matches!(sent, Ok(Ok(()))) {
                 cortex_m::asm::udf();
             }

@@ -2,11 +2,11 @@
 //!
 //! Interrupts are masked while it is erased or programmed: a core that fetches from it stands still anyway, and the tick must
 //! not take that for a run gone late. The store writes at rest only.
-use super::register;
+use super::{common, register};
 use core::ptr;
-use cortex_m::peripheral::SCB;
+use cortex_m::peripheral::{DWT, SCB, SYST};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
-use giotto_firmware::stm32_flash::{FlashError, Part, Register, UNIT, Units};
+use giotto_firmware::stm32_flash::{FlashError, Part, Register, UNIT, Units, ticks_due};
 use giotto_firmware::store::Layout;
 
 const FLASH: usize = 0x4002_3c00;
@@ -62,11 +62,16 @@ impl Flash {
     }
 }
 
-/// With interrupts masked; the tick that fell due meanwhile is not late: time stood still.
+/// With interrupts masked. The ticks that fell due meanwhile are not late, the core stood still; they are counted as passed. The
+/// counter of cycles runs on, and wraps after 25 s.
 fn masked<T>(act: impl FnOnce() -> T) -> T {
     critical_section::with(|_| {
+        let period = SYST::get_reload().wrapping_add(1);
+        let (began, into) = (DWT::cycle_count(), period.wrapping_sub(SYST::get_current()));
         let result = act();
+        let took = DWT::cycle_count().wrapping_sub(began);
         SCB::clear_pendst();
+        common::lose(ticks_due(took, into, period));
         result
     })
 }

@@ -8,7 +8,7 @@
 //! | PC3 (D11) | stop input: a closed contact to ground lets it run; open, or a broken wire, stops |
 //!
 //! Tables and key are in sectors 1 to 3 of the flash, between the vectors and the code. While one is erased the core stands still for
-//! up to half a second, and so does the tick: it happens at rest only, and the watchdog waits for four. So with the configuration, in
+//! up to half a second, and so does the tick: it happens at rest only, its time is counted, and the watchdog waits for four. So with the configuration, in
 //! sectors 10 and 11, for up to two seconds once in two hundred changes.
 //!
 //! **Never run on a real board**: what QEMU does not emulate (clock, flash, pins) follows the reference manual (RM0090) and
@@ -66,6 +66,8 @@ mod image {
         };
         stop::prepare();
         let started = cortex_m::Peripherals::take().and_then(|mut core| {
+            core.DCB.enable_trace();
+            core.DWT.enable_cycle_counter();
             let link = usart::Usart::link(&clock)?;
             common::interrupt::enable::<{ vectors::LINK }>(&mut core.NVIC);
             let desk = common::start(

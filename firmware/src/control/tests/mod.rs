@@ -1,6 +1,7 @@
 //! Tick and desk with the queues of a board between them: stop command, stop input, silent host, late ticks.
 mod pause;
 mod programs;
+mod soft_limits;
 mod streams;
 
 use super::*;
@@ -218,6 +219,22 @@ fn a_late_tick_is_counted_stops_the_run_and_leads_to_fault() {
     let stood = bench.now().raw_nm;
     bench.ticks(100);
     assert_eq!(bench.now().raw_nm, stood);
+}
+
+/// An erased sector of a flash that the core runs from: 1.7 s in which nothing is fetched.
+#[test]
+fn time_in_which_the_core_stood_still_has_passed() {
+    let mut bench = bench();
+    bench.ticks(100);
+    let before = bench.now();
+    bench.shared.lose(1700);
+    assert_eq!(bench.now().tick, before.tick + 1700, "at once");
+    bench.ticks(1);
+    let after = bench.now();
+    assert_eq!(after.tick, before.tick + 1701);
+    assert_eq!((after.raw_nm, after.tick_overruns), (before.raw_nm, 0));
+    bench.ticks(10);
+    assert_eq!(bench.now().tick, before.tick + 1711, "once");
 }
 
 #[test]

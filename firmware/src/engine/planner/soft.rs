@@ -2,6 +2,7 @@
 use super::numbers::arm;
 use super::{Planner, Refused};
 use core::f32::consts::{PI, TAU};
+use giotto_shared::Actuator;
 use giotto_shared::path::{ExactArc, ExactCircle};
 
 /// What rounding of vectors and single precision may carry an arc over a limit that it was meant to touch, m.
@@ -31,11 +32,16 @@ impl Planner {
         Ok(())
     }
 
-    /// Circles in a plane of constant Z.
+    /// Circles in a plane of two axes: the third does not move from where the centre is.
     pub fn soft_circle(&self, run: &ExactCircle) -> Result<(), Refused> {
         let radius_m = run.radius_half_nm as f32 * 0.5e-9;
-        let reach = [radius_m, radius_m, 0.0];
-        for (axis, (nm, reach)) in run.centre_nm.iter().zip(reach).enumerate() {
+        let turning = run.plane.axes();
+        for (axis, (nm, slide)) in run.centre_nm.iter().zip(Actuator::SLIDES).enumerate() {
+            let reach = if turning.contains(&slide) {
+                radius_m
+            } else {
+                0.0
+            };
             let centre_m = *nm as f32 * 1e-9;
             self.soft_span(axis, [centre_m - reach, centre_m + reach])?;
         }

@@ -16,11 +16,24 @@ pub(super) struct Before {
     pub(super) place_nm: [[i32; 3]; 5],
 }
 
-/// Limits, nm per tick² and per tick³.
+/// Limits, nm per tick, per tick² and per tick³.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub(super) struct Limits {
+    pub(super) feed: f32,
     pub(super) acceleration: f32,
     pub(super) jerk: f32,
+}
+
+impl Limits {
+    /// Largest acceleration that a brake goes on from, at a speed. Taken back at the limit of jerk, an acceleration a adds
+    /// a²/2j to the speed. A sender within feed and jerk has no more of it than leads to its feed, to a tick of jerk, which is
+    /// what a difference of set-points is late by. A rougher sender may have more: the brake would then be faster than any
+    /// set-point was, so that it begins with less.
+    fn growing(&self, speed: f32) -> f32 {
+        let room = (self.feed - speed).max(0.0);
+        let lawful = libm::sqrtf(2.0 * self.jerk * room) + self.jerk;
+        lawful.min(self.acceleration)
+    }
 }
 
 /// A brake under way.
@@ -95,8 +108,7 @@ impl Brake {
             return Self::default();
         }
         let along = combined(velocity, 1.0 / speed, velocity, 0.0);
-        // Set-points may be as rough as their sender likes: more than the limit is not taken back at the limit of jerk.
-        let acceleration = (speed - dot(earlier, along)).min(limits.acceleration);
+        let acceleration = (speed - dot(earlier, along)).min(limits.growing(speed));
         let mut brake = Self {
             along,
             way: speed,
@@ -190,7 +202,8 @@ impl Brake {
 /// Farthest that a brake from a velocity and its change leads on one axis, nm; `speed` is that along the path. All per tick.
 pub(crate) fn farthest_nm(limits: [f32; 2], speed: f32, velocity: f32, change: f32) -> f32 {
     let [acceleration, jerk] = limits;
-    let (velocity, change) = (velocity.abs(), change.clamp(0.0, acceleration));
+    // Not `clamp`: it panics at a limit that is no number.
+    let (velocity, change) = (velocity.abs(), change.max(0.0).min(acceleration));
     // While the acceleration is taken back the speed still grows.
     let gained = velocity + 0.5 * change * change / jerk;
     let growing = change / jerk * (velocity + change * change / (3.0 * jerk));

@@ -81,7 +81,11 @@ impl StreamPlan {
             outer: single_to_fixed(outer, WEIGHT_BITS),
             step_nm: single_to_fixed(n.feed_m_s / n.rate_hz * 1.05e9, 0) as u32,
             hold_ticks: n.hold_ticks,
-            limits: Limits { acceleration, jerk },
+            limits: Limits {
+                feed: n.feed_m_s * tick_s * 1e9,
+                acceleration,
+                jerk,
+            },
             engage_ticks: n.engage_ticks,
             offset_nm,
             slew_nm,

@@ -45,6 +45,9 @@ pub fn learn(plan: &Plan, seed: u64) -> Result<Learned, DemoError> {
             ..diagnosis::Options::default()
         },
     )?;
+    if !diagnosis.worth_writing {
+        return Err(DemoError::NotProven);
+    }
     let table = table_from_model(&diagnosis.model)?;
     Ok(Learned {
         campaign,

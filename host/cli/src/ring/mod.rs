@@ -47,6 +47,9 @@ pub enum DemoError {
     /// The diagnosis.
     #[error(transparent)]
     Diagnosis(#[from] DiagnosisError),
+    /// The runs left out do not prove the extended model.
+    #[error("the extended model is not proven on runs left out: nothing is flashed")]
+    NotProven,
     /// The extended model has no table.
     #[error(transparent)]
     Model(#[from] ModelTableError),

@@ -192,7 +192,9 @@ fn alike(head: &Head, from: usize, separator: u8) -> bool {
     };
     let next: Vec<&String> = head.lines[from + 1..].iter().take(ALIKE).collect();
     let filled: Vec<&&String> = next.iter().filter(|l| !l.trim().is_empty()).collect();
-    filled.len() + 1 >= ALIKE.min(head.lines.len() - from)
+    // A file of two rows has no third.
+    let there = head.lines[from..].iter().filter(|l| !l.trim().is_empty());
+    filled.len() + 1 >= there.take(ALIKE).count()
         && filled.iter().all(|line| shape(line) == Some(width))
 }
 
