@@ -465,10 +465,10 @@ phase_rad = 0.5
     /// A whole effect of a cause, as a file would hold it, and the names of its parameters that have to be there.
     fn whole(cause: Cause) -> (String, Vec<&'static str>) {
         let place = match cause.model().seat() {
-            Seat::Machine | Seat::MachineOrOne => "",
+            Seat::Machine | Seat::MachineOrOne | Seat::MachineOrJoint => "",
             Seat::One => "axis = \"z\"\n",
             Seat::Pair | Seat::PairOrJoint => "plane = \"zx\"\n",
-            Seat::Joint | Seat::MachineOrJoint => "axis = \"joint2\"\n",
+            Seat::Joint => "axis = \"joint2\"\n",
             Seat::Across => "axis = \"z\"\nacross = \"y\"\n",
         };
         let inside = |[lowest, highest]: [f64; 2]| 0.9 * lowest + 0.1 * highest;

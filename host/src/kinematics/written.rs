@@ -219,7 +219,7 @@ impl WrittenKinematics {
                     expected: BRANCH,
                 })?,
         };
-        Ok((tool.map(|v| v * 1e-3), given.map(|v| v / norm), branch))
+        Ok((tool.map(|v| v / 1e3), given.map(|v| v / norm), branch))
     }
 
     /// Refuses keys that are there and not among the `allowed`.
@@ -263,7 +263,7 @@ fn length(key: &'static str, mm: Option<f64>) -> Result<f64, Fault> {
         expected: LENGTH,
     })?;
     match (-LONGEST_MM..=LONGEST_MM).contains(&mm) {
-        true => Ok(mm * 1e-3),
+        true => Ok(mm / 1e3),
         false => Err(Fault::Range {
             key,
             found: mm.to_string(),
