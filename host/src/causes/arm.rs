@@ -1,6 +1,6 @@
 //! What a signature may know of an arm in one run: the circle as its joints see it, and how all joints answer.
 use super::{Harmonics, ORDERS, RunView};
-use crate::kinematics::{COARSE, Cycle, Orbit, Reversal, WAVES};
+use crate::kinematics::{COARSE, Cycle, Orbit, WAVES};
 use giotto_shared::Actuator;
 use rustfft::num_complex::Complex;
 use std::f64::consts::TAU;
@@ -76,17 +76,6 @@ pub fn has_shape(waves: &Harmonics, of: f64) -> bool {
         .sum::<f64>()
         .sqrt();
     beyond > SHOWS * of
-}
-
-/// The last of a joint's reversals before a polar angle, the circle run in direction `sign`, and the angle since, rad.
-pub fn last_reversal(reversals: &[Reversal], psi_rad: f64, sign: f64) -> Option<(&Reversal, f64)> {
-    reversals
-        .iter()
-        .map(|reversal| {
-            let since = (sign * (psi_rad - reversal.angle_rad)).rem_euclid(TAU);
-            (reversal, since)
-        })
-        .min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Mean and waves of a quantity over one turn.

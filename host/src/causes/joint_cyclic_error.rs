@@ -15,6 +15,8 @@ const WORDS: Words = Words {
     what: "a ripple with a fixed period in a joint's angle: dense where the joint is fast, stretched where it turns back",
     usual: "transmission error of the joint's gear: once or twice a turn of its input",
     adjust: "map the joint over one turn of its gear's input, or have the gear overhauled",
+    positive: "the gear of {a} is off by up to {size} within each turn of its input: map it, or have it overhauled",
+    negative: "the gear of {a} is off by up to {size} within each turn of its input: map it, or have it overhauled",
     never_told_from: &[],
     next: "a slow turn of the joint alone over a few waves, with an encoder or a tracker at the tool",
     not_compensable: Some("the table has no model of the arm"),
@@ -128,6 +130,11 @@ impl CauseModel for JointCyclicError {
             ratio += BESIDE * TAU / swing;
         }
         shapes
+    }
+
+    /// In waves a turn here, since a joint's place is an angle.
+    fn finest_wave_per_m(&self, _views: &[RunView]) -> Option<f64> {
+        Some(RATIOS[1])
     }
 
     /// About a hundredth of a wave over a swing of half a radian.

@@ -14,6 +14,8 @@ const WORDS: Words = Words {
     what: "size and oval of circles depend on the place, at every speed alike: a joint's zero is off",
     usual: "a calibration mark or revolution counter set wrong after a repair or a collision",
     adjust: "calibrate that joint's zero again",
+    positive: "{a} stands {size} further than its controller reads: set its zero again, {size} less",
+    negative: "{a} stands {size} less far than its controller reads: set its zero again, {size} more",
     never_told_from: &[],
     next: "the same circle at three more places of the work space",
     not_compensable: Some("the table has no model of the arm"),

@@ -14,6 +14,8 @@ const WORDS: Words = Words {
     what: "size and oval of circles depend on the place, at every speed alike: a link is longer or shorter than the controller has it",
     usual: "nominal instead of calibrated lengths, a repaired arm, warmth",
     adjust: "enter the calibrated length of that link",
+    positive: "the link behind {a} is {size} longer than the controller has it: enter its calibrated length",
+    negative: "the link behind {a} is {size} shorter than the controller has it: enter its calibrated length",
     never_told_from: &[],
     next: "the same circle at three more places of the work space",
     not_compensable: Some("the table has no model of the arm"),

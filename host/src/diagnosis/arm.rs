@@ -24,6 +24,8 @@ pub struct Arms {
     arms_m: [f64; 6],
 }
 
+/// Square of 1/|G| that is taken at least.
+const LEAST_SQUARE: f64 = 0.25;
 /// Share of κ2 and of b by which the baseline is moved for its slopes.
 const STEP: f64 = 1e-3;
 /// The least of it, s² and s⁴.
@@ -102,12 +104,32 @@ fn answers(
     sign: f64,
 ) -> ([Complex<f64>; WAVES], [Complex<f64>; WAVES]) {
     let chain: [Complex<f64>; WAVES] = std::array::from_fn(|n| {
-        let forward = response.answer(n as f64 * omega_rad_s);
+        let forward = answer(response, n as f64 * omega_rad_s);
         if sign < 0.0 { forward.conj() } else { forward }
     });
     let lag = chain[1].arg();
     let answers = std::array::from_fn(|n| chain[n] * Complex::cis(-(n as f64) * lag));
     (chain, answers)
+}
+
+/// G(jω) of the simplest chain with a response: one lag for b ≤ 0, else a second-order element. Beyond the rates of the
+/// circles themselves, where a fitted b < 0 would blow up, the gain is held at 2.
+fn answer(response: &Response, omega_rad_s: f64) -> Complex<f64> {
+    let (a, b) = (response.a_s2, response.b_s4);
+    let w2 = omega_rad_s * omega_rad_s;
+    let gain = (1.0 + a * w2 + b * w2 * w2)
+        .max(LEAST_SQUARE)
+        .sqrt()
+        .recip();
+    let lag_rad = if b > 0.0 {
+        let omega_n = b.powf(-0.25);
+        let zeta = (0.5 + 0.25 * a * omega_n * omega_n).max(0.0).sqrt();
+        let r = omega_rad_s / omega_n;
+        (2.0 * zeta * r).atan2(1.0 - r * r)
+    } else {
+        (a.max(0.0).sqrt() * omega_rad_s).atan()
+    };
+    Complex::from_polar(gain, -lag_rad)
 }
 
 /// The lag that fits the sizes of a campaign, of an arm or of slides.

@@ -2,7 +2,7 @@
 //!
 //! `r = lever·A·sin(w·q + φ)` is one frequency over the joint's angle q, whatever the circle and the speed. What pulls at each
 //! angle, folded into fine bins, holds every ratio at once in one transform, as for the pitch of a slide (`pitch`).
-use super::column::Column;
+use super::design_column::Column;
 use super::survey::Prepared;
 use crate::causes::RunView;
 use crate::causes::joint_cyclic_error::waves_of;

@@ -43,7 +43,7 @@ pub fn is_like_arm(found: &Explained) -> bool {
     if runs.iter().any(|run| run.view.arm.is_some() || is_arc(run)) {
         return false;
     }
-    let data = found.ledger.column(0);
+    let data = found.gram.column(0);
     let seen: Vec<Seen> = runs
         .iter()
         .zip(data.low())

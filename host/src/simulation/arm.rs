@@ -6,8 +6,8 @@
 use super::axis::AxisPoint;
 use super::circle::CircleTest;
 use super::geometry::{self, Place};
+use super::hysteresis::{Hysteresis, turning_point};
 use super::machine::{AccDec, Friction, Machine};
-use super::memory::{Memory, turning_point};
 use crate::kinematics::{Angles, Kinematics, WAVES, short_way, waves};
 use giotto_shared::Direction;
 use rustfft::num_complex::Complex;
@@ -35,6 +35,9 @@ pub struct Joint {
     pub kappa2_s2: f64,
     /// Play of its gear, rad.
     pub backlash_rad: f64,
+    /// Time constant with which the joint's loop smooths what play and friction add, s; 0: they act behind it. The smoothed
+    /// error is as much earlier, as that of a loop whose lag it is.
+    pub smoothed_s: f64,
     /// Friction; lengths are angles here (rad for m).
     pub friction: Option<Friction>,
     /// Periodic error of its gear.
@@ -80,6 +83,7 @@ impl Arm {
                 ("joint.dead_time_s", joint.dead_time_s),
                 ("joint.kappa2_s2", joint.kappa2_s2),
                 ("joint.backlash_rad", joint.backlash_rad),
+                ("joint.smoothed_s", joint.smoothed_s),
                 ("joint.zero_rad", joint.zero_rad),
                 ("joint.friction", friction.peak_m),
                 ("joint.friction", friction.rise_s),
@@ -242,20 +246,39 @@ fn remembered(
         ..Machine::default()
     };
     let turn: Vec<[f64; 2]> = (0..steps).map(motion).collect();
-    let Some(mut memory) = Memory::new(&own, 0, turn[0], step_s) else {
+    let Some(mut memory) = Hysteresis::new(&own, 0, turn[0], step_s) else {
         return turn.iter().step_by(every).map(|m| m[0]).collect();
     };
-    let mut out = Vec::with_capacity(steps / every);
+    let mut errors = Vec::with_capacity(steps);
     for step in 0..2 * steps {
         let (here, next) = (turn[step % steps], turn[(step + 1) % steps]);
-        if step >= steps && step.is_multiple_of(every) {
-            out.push(here[0] + memory.error_m(here[0], here[1]));
+        if step >= steps {
+            errors.push(memory.error_m(here[0], here[1]));
         }
         let y = [here[0], here[1], next[0], next[1]];
         let mut turns = turning_point(y, step_s);
         memory.follow(y, [0.0, 1.0], &mut turns);
     }
-    out
+    if joint.smoothed_s > 0.0 {
+        errors = smoothed(&errors, joint.smoothed_s, step_s);
+    }
+    let at = |step: usize| turn[step][0] + errors[step];
+    (0..steps).step_by(every).map(at).collect()
+}
+
+/// A periodic error behind a lag, seen as much earlier as the lag is long.
+fn smoothed(errors: &[f64], lag_s: f64, step_s: f64) -> Vec<f64> {
+    let steps = errors.len();
+    let keep = (-step_s / lag_s).exp();
+    let mut out = vec![0.0; steps];
+    let mut state = errors[steps - 1];
+    // Once round to forget the start.
+    for step in 0..2 * steps {
+        state = keep * state + (1.0 - keep) * errors[step % steps];
+        out[step % steps] = state;
+    }
+    let ahead = (lag_s / step_s).round() as usize;
+    (0..steps).map(|step| out[(step + ahead) % steps]).collect()
 }
 
 /// Answer of a joint to a wave of its command.

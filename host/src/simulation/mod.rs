@@ -21,14 +21,14 @@ mod drive;
 mod extend;
 mod from_model;
 mod geometry;
+mod hysteresis;
 mod instrument;
 pub mod machine;
 mod machine_spec;
-mod memory;
-mod orbit;
 mod plan;
 pub mod plan_file;
 mod preset;
+mod steady_circle;
 mod wave;
 
 pub use arm::Arm;

@@ -144,7 +144,7 @@ fn example(cause: Cause, site: Site) -> Option<(Effect, Vec<f64>, f64)> {
             vec![0.05, 0.006, 1e-5],
             6e-2,
         ),
-        Cause::JointBacklash => (0.1, vec![], vec![1e-4], 5e-2),
+        Cause::JointBacklash => (0.1, vec![("smoothed_s", 0.008)], vec![1e-4, 0.008], 5e-2),
         Cause::JointCyclicError => (
             0.05,
             vec![("ratio", 121.0), ("phase_rad", 0.7)],
