@@ -11,6 +11,8 @@ struct Memory {
     ram: u32,
     /// Where the code begins, if not behind the vectors.
     code: u32,
+    /// Bytes of stack.
+    stack: u32,
 }
 
 const BOARDS: [Memory; 3] = [
@@ -20,6 +22,7 @@ const BOARDS: [Memory; 3] = [
         flash: 0x0000_0000,
         ram: 0x2000_0000,
         code: 0,
+        stack: STACK,
     },
     // Vectors in sector 0, tables and key in 1 to 3, code from sector 4 on, configuration in 10 and 11 (RM0090 3.3). The first of
     // two RAMs (RM0090 2.3).
@@ -28,21 +31,24 @@ const BOARDS: [Memory; 3] = [
         flash: 0x0800_0000,
         ram: 0x2000_0000,
         code: 0x0801_0000,
+        stack: STACK,
     },
     Memory {
         feature: "CARGO_FEATURE_TICKS",
         flash: 0x0000_0000,
         ram: 0x2000_0000,
         code: 0,
+        // It makes everything on its stack.
+        stack: 32 * 1024,
     },
 ];
 
 /// Most text and most RAM, stack and all, of an image: a quarter of what the STM32F405 has, so that what is too large does
 /// not link.
 const ROOM: [u32; 2] = [256 * 1024, 48 * 1024];
-/// Of that RAM, the stack. It lies below the variables, where memory begins: one that grows too long leaves memory, which is a
-/// fault, and never writes into variables. Variables that do not fit above it do not link.
-const STACK: u32 = 8 * 1024;
+/// Of that RAM, the stack of a controller. It lies below the variables, where memory begins: one that grows too long leaves memory,
+/// which is a fault, and never writes into variables. Variables that do not fit above it do not link.
+const STACK: u32 = 10 * 1024;
 
 /// Version of the package and, in a git work tree, the commit: what an image says of itself.
 fn build() -> String {
@@ -84,11 +90,11 @@ fn main() {
     let [text, ram] = ROOM;
     let (flash, ram) = (
         region("FLASH", (board.flash, text)),
-        region("RAM", (board.ram + STACK, ram - STACK)),
+        region("RAM", (board.ram + board.stack, ram - board.stack)),
     );
     let stack = format!(
         "_stack_start = {:#010x};\n_stack_end = {:#010x};\n",
-        board.ram + STACK,
+        board.ram + board.stack,
         board.ram
     );
     let code = if board.code > 0 {

@@ -46,7 +46,11 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let inputs = args.source.inputs(args.model.as_deref());
     Destination::maybe(args.output.as_deref(), Kind::Model, &inputs)?;
     let page = Destination::maybe(args.report.as_deref(), Kind::Html, &inputs)?;
-    let campaign = args.source.read(out)?;
+    let (campaign, mislabelled) = if args.keep_all {
+        (args.source.read(out)?, Vec::new())
+    } else {
+        args.source.read_labelled(out)?
+    };
     let model = args.model.as_deref().map(ModelFile::load).transpose()?;
     let bar = out.spinner("diagnosing");
     let diagnosis = diagnose(
@@ -60,6 +64,7 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     );
     bar.finish_and_clear();
     let mut diagnosis = diagnosis.map_err(|e| args.source.refused(&e))?;
+    diagnosis.left_out.splice(0..0, mislabelled);
     let mut refused = None;
     match &args.output {
         Some(path) if diagnosis.worth_writing => {

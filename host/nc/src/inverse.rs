@@ -37,7 +37,7 @@ impl Inverse {
             keep: options.keep,
             omega_max: OMEGA_MARGIN * model.valid.feed_mm_s[1] / model.valid.radius_mm[0],
             max_offset_mm: options.max_offset_mm,
-            steps: Steps::new(Response::of(&model.servo), options.acceleration_mm_s2),
+            steps: Steps::new(Response::of(&model.servo), options),
         }
     }
 

@@ -16,11 +16,15 @@ mod chain;
 pub mod check;
 mod codes;
 mod correct;
+mod dialect;
 mod digits;
 mod emit;
 mod engine;
 mod flow;
 mod inverse;
+mod joint;
+mod lead;
+mod least_squares;
 mod left;
 mod mark;
 #[cfg(test)]
@@ -37,6 +41,7 @@ mod transition;
 mod word;
 
 use giotto::model_file::ModelFile;
+pub use lead::{FreeSide, Leads, Led};
 pub use left::{Because, Code, Left};
 pub use mark::{Mark, marked};
 use std::io;
@@ -68,6 +73,11 @@ pub struct Options {
     pub printer: bool,
     /// Codes of the machine's own that move nothing.
     pub harmless: Vec<Code>,
+    /// The last stretch of an arc before a stop may be run more slowly than F says, where the machine would leave the
+    /// circle otherwise.
+    pub slow_to_stops: bool,
+    /// Leads of full circles that begin or end at a stop; not in RAPID.
+    pub leads: Leads,
 }
 
 impl Default for Options {
@@ -80,6 +90,8 @@ impl Default for Options {
             absolute_centres: false,
             printer: false,
             harmless: Vec::new(),
+            slow_to_stops: true,
+            leads: Leads::No,
         }
     }
 }
@@ -108,6 +120,8 @@ pub enum Fate {
         blocks: usize,
         /// Largest share of `delta_mm` that is expected to remain as an error where the arc meets its neighbours.
         joint_share: f64,
+        /// Its leads.
+        led: Led,
     },
     /// As it was.
     Left(Left),
@@ -136,7 +150,7 @@ pub fn is_program(program: &[u8]) -> bool {
             !line.words.is_empty() && line.words.iter().any(|w| !w.value.is_nan())
         }
         word::Sort::Flow(_) | word::Sort::Setting => true,
-        word::Sort::Unread => false,
+        word::Sort::Unread => dialect::arc(line.text).is_some(),
     };
     word::lines(program).any(block)
 }

@@ -43,7 +43,7 @@ pub use check::sample_noise;
 pub use error::{CampaignError, Place, Problem};
 pub use giotto_shared::{Direction, Frame, Plane};
 pub use manifest::{Entry, Manifest, SHORTEST_ARC_DEG};
-pub use read::{Together, read, read_with_notes};
+pub use read::{Mislabelled, Together, read, read_with_notes};
 pub use samples::{Loaded, Location, Tilt};
 pub(crate) use table::is_contract_header;
 pub use write::replace;
@@ -168,11 +168,17 @@ impl Run {
 }
 
 impl Samples {
-    /// Angle covered, rad, counting one spacing for the last sample; `None` for a whole turn.
+    /// Angle covered, rad, counting one spacing for the last sample; `None` for a whole turn, of which measured angles may lack as
+    /// much at its seam as anywhere else.
     pub fn arc_rad(&self) -> Option<f64> {
         let n = self.angle_rad.len() as f64;
         let span = (self.angle_rad.last()? - self.angle_rad.first()?).abs();
         let spacing = span / (n - 1.0).max(1.0);
-        (span + spacing < TAU - 2.0 * spacing - 1f64.to_radians()).then_some(span + spacing)
+        let seam = if self.angle_inferred {
+            1f64.to_radians()
+        } else {
+            check::LARGEST_GAP_DEG.to_radians()
+        };
+        (span + spacing < TAU - 2.0 * spacing - seam).then_some(span + spacing)
     }
 }

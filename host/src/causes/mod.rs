@@ -1,7 +1,7 @@
 //! Causes: one file each. A cause knows its signature in measured circles, its element in the
 //! simulation, its inverse if it has one, and the words for a person. Causes know nothing of each other.
 //!
-//! To add a cause: write its file, name its module and add one line to the list of [`register`].
+//! To add a cause: write its file, name its module and add one line to the list of `register`.
 mod backlash;
 mod bandwidth_mismatch;
 mod cyclic_error;

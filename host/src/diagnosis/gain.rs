@@ -171,10 +171,10 @@ pub fn measure(
     clamp: Option<Clamp>,
     seed: u64,
 ) -> Gain {
-    let circles: Vec<[f64; 2]> = campaign
+    let circles: Vec<[f64; 3]> = campaign
         .runs
         .iter()
-        .map(|run| [run.radius_m, run.feed_m_s])
+        .map(|run| [run.radius_m, run.feed_m_s, run.sign()])
         .collect();
     let [radii, feeds] = veto::folds(&circles);
     let count = [radii.len(), feeds.len()];

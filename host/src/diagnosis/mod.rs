@@ -249,10 +249,7 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
             .map(|(item, other)| tie_words(found, *item, *other)),
     );
     let model = extended_model(&session.campaign, &survey, found, &baseline, &stated);
-    let mut picture = picture::draw(&session.campaign, &seen, found);
-    picture
-        .iter_mut()
-        .for_each(|run| run.index = session.places[run.index]);
+    let picture = pictured(&session.campaign, &session.places, &seen, found);
     // Where no run can be left out, what the search leaves of the runs it saw.
     let in_sample_um = misfit::rms_um(found);
     let heldout_um = |of: &dyn Fn(&Gain) -> f64| proof.as_ref().map_or(in_sample_um, of);
@@ -284,6 +281,20 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
     };
     diagnosis.recommendation = recommendation::of(&diagnosis);
     Ok(diagnosis)
+}
+
+/// What the plots of a report draw, run by run; `places` are those of the runs in the given campaign.
+fn pictured(
+    campaign: &Campaign,
+    places: &[usize],
+    seen: &Campaign,
+    found: &Explained,
+) -> Vec<picture::RunPicture> {
+    let mut picture = picture::draw(campaign, seen, found);
+    for run in &mut picture {
+        run.index = places[run.index];
+    }
+    picture
 }
 
 /// Whether a model holds something that can be called real: causes that are proven on runs left out, or, without any, a
@@ -566,8 +577,12 @@ fn state(
             proven: proof.is_some_and(|gain| gain.ci95_percent[0] > 0.0),
         },
     );
+    // Where the scatter is assumed, an interval that holds zero shows nothing.
+    let shown = |[low, high]: [f64; 2]| footing.measured_scatter || !(low <= 0.0 && high >= 0.0);
     findings.retain(|finding| {
-        finding.probability > status::TIE && finding.cause.model().allows(finding.estimate.value)
+        finding.probability > status::TIE
+            && finding.cause.model().allows(finding.estimate.value)
+            && shown(finding.estimate.ci95)
     });
     let unexplained = if footing.measured_scatter {
         let mut unexplained = unexplained::describe(found, durations);
@@ -640,6 +655,15 @@ fn poverty(campaign: &Campaign, repeatability_m: f64) -> Vec<String> {
             "{} run(s): the scatter between runs cannot be measured and is taken as {:.1} µm (`--repeatability` states another), so what is listed is provisional and nothing can be called real; measure at least {FEWEST_RUNS}, better 26",
             campaign.runs.len(),
             repeatability_m * 1e6
+        ));
+    }
+    if distinct(&|run| run.feed_m_s) < 2 {
+        let sizes = sizes(campaign, |run| run.feed_m_s);
+        let mean_m = sizes.iter().map(|size| size.error_m).sum::<f64>() / sizes.len().max(1) as f64;
+        out.push(format!(
+            "the circles are {:.0} µm too {}, and at one speed a servo that lags, an offset of the radius and a scale look alike",
+            (mean_m * 1e6).abs(),
+            if mean_m < 0.0 { "small" } else { "large" }
         ));
     }
     if distinct(&|run| run.radius_m) < 2 {

@@ -403,11 +403,50 @@ fn padded(samples: usize) -> usize {
 
 fn spectrum(clean: &Clean<'_>, transform: &Arc<dyn Fft<f64>>, noise_m2: f64) -> Spectrum {
     let (n, length) = (clean.samples.len(), transform.len());
+    let mut power = powers(clean.samples, transform, noise_m2);
+    whiten(&mut power, length as f64 / n as f64);
     Spectrum {
         turn_s: clean.turn_s,
         nyquist_hz: 0.5 * n as f64 / clean.turn_s,
-        power: powers(clean.samples, transform, noise_m2),
+        power,
         per_hz: clean.turn_s * length as f64 / n as f64,
+    }
+}
+
+/// Brings noise that is louder at some frequencies, as noise correlated along the turn is at low ones, down to the level of white
+/// noise: by the median within an octave to either side, which a tone of a wave or two does not move. Nothing is made louder.
+fn whiten(power: &mut [f64], places_a_wave: f64) {
+    /// Median of χ²₂.
+    const MEDIAN: f64 = 1.386;
+    /// Knots an octave, between which the level is drawn as a line.
+    const KNOTS: f64 = 4.0;
+    let lowest = ((FEWEST_WAVES - 1.0) * places_a_wave) as usize;
+    let mut part = Vec::new();
+    let mut level = |centre: f64| -> f64 {
+        let from = ((0.5 * centre) as usize).max(lowest);
+        let to = ((2.0 * centre) as usize + 1).min(power.len());
+        part.clear();
+        part.extend_from_slice(power.get(from..to).unwrap_or(&[]));
+        let middle = part.len() / 2;
+        if part.is_empty() {
+            return 1.0;
+        }
+        (*part.select_nth_unstable_by(middle, f64::total_cmp).1 / MEDIAN).max(1.0)
+    };
+    let step = 2f64.powf(1.0 / KNOTS);
+    let mut knots = Vec::new();
+    let mut at = lowest.max(1) as f64;
+    while at < power.len() as f64 * step {
+        knots.push((at, level(at)));
+        at *= step;
+    }
+    for pair in knots.windows(2) {
+        let [(from, low), (to, high)] = [pair[0], pair[1]];
+        let end = (to as usize).min(power.len());
+        for (place, value) in power.iter_mut().enumerate().take(end).skip(from as usize) {
+            let share = (place as f64 - from) / (to - from);
+            *value /= low + (high - low) * share.clamp(0.0, 1.0);
+        }
     }
 }
 

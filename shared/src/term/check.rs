@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// Which number of a term an error speaks of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[allow(missing_docs, reason = "the name is the field of the term")]
 pub enum Number {
     Length,

@@ -90,7 +90,7 @@ pub(super) fn slow(
 }
 
 /// Seconds of a stamp since 1970 (UTC assumed; only differences are used).
-fn seconds(text: &str, order: DateOrder) -> Option<f64> {
+pub(super) fn seconds(text: &str, order: DateOrder) -> Option<f64> {
     let text = text.trim().trim_start_matches('\'').trim();
     let (date, clock) = match text.split_once([' ', 'T']) {
         Some((date, clock)) => (Some(date), clock),
