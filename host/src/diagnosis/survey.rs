@@ -421,6 +421,10 @@ fn lowest_by_parabolas(
     mut steps: [f64; 2],
     cost: &dyn Fn([f64; 2]) -> f64,
 ) -> [f64; 2] {
+    #[allow(
+        clippy::needless_range_loop,
+        reason = "the number is a choice of parameter"
+    )]
     for _ in 0..60 {
         for which in 0..2 {
             let moved = |delta: f64| {
