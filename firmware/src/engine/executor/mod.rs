@@ -17,19 +17,19 @@
 //! | set-point of a stream ([`super::Stream`]) | 146 | 146 |
 //! | whole interrupt, helix with the dearest eight, each set-point recorded | | 1181; 2441 where a segment is taken |
 //!
-//! Lines, helices and stops in a ramp run in `curve`, what is between motions in `between`; between two ticks of 8 kHz at
+//! Lines, helices and stops in a ramp run in `curve`, what is between motions in `transitions`; between two ticks of 8 kHz at
 //! 25 MHz are 3125.
 mod arc;
-mod between;
 mod curve;
 mod pause;
 mod phase;
+mod transitions;
 
 use crate::engine::engage::Engage;
 use crate::engine::guard::Guard;
+use crate::engine::hysteresis::Sides;
 use crate::engine::planned::{Law, Planned};
 use crate::engine::ramp::{Clock, POLYNOMIAL};
-use crate::engine::sides::Sides;
 use crate::engine::{Counters, Fault, Output, flag};
 use giotto_shared::angle::SINCOS;
 
@@ -55,6 +55,10 @@ impl Inbox for heapless::spsc::Consumer<'_, Planned> {
 enum Mode {
     /// Stands still, nothing in hand.
     Rest,
+    /// Stands still, a segment taken in this tick: the sides of its slides are for the next …
+    Taken,
+    /// … and the offset that it starts with for the one after that.
+    Sided,
     /// Stands still while the offset moves to what the segment in hand starts with.
     Settle,
     /// Stands still for a time.
@@ -301,6 +305,8 @@ impl Executor {
             Mode::Rise => self.any_ramp(false),
             Mode::Fall => self.any_ramp(true),
             Mode::Both => self.both(),
+            Mode::Taken => self.begin_sides(),
+            Mode::Sided => self.begin_settle(),
             Mode::Settle => self.settle(),
             Mode::Dwell => self.dwell(),
             Mode::Rest => self.rest(inbox),
