@@ -103,6 +103,32 @@ fn quantiles(free: usize, many: usize) -> Quantiles {
 }
 
 /// Compares two campaigns.
+///
+/// ```
+/// use giotto::comparison::{Fate, compare};
+/// use giotto::simulation::{self, Plan};
+/// use giotto::summary::Summary;
+/// use giotto::{analysis, diagnosis};
+/// # use std::path::Path;
+/// let summary = |backlash_um: f64| -> Result<Summary, Box<dyn std::error::Error>> {
+///     let plan = Plan::parse(
+///         &format!(
+///             "[machine]\nboth = {{ kv_per_s = 50.0 }}\ny = {{ backlash_um = {backlash_um:?} }}\n\
+///              [grid]\nradii_mm = [50.0, 100.0, 150.0]\nfeeds_mm_s = [20.0, 100.0, 300.0]"
+///         ),
+///         Path::new("plan.toml"),
+///     )?;
+///     let campaign = simulation::campaign(&plan, 1);
+///     let report = analysis::of_campaign(&campaign).map_err(|(_, error)| error)?;
+///     Ok(Summary::of(&report, &diagnosis::diagnose(&campaign, &Default::default())?))
+/// };
+/// // The screw of Y was adjusted.
+/// let change = compare(&summary(12.0)?, &summary(4.0)?);
+/// let cause = change.causes.iter().find(|c| c.cause == "backlash").unwrap();
+/// assert_eq!(cause.fate, Fate::Changed);
+/// assert!((cause.change + 0.008).abs() < 0.001);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn compare(before: &Summary, after: &Summary) -> Comparison {
     let shared: Vec<_> = before
         .figures

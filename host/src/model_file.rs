@@ -1,6 +1,7 @@
 //! `MODEL.toml`: what `fit` and `diagnose` write and what `simulate`, `table` and `flash` read.
 use crate::causes::{Effect, WrittenEffect};
 use crate::toml_file::{TomlFileError, TomlProblem, TomlText};
+use giotto_shared::model::{Cumulants, Element, RadiusModel, Response};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -74,6 +75,48 @@ pub enum Servo {
     },
 }
 
+impl Servo {
+    /// The element that it names; `None` for the paper's model, which names none.
+    pub fn element(&self) -> Option<Element<f64>> {
+        match *self {
+            Self::Beta { .. } => None,
+            Self::Lag { kv_per_s } => Some(Element::Lag { kv_per_s }),
+            Self::SecondOrder {
+                omega_n_rad_s,
+                zeta,
+            } => Some(Element::SecondOrder {
+                omega_n_rad_s,
+                zeta,
+            }),
+        }
+    }
+
+    /// κ2 and κ4.
+    pub fn cumulants(&self) -> Cumulants<f64> {
+        match self.element() {
+            Some(element) => element.cumulants(),
+            None => Cumulants::from(self.beta()),
+        }
+    }
+
+    /// The same as 1 + aω² + bω⁴, which a diagnosis refines.
+    pub fn response(&self) -> Response<f64> {
+        self.element()
+            .and_then(|element| Response::of(&element))
+            .unwrap_or_else(|| Response::from(self.beta()))
+    }
+
+    /// The coefficients of Eq. 15.
+    pub fn beta(&self) -> RadiusModel<f64> {
+        match *self {
+            Self::Beta {
+                beta1_s2, beta2_s4, ..
+            } => RadiusModel { beta1_s2, beta2_s4 },
+            Self::Lag { .. } | Self::SecondOrder { .. } => RadiusModel::from(self.cumulants()),
+        }
+    }
+}
+
 /// Ranges that the fit has seen.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Valid {
@@ -96,6 +139,23 @@ impl ModelFile {
     ///
     /// # Errors
     /// As [`Self::load`].
+    ///
+    /// ```
+    /// use giotto::model_file::ModelFile;
+    /// use std::path::Path;
+    ///
+    /// let text = "format = 2\ncampaign = \"lab\"\nmachine = \"mill\"\n\
+    ///             [servo]\nkind = \"lag\"\nkv_per_s = 50.0\n\
+    ///             [valid]\nradius_mm = [50.0, 150.0]\nfeed_mm_s = [20.0, 300.0]\n\
+    ///             [[effect]]\ncause = \"backlash\"\naxis = \"z\"\nvalue = 0.008\n";
+    /// let file = Path::new("model.toml");
+    /// let model = ModelFile::parse(text, file)?;
+    /// assert_eq!(model.effects[0].value(), 0.008);
+    /// // A misspelt key is refused by file, line and name.
+    /// let error = ModelFile::parse(&text.replace("kv_per_s", "kv"), file).unwrap_err().to_string();
+    /// assert!(error.contains("model.toml:") && error.contains("kv"), "{error}");
+    /// # Ok::<(), giotto::toml_file::TomlFileError>(())
+    /// ```
     pub fn parse(text: &str, file: &Path) -> Result<Self, TomlFileError> {
         Self::of_text(&TomlText::new(file, text, EXPECTED))
     }

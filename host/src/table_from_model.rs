@@ -1,7 +1,8 @@
 //! From a model to the table that a controller corrects with: one zone, where the model was fitted.
 use crate::causes::{Cause, Effect};
-use crate::model_file::{ModelFile, Servo};
-use giotto_shared::model::{Cumulants, RadiusModel};
+use crate::model_file::ModelFile;
+use giotto_shared::law::Operator;
+use giotto_shared::model::Cumulants;
 use giotto_shared::table::{self, Limits, Table, TableError, Travel, Zone, bounds};
 use giotto_shared::term::{Extent, Term};
 
@@ -34,40 +35,6 @@ pub struct ModelTable {
     pub left_out: Vec<Cause>,
 }
 
-/// κ2 and κ4 of the servo law.
-fn cumulants(servo: &Servo) -> Cumulants<f64> {
-    match *servo {
-        Servo::Beta {
-            beta1_s2, beta2_s4, ..
-        } => {
-            // ln(1 + β1ω² + β2ω⁴) = β1ω² + (β2 − β1²/2)ω⁴ + …, against −κ2ω²/2 + κ4ω⁴/24.
-            let beta = RadiusModel { beta1_s2, beta2_s4 };
-            let kappa2_s2 = -2.0 * beta.beta1_s2;
-            Cumulants {
-                kappa2_s2,
-                kappa4_s4: 24.0 * beta.beta2_s4 - 3.0 * kappa2_s2 * kappa2_s2,
-            }
-        }
-        Servo::Lag { kv_per_s } => {
-            let kappa2_s2 = 1.0 / (kv_per_s * kv_per_s);
-            Cumulants {
-                kappa2_s2,
-                kappa4_s4: 6.0 * kappa2_s2 * kappa2_s2,
-            }
-        }
-        Servo::SecondOrder {
-            omega_n_rad_s,
-            zeta,
-        } => {
-            let (w2, z2) = (omega_n_rad_s * omega_n_rad_s, zeta * zeta);
-            Cumulants {
-                kappa2_s2: -2.0 * (1.0 - 2.0 * z2) / w2,
-                kappa4_s4: 12.0 * (8.0 * z2 * z2 - 8.0 * z2 + 1.0) / (w2 * w2),
-            }
-        }
-    }
-}
-
 /// What an effect is to a controller.
 enum Share {
     Term(Term<f64>),
@@ -76,20 +43,38 @@ enum Share {
 }
 
 fn share(effect: &Effect) -> Share {
-    let cause = effect.cause();
-    match (cause, cause.model().term(effect)) {
-        (Cause::HigherOrderDynamics, _) => Share::Kappa4(24.0 * effect.value()),
-        (_, Some(term)) => Share::Term(term),
-        (_, None) => Share::Nothing,
-    }
+    let model = effect.cause().model();
+    let term = model.term(effect).map(Share::Term);
+    term.or_else(|| model.kappa4_s4(effect).map(Share::Kappa4))
+        .unwrap_or(Share::Nothing)
 }
 
 /// The table of a model.
 ///
 /// # Errors
 /// [`ModelTableError`]; a table that is returned passes [`Table::validate`].
+///
+/// ```
+/// use giotto::model_file::ModelFile;
+/// # use std::path::Path;
+/// use giotto::table_from_model::table_from_model;
+///
+/// let model = ModelFile::parse(
+///     "format = 2\ncampaign = \"lab\"\nmachine = \"mill\"\n\
+///      [servo]\nkind = \"lag\"\nkv_per_s = 50.0\n\
+///      [valid]\nradius_mm = [50.0, 150.0]\nfeed_mm_s = [20.0, 300.0]",
+///     Path::new("model.toml"),
+/// )?;
+/// let made = table_from_model(&model)?;
+/// let zone = &made.table.zones[0];
+/// // κ2 of a lag is τ² = 4e-4 s²; the zone is where the model was fitted.
+/// assert!((zone.cumulants.kappa2_s2 - 4e-4).abs() < 1e-9);
+/// assert_eq!(zone.radius_m, [0.05, 0.15]);
+/// assert!(made.left_out.is_empty());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn table_from_model(model: &ModelFile) -> Result<ModelTable, ModelTableError> {
-    let mut cumulants = cumulants(&model.servo);
+    let mut cumulants = model.servo.cumulants();
     let mut terms: Vec<Term<f64>> = Vec::new();
     let mut left_out = Vec::new();
     for effect in &model.effects {
@@ -142,10 +127,10 @@ fn limits(
     let [smallest, largest] = radius_m;
     let [_, fastest] = feed_m_s;
     let omega = fastest / smallest;
-    let k2 = cumulants.kappa2_s2;
-    let fourth = k2 * k2 / 8.0 - cumulants.kappa4_s4 / 24.0;
+    let operator = Operator::new(cumulants);
+    let (second, fourth) = (operator.second_s2.abs(), operator.fourth_s4.abs());
     // R·(κ2/2·ω² + …·ω⁴) with ω = f/R falls with R, so the smallest circle asks for the most.
-    let law = smallest * omega * omega * (0.5 * k2.abs() + fourth.abs() * omega * omega);
+    let law = smallest * omega * omega * (second + fourth * omega * omega);
     let extent = Extent {
         radius_m: largest,
         feed_m_s: fastest,
@@ -180,7 +165,7 @@ fn cut(name: &str) -> heapless::String<32> {
 mod tests {
     use super::*;
     use crate::causes::Site;
-    use crate::model_file::{FORMAT, Valid};
+    use crate::model_file::{FORMAT, Servo, Valid};
     use giotto_shared::{Actuator, Plane};
 
     fn paper() -> ModelFile {
@@ -219,13 +204,14 @@ mod tests {
 
     #[test]
     fn servo_kinds_agree_where_they_mean_the_same() {
-        let lag = cumulants(&Servo::Lag { kv_per_s: 50.0 });
+        let lag = Servo::Lag { kv_per_s: 50.0 }.cumulants();
         // 1/sqrt(1 + w^2/kv^2) = 1 - w^2/(2 kv^2) + 3 w^4/(8 kv^4)
-        let beta = cumulants(&Servo::Beta {
+        let beta = Servo::Beta {
             beta1_s2: -0.5 / 2500.0,
             beta2_s4: 0.375 / 6_250_000.0,
             half_width95: [0.0; 2],
-        });
+        }
+        .cumulants();
         assert!((lag.kappa2_s2 / beta.kappa2_s2 - 1.0).abs() < 1e-12);
         assert!((lag.kappa4_s4 / beta.kappa4_s4 - 1.0).abs() < 1e-12);
     }

@@ -74,6 +74,20 @@ impl TomlFileError {
 }
 
 /// The text of a TOML file and where it came from.
+///
+/// ```
+/// use giotto::toml_file::TomlText;
+///
+/// #[derive(Debug, serde::Deserialize)]
+/// #[serde(deny_unknown_fields)]
+/// struct Limits {
+///     feed_mm_s: f64,
+/// }
+/// let read = |text| TomlText::new("limits.toml", text, "the limits of a machine").parse::<Limits>();
+/// assert_eq!(read("feed_mm_s = 300.0\n").unwrap().feed_mm_s, 300.0);
+/// let error = read("\nfeed = 300.0\n").unwrap_err().to_string();
+/// assert!(error.contains("limits.toml:2"), "{error}");
+/// ```
 #[derive(Clone, Debug)]
 pub struct TomlText {
     /// The file.

@@ -37,6 +37,14 @@ pub fn scale(contract: &str, largest: f64) -> (f64, String) {
 }
 
 /// An estimate of the contract in the unit that a person reads.
+///
+/// ```
+/// use giotto::units::shown;
+///
+/// let backlash = shown(0.0123, [0.0119, 0.0127], "mm");
+/// assert_eq!(format!("{} {}", backlash.value, backlash.unit), "12.3 µm");
+/// assert_eq!((backlash.low.as_str(), backlash.high.as_str()), ("11.9", "12.7"));
+/// ```
 pub fn shown(value: f64, interval: [f64; 2], contract: &str) -> Shown {
     let largest = interval.iter().fold(value.abs(), |m, v| m.max(v.abs()));
     let (factor, unit) = scale(contract, largest);

@@ -16,6 +16,24 @@ pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
 ///
 /// # Errors
 /// As [`write()`], and those of `fill`.
+///
+/// ```
+/// use giotto::whole_file;
+/// use std::io::Error;
+///
+/// let folder = tempfile::tempdir()?;
+/// let file = folder.path().join("model.toml");
+/// whole_file::write(&file, b"old")?;
+/// // A writer that fails half-way leaves the file as it was.
+/// let failed = whole_file::with(&file, |out| {
+///     out.write_all(b"half of the n")?;
+///     Err(Error::other("the disk is gone"))
+/// });
+/// assert!(failed.is_err());
+/// assert_eq!(std::fs::read(&file)?, b"old");
+/// assert_eq!(std::fs::read_dir(folder.path())?.count(), 1);
+/// # Ok::<(), Error>(())
+/// ```
 pub fn with(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
     let Some(target) = target(path)? else {
         let mut out = io::BufWriter::new(std::fs::OpenOptions::new().write(true).open(path)?);

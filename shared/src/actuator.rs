@@ -4,6 +4,15 @@ use serde::{Deserialize, Serialize};
 
 /// One drive of a machine. Coordinates of slides are metres, those of joints radians (of a SCARA's third joint, a
 /// slide along Z, metres).
+///
+/// ```
+/// use giotto_shared::Actuator;
+///
+/// // Places in the coordinates of a machine: Z is the third slide, and the third joint shares its place in an arm.
+/// assert_eq!(Actuator::Z.index(), 2);
+/// assert_eq!(Actuator::Joint3.index(), 2);
+/// assert_eq!(Actuator::Joint3.to_string(), "joint3");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[serde(rename_all = "lowercase")]

@@ -76,6 +76,15 @@ const fn series(x: f64, first: f64, n: usize) -> f64 {
 }
 
 /// Phase nearest to an angle in radians, of size below 5e7.
+///
+/// ```
+/// use giotto_shared::angle::{phase_from_rad, sincos, SINCOS_ERROR};
+///
+/// let (cos, sin) = sincos(phase_from_rad(1.0));
+/// let q31 = f64::from(i32::MAX);
+/// assert!((f64::from(cos) / q31 - 1f64.cos()).abs() < SINCOS_ERROR);
+/// assert!((f64::from(sin) / q31 - 1f64.sin()).abs() < SINCOS_ERROR);
+/// ```
 pub fn phase_from_rad(angle_rad: f64) -> u32 {
     // Whole turns fall out of the 32 bits.
     rounded(angle_rad, 1.0 / RAD_PER_UNIT) as u32

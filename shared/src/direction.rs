@@ -1,7 +1,14 @@
-//! Sense of rotation and axis names.
+//! Sense of rotation.
 use serde::{Deserialize, Serialize};
 
 /// Sense in which a circle is travelled, seen from +Z.
+///
+/// ```
+/// use giotto_shared::Direction;
+///
+/// assert_eq!(Direction::Ccw.sign(), 1);
+/// assert_eq!(Direction::Ccw.reversed(), Direction::Cw);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Direction {
@@ -25,40 +32,6 @@ impl Direction {
         match self {
             Self::Ccw => Self::Cw,
             Self::Cw => Self::Ccw,
-        }
-    }
-}
-
-/// One of the two linear axes of the plane of the circle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Axis {
-    /// First axis of the plane.
-    X,
-    /// Second axis of the plane.
-    Y,
-}
-
-impl Axis {
-    /// 0 for X, 1 for Y.
-    pub const fn index(self) -> usize {
-        self as usize
-    }
-
-    /// The other axis of the plane.
-    pub const fn other(self) -> Self {
-        match self {
-            Self::X => Self::Y,
-            Self::Y => Self::X,
-        }
-    }
-}
-
-impl From<Axis> for crate::Actuator {
-    fn from(axis: Axis) -> Self {
-        match axis {
-            Axis::X => Self::X,
-            Axis::Y => Self::Y,
         }
     }
 }

@@ -4,6 +4,17 @@ use core::fmt;
 use serde::{Deserialize, Serialize};
 
 /// A coordinate plane. Angles run from its first axis to its second, so that the normal is the remaining axis.
+///
+/// ```
+/// use giotto_shared::{Actuator, Plane};
+///
+/// // G18 runs from Z to X, so that its normal is +Y.
+/// assert_eq!(Plane::Zx.axes(), [Actuator::Z, Actuator::X]);
+/// assert_eq!(Plane::Zx.normal(), Actuator::Y);
+/// // Two slides name their plane in either order; two joints have none.
+/// assert_eq!(Plane::of(Actuator::X, Actuator::Z), Some(Plane::Zx));
+/// assert_eq!(Plane::of(Actuator::Joint1, Actuator::Joint2), None);
+/// ```
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Default, Serialize, Deserialize,
 )]
@@ -75,6 +86,17 @@ impl fmt::Display for Plane {
 
 /// Directions of a circle in machine coordinates: a point at polar angle θ lies at R(cosθ·first + sinθ·second) from
 /// the centre. Both are unit vectors, at right angles.
+///
+/// ```
+/// use giotto_shared::{Frame, Plane};
+///
+/// assert_eq!(Frame::of(Plane::Yz).first(), [0.0, 1.0, 0.0]);
+/// // XY tilted about X: its first direction is X still, its second climbs by 1 in 2.
+/// let tilted = Frame::across([0.0, -0.5, 1.0]).unwrap();
+/// assert_eq!(tilted.plane(), None);
+/// assert!((tilted.first()[0] - 1.0).abs() < 1e-12);
+/// assert!((tilted.second()[2] / tilted.second()[1] - 0.5).abs() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame {
     first: [f64; 3],

@@ -14,10 +14,28 @@
 //! | [`table`] | the correction table: layout, bounds, CRC |
 //! | [`wire`] | messages and frames between host and controller |
 //!
+//! A servo's circle, and what undoes it:
+//!
+//! ```
+//! use giotto_shared::law::{AngularMotion, Operator};
+//! use giotto_shared::model::{Element, RadiusModel};
+//!
+//! let servo = Element::Lag { kv_per_s: 50.0_f64 };
+//! let (radius_m, feed_m_s) = (0.1, 0.5);
+//! // It draws the circle 496 µm too small …
+//! let model = RadiusModel::from(servo.cumulants());
+//! assert!((model.radius_error_m(radius_m, feed_m_s) + 496e-6).abs() < 1e-6);
+//! // … unless the controller commands it larger by what the operator says.
+//! let steady = AngularMotion { rate: feed_m_s / radius_m, ..Default::default() };
+//! let commanded_m = radius_m * (1.0 + Operator::new(&servo.cumulants()).gain(&steady).radial);
+//! assert!((commanded_m * servo.gain(feed_m_s / radius_m) - radius_m).abs() < 0.1e-6);
+//! ```
+//!
 //! The source paper is Slamani, Nubiola, Bonev, "Effect of servo systems on the contouring errors in
 //! industrial robots", Trans. CSME 36(1), 2012. SI units throughout unless a name says otherwise.
 #![no_std]
 #![forbid(unsafe_code)]
+#![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 #[cfg(any(test, feature = "std"))]
 extern crate std;
@@ -38,5 +56,5 @@ pub mod term;
 pub mod wire;
 
 pub use actuator::Actuator;
-pub use direction::{Axis, Direction};
+pub use direction::Direction;
 pub use frame::{Frame, Plane};

@@ -1,7 +1,7 @@
 //! What is left of contour errors, on a plant whose laws are not the host's: a lag, a lag behind an average, second order.
 use giotto::model_file::{ModelFile, Servo};
-use giotto_nc::{Fate, Options};
-use giotto_tests::nc::contour::{Plant, deviations};
+use giotto_nc::{Fate, FreeSide, Leads, Led, Options};
+use giotto_tests::nc::contour::{Plant, deviations, wall_um};
 use giotto_tests::nc::model;
 
 /// A shape, whether it begins or ends at a stop on its arc, and its moves.
@@ -83,6 +83,9 @@ fn plants() -> [(&'static str, Plant, ModelFile, f64); 3] {
     ]
 }
 
+/// The machine goes no deeper into the material than before, µm.
+const DEEPER_UM: f64 = 1.0;
+
 #[test]
 fn contour_errors_are_within_their_bars() {
     let mut failed = Vec::new();
@@ -106,17 +109,7 @@ fn contour_errors_are_within_their_bars() {
             );
             let before = deviations(plant, &program, &program);
             let after = deviations(plant, &text, &program);
-            let bar = match (plant_name, name) {
-                // A single lag goes straight on to the place where its command stands still: the chord of what it is
-                // behind lies δ/4 off the arc, and no shape of the last stretch leaves less than two thirds of that.
-                ("lag", _) if stop => 25.0,
-                (_, _) if stop => 10.0,
-                // The offset changes its side in one joint: twice the step.
-                ("lag and average", "S chain") => 8.0,
-                // A half turn of 5 mm takes four times as long as the machine answers.
-                (_, "slot") => bar + 0.5,
-                _ => bar,
-            };
+            let bar = if stop { 10.0 } else { bar };
             for (was, is) in before.iter().zip(&after) {
                 if was.most_um() < 1.0 {
                     continue;
@@ -130,19 +123,63 @@ fn contour_errors_are_within_their_bars() {
                     "{plant_name}, {name}: {was:.2?} -> {is:.2?}: {share:.2} %, {said:.2} % said"
                 );
                 let deeper = (is.left_um - was.left_um).max(is.right_um - was.right_um);
-                let room = if stop && plant_name == "lag" {
-                    4.0
-                } else {
-                    2.0
-                };
                 if share > bar {
                     failed.push(format!("{plant_name}, {name}: {share:.2} % of {bar} %"));
                 }
-                if deeper > room {
+                if deeper > DEEPER_UM {
                     failed.push(format!("{plant_name}, {name}: {deeper:.2} µm deeper"));
                 }
             }
         }
     }
     assert!(failed.is_empty(), "{failed:#?}");
+}
+
+/// With leads a hole and a boss that begin and end at a stop are round, as far as the plain part of a circle is.
+#[test]
+fn leads_make_the_wall_round() {
+    for (plant_name, plant, model, bar) in plants() {
+        for (side, code, radius) in [
+            (FreeSide::Inside, "G3", 12.0),
+            (FreeSide::Inside, "G2", 8.0),
+            (FreeSide::Outside, "G2", 10.0),
+            (FreeSide::Outside, "G3", 15.0),
+        ] {
+            let hole = side == FreeSide::Inside;
+            let far = if hole { 0.0 } else { radius + 8.0 };
+            let program = format!(
+                "G21 G90 G17 G94 F1500\nG0 X{far} Y0\nG1 X{radius}\n{code} X{radius} Y0 I-{radius} J0\nG1 X{far}\n"
+            );
+            let options = Options {
+                acceleration_mm_s2: 5000.0,
+                leads: Leads::On(side),
+                ..Options::default()
+            };
+            let result = giotto_nc::compensate(program.as_bytes(), &model, &options);
+            let text = String::from_utf8(result.program).unwrap();
+            assert!(
+                matches!(
+                    result.arcs[0].fate,
+                    Fate::Corrected {
+                        led: Led::Tangent,
+                        ..
+                    }
+                ),
+                "{:?}",
+                result.arcs
+            );
+            let was = wall_um(plant, &program, [0.0; 2], radius, hole);
+            let is = wall_um(plant, &text, [0.0; 2], radius, hole);
+            let most = |[least, most]: [f64; 2]| f64::max(-least, most);
+            let share = 100.0 * most(is) / most(was);
+            println!("{plant_name}, {side:?} {radius}: {was:.2?} -> {is:.2?}: {share:.2} %");
+            assert!(share <= bar, "{plant_name}, {side:?}: {share:.2} %\n{text}");
+            // No deeper than before, or than the circle itself.
+            let deeper = (-is[0]) - f64::max(-was[0], 0.0);
+            assert!(
+                deeper <= DEEPER_UM,
+                "{plant_name}, {side:?}: {deeper:.2} µm deeper"
+            );
+        }
+    }
 }

@@ -128,6 +128,11 @@ fn show(comparison: &Comparison, before: &Path, after: &Path, out: Output) {
     ));
     comparison.words.iter().for_each(|words| out.say(words));
     out.say("");
+    show_causes(comparison, out);
+    show_figures(comparison, out);
+}
+
+fn show_causes(comparison: &Comparison, out: Output) {
     let mut causes = Grid::new(
         &[
             "cause",
@@ -171,6 +176,9 @@ fn show(comparison: &Comparison, before: &Path, after: &Path, out: Output) {
         causes.show(out);
         out.say("");
     }
+}
+
+fn show_figures(comparison: &Comparison, out: Output) {
     let header = [
         "figure",
         "R mm",

@@ -5,7 +5,7 @@ mod summary;
 use super::{Failure, Output};
 use giotto::model_file::ModelFile;
 use giotto_nc::check::Controller;
-use giotto_nc::{self, Code, Fate, Keep, Mark, Options, Report};
+use giotto_nc::{self, Code, Fate, FreeSide, Keep, Leads, Led, Mark, Options, Report};
 use output_file::OutputFile;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -45,6 +45,19 @@ pub struct Args {
     /// A code of the machine's own that moves nothing, as M150 or G77; may be given again.
     #[arg(long, value_name = "CODE", value_parser = |text: &str| text.parse::<Code>())]
     harmless: Vec<Code>,
+    /// Keep F to the last where an arc ends at a stop; up to a quarter of a lag's correction then remains there.
+    #[arg(long)]
+    full_feed_to_stops: bool,
+    /// Full circles that begin or end at a stop get leads of their own on the free side, which is that of `--inside` or
+    /// `--outside`, or what the comment before them names (hole, bore, pocket; boss, stud, island). Not in RAPID.
+    #[arg(long, value_enum)]
+    lead: Option<LeadArg>,
+    /// The circles with leads are walls of holes: the inside is free.
+    #[arg(long, requires = "lead", conflicts_with = "outside")]
+    inside: bool,
+    /// The circles with leads are walls of bosses: the outside is free, by the circle's own diameter.
+    #[arg(long, requires = "lead")]
+    outside: bool,
     /// Hold the output against the rules of the controller it is for; exit 5 where it would be refused.
     #[arg(long, value_enum)]
     check: Option<Target>,
@@ -60,6 +73,12 @@ enum KeepArg {
 enum Centres {
     Relative,
     Absolute,
+}
+
+#[derive(clap::ValueEnum, Clone, Copy, Debug)]
+enum LeadArg {
+    /// A circle that touches the wall where it is entered and left.
+    Tangent,
 }
 
 #[derive(clap::ValueEnum, Clone, Copy, Debug)]
@@ -104,6 +123,13 @@ impl Args {
             absolute_centres: self.centres == Centres::Absolute,
             printer: matches!(self.purpose, Some(Purpose::Printer)),
             harmless: self.harmless.clone(),
+            slow_to_stops: !self.full_feed_to_stops,
+            leads: match (self.lead, self.inside, self.outside) {
+                (None, ..) => Leads::No,
+                (Some(LeadArg::Tangent), true, _) => Leads::On(FreeSide::Inside),
+                (Some(LeadArg::Tangent), _, true) => Leads::On(FreeSide::Outside),
+                (Some(LeadArg::Tangent), false, false) => Leads::ByName,
+            },
         };
         for (name, value) in [
             ("--acceleration", options.acceleration_mm_s2),
@@ -140,11 +166,22 @@ impl Args {
         } else {
             ""
         };
+        let leads = match options.leads {
+            Leads::No => "",
+            Leads::ByName => ", leads by name",
+            Leads::On(FreeSide::Inside) => ", leads inside",
+            Leads::On(FreeSide::Outside) => ", leads outside",
+        };
+        let feed = if options.slow_to_stops {
+            ""
+        } else {
+            ", full feed to stops"
+        };
         Ok(Mark {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             model: digest[..6].iter().map(|b| format!("{b:02x}")).collect(),
             options: format!(
-                "keep {keep}, acceleration {}, max offset {}{planes}{centres}",
+                "keep {keep}, acceleration {}, max offset {}{planes}{centres}{leads}{feed}",
                 options.acceleration_mm_s2, options.max_offset_mm
             ),
         })
@@ -173,6 +210,8 @@ struct Arc {
     blocks: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     joint_remaining_um: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lead: Option<&'static str>,
     #[serde(skip_serializing_if = "Option::is_none")]
     left: Option<String>,
 }
@@ -301,6 +340,7 @@ fn document(arcs: &[Report], model: &ModelFile) -> Document {
                 change_um: None,
                 blocks: None,
                 joint_remaining_um: None,
+                lead: None,
                 left: None,
             };
             match report.fate {
@@ -314,12 +354,19 @@ fn document(arcs: &[Report], model: &ModelFile) -> Document {
                     delta_mm,
                     blocks,
                     joint_share,
+                    led,
                 } => Arc {
                     radius_mm: Some(radius_mm),
                     feed_mm_s: Some(feed_mm_s),
                     change_um: Some(delta_mm * 1e3),
                     blocks: Some(blocks),
                     joint_remaining_um: Some(joint_share * delta_mm.abs() * 1e3),
+                    lead: match led {
+                        Led::Not => None,
+                        Led::Tangent => Some("tangent"),
+                        Led::SideUnknown => Some("free side unknown"),
+                        Led::NoRoom => Some("no room"),
+                    },
                     ..none
                 },
             }

@@ -206,7 +206,20 @@ fn show_learned(learned: &Learned, out: Output) {
             heldout.explained_percent
         ));
     }
-    let diagnosis = &learned.diagnosis;
+    show_diagnosis(&learned.diagnosis, out);
+    let zone = learned.table.table.zones.first();
+    out.say(format_args!(
+        "            table: κ2, κ4 and {} terms{}",
+        zone.map_or(0, |zone| zone.terms.len()),
+        match learned.table.left_out.len() {
+            0 => String::new(),
+            n => format!("; {n} effects that no controller corrects are left out"),
+        }
+    ));
+}
+
+/// What is wrong beside the law, and what the extended simulation gains.
+fn show_diagnosis(diagnosis: &giotto::diagnosis::Diagnosis, out: Output) {
     out.say(format_args!(
         "3 diagnose  against {}:",
         diagnosis.baseline.name
@@ -245,15 +258,6 @@ fn show_learned(learned: &Learned, out: Output) {
     out.say(format_args!(
         "4 extend    on runs left out the simulation is off by {:.2} µm rms, before {:.2} (gain {:.1} %)",
         diagnosis.extended.heldout_rms_um, diagnosis.baseline.heldout_rms_um, diagnosis.gain_percent
-    ));
-    let zone = learned.table.table.zones.first();
-    out.say(format_args!(
-        "            table: κ2, κ4 and {} terms{}",
-        zone.map_or(0, |zone| zone.terms.len()),
-        match learned.table.left_out.len() {
-            0 => String::new(),
-            n => format!("; {n} effects that no controller corrects are left out"),
-        }
     ));
 }
 

@@ -46,7 +46,11 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let inputs = args.source.inputs(args.model.as_deref());
     Destination::maybe(args.output.as_deref(), Kind::Model, &inputs)?;
     let page = Destination::maybe(args.report.as_deref(), Kind::Html, &inputs)?;
-    let campaign = args.source.read(out)?;
+    let (campaign, mislabelled) = if args.keep_all {
+        (args.source.read(out)?, Vec::new())
+    } else {
+        args.source.read_labelled(out)?
+    };
     let model = args.model.as_deref().map(ModelFile::load).transpose()?;
     let bar = out.spinner("diagnosing");
     let diagnosis = diagnose(
@@ -60,6 +64,7 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     );
     bar.finish_and_clear();
     let mut diagnosis = diagnosis.map_err(|e| args.source.refused(&e))?;
+    diagnosis.left_out.splice(0..0, mislabelled);
     let mut refused = None;
     match &args.output {
         Some(path) if diagnosis.worth_writing => {
@@ -122,6 +127,23 @@ fn show(name: &str, d: &Diagnosis, extended: Option<&Path>, out: &Output) {
     }
     right(&mut table, 1);
     out.say(&table);
+    show_findings(d, out);
+    show_doubts(d, out);
+    if let Some(g) = &d.gain {
+        out.say(format_args!(
+            "On runs left out (each radius, each speed): {:.2} µm rms, before {:.2}; β1, β2 alone {:.2}; no model {:.2}.",
+            g.extended_rms_um, g.baseline_rms_um, g.beta_rms_um, g.no_model_rms_um
+        ));
+        out.say(format_args!(
+            "Gain {:.1} % ({:.1} to {:.1}), {:.1} % of what a perfect model would gain.",
+            g.percent, g.ci95_percent[0], g.ci95_percent[1], g.of_perfect_percent
+        ));
+    }
+    out.say(format_args!("Next: {}", recommendation(d, extended)));
+}
+
+/// What was found, as a table and in words.
+fn show_findings(d: &Diagnosis, out: &Output) {
     if d.findings.is_empty() && !d.unexplained.present && d.cannot_tell.is_empty() {
         out.say("Nothing found: the simulation explains the data.");
     } else if !d.findings.is_empty() {
@@ -160,6 +182,10 @@ fn show(name: &str, d: &Diagnosis, extended: Option<&Path>, out: &Output) {
             }
         }
     }
+}
+
+/// What has no name, what was taken otherwise, what was left out and what cannot be told.
+fn show_doubts(d: &Diagnosis, out: &Output) {
     if d.unexplained.present {
         out.say(format_args!(
             "Unexplained: {:.2} µm rms that match no cause in the list:",
@@ -181,17 +207,6 @@ fn show(name: &str, d: &Diagnosis, extended: Option<&Path>, out: &Output) {
     for missing in &d.cannot_tell {
         out.say(format_args!("Cannot tell: {missing}."));
     }
-    if let Some(g) = &d.gain {
-        out.say(format_args!(
-            "On runs left out (each radius, each speed): {:.2} µm rms, before {:.2}; β1, β2 alone {:.2}; no model {:.2}.",
-            g.extended_rms_um, g.baseline_rms_um, g.beta_rms_um, g.no_model_rms_um
-        ));
-        out.say(format_args!(
-            "Gain {:.1} % ({:.1} to {:.1}), {:.1} % of what a perfect model would gain.",
-            g.percent, g.ci95_percent[0], g.ci95_percent[1], g.of_perfect_percent
-        ));
-    }
-    out.say(format_args!("Next: {}", recommendation(d, extended)));
 }
 
 /// Numbers to the right: every column from `first` on.

@@ -79,6 +79,24 @@ impl From<FitError> for Failure {
     }
 }
 
+impl Args {
+    /// What to fit, and how.
+    fn options(&self) -> Options {
+        Options {
+            train_radius_m: self.train_radius.map(|mm| mm * 1e-3),
+            offset: match self.offset {
+                OffsetArg::Joint => Offset::Joint,
+                OffsetArg::LowestSpeed => Offset::LowestSpeed,
+            },
+            alpha: self.alpha,
+            partial_f: match self.partial_f {
+                PartialFArg::Textbook => PartialF::Textbook,
+                PartialFArg::Paper => PartialF::Paper,
+            },
+        }
+    }
+}
+
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let inputs = args.source.inputs(None);
@@ -116,19 +134,7 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
             out_of_roundness_m: Some(run.out_of_roundness_m),
         })
         .collect();
-    let options = Options {
-        train_radius_m: args.train_radius.map(|mm| mm * 1e-3),
-        offset: match args.offset {
-            OffsetArg::Joint => Offset::Joint,
-            OffsetArg::LowestSpeed => Offset::LowestSpeed,
-        },
-        alpha: args.alpha,
-        partial_f: match args.partial_f {
-            PartialFArg::Textbook => PartialF::Textbook,
-            PartialFArg::Paper => PartialF::Paper,
-        },
-    };
-    let fit = RadiusFit::new(&observations, options)?;
+    let fit = RadiusFit::new(&observations, args.options())?;
     if let Some(path) = &args.output {
         model_file(&fit, &observations, &report.name, &report.machine)
             .save(path)
@@ -319,6 +325,16 @@ fn show(fit: &RadiusFit, runs: &[Observation], campaign: &str, out: Output) {
     out.say("");
     show_steps(fit, out);
     out.say("");
+    show_coefficients(fit, out);
+    out.say("");
+    show_radii(fit, runs, out);
+    out.say("");
+    show_prediction(fit, out);
+    show_chain(fit, out);
+}
+
+/// β1 and β2 with their intervals.
+fn show_coefficients(fit: &RadiusFit, out: Output) {
     let header = ["coefficient", "estimate", "95 % from", "to", "unit"];
     let mut coefficients = Grid::new(&header, 1, 1);
     let mut remarks = Vec::new();
@@ -342,7 +358,10 @@ fn show(fit: &RadiusFit, runs: &[Observation], campaign: &str, out: Output) {
     }
     coefficients.show(out);
     remarks.iter().for_each(|remark| out.say(remark));
-    out.say("");
+}
+
+/// Radius by radius: its offset, and how well it is predicted.
+fn show_radii(fit: &RadiusFit, runs: &[Observation], out: Output) {
     let header = [
         "R mm",
         "part",
@@ -382,7 +401,10 @@ fn show(fit: &RadiusFit, runs: &[Observation], campaign: &str, out: Output) {
         radii.row(row);
     }
     radii.show(out);
-    out.say("");
+}
+
+/// What the fit leaves of the runs it has seen and of those it has not.
+fn show_prediction(fit: &RadiusFit, out: Output) {
     let (runs, rms) = fit.train;
     out.say(format_args!(
         "fitted: {runs} runs, residuals {:.2} µm rms",
@@ -403,7 +425,6 @@ fn show(fit: &RadiusFit, runs: &[Observation], campaign: &str, out: Output) {
         )),
         None => out.say("predicted: nothing; a second radius would show whether the model carries over"),
     }
-    show_chain(fit, out);
 }
 
 fn show_steps(fit: &RadiusFit, out: Output) {

@@ -1,5 +1,6 @@
 //! The command line: one file a command; arguments in, tables or one JSON document out.
 #![forbid(unsafe_code)]
+#![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 mod analyze;
 mod bypass;

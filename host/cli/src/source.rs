@@ -3,6 +3,7 @@ use super::choice::one_of;
 use super::{Failure, Output};
 use giotto::campaign::import::{self, Added, Format, Laps, Options, Reason};
 use giotto::campaign::{Campaign, Direction, Manifest, Plane};
+use giotto::diagnosis::LeftOut;
 use std::path::{Path, PathBuf};
 
 /// Heading of these options; given one by one, since a heading for the struct would go on behind it.
@@ -131,6 +132,17 @@ impl Source {
     pub(super) fn refused(&self, reason: &dyn std::fmt::Display) -> Failure {
         Failure::input(format_args!("{}: {reason}", self.campaign.display()))
             .help("see `giotto analyze` for what the runs hold")
+    }
+
+    /// As [`Source::read`], but leaves out the odd run whose file contradicts its label.
+    pub fn read_labelled(&self, out: Output) -> Result<(Campaign, Vec<LeftOut>), Failure> {
+        let (campaign, notes, left_out) = self.open(out)?.read_labelled()?;
+        notes.iter().for_each(|note| out.note(note));
+        let reason = |run: giotto::campaign::Mislabelled| LeftOut {
+            reason: run.error.problem.to_string(),
+            file: run.file,
+        };
+        Ok((campaign, left_out.into_iter().map(reason).collect()))
     }
 
     /// Reads the whole campaign into memory and prints its notes.

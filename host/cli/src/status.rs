@@ -110,13 +110,30 @@ fn slot_words(state: &SlotState) -> String {
 
 /// State and slots for a person.
 pub(super) fn words(controller: &Controller, status: &Status) -> Table {
-    let identity = controller.identity();
     let mut table = Table::new();
     table.load_style(presets::NOTHING);
-    let mut row = |name: &str, value: String| {
-        table.add_row(vec![name.to_owned(), value]);
-    };
-    row(
+    let mut rows = identity_rows(controller);
+    rows.extend(motion_rows(status));
+    rows.extend(position_rows(status));
+    rows.extend(counter_rows(status));
+    rows.extend(load_rows(status));
+    for (name, value) in rows {
+        table.add_row(vec![name, value]);
+    }
+    table
+}
+
+/// Name and value of a line.
+type Row = (String, String);
+
+fn row(name: &str, value: String) -> Row {
+    (name.to_owned(), value)
+}
+
+/// Who it is and what it speaks.
+fn identity_rows(controller: &Controller) -> Vec<Row> {
+    let identity = controller.identity();
+    let named = row(
         "controller",
         format!(
             "{} {} at {}",
@@ -125,7 +142,7 @@ pub(super) fn words(controller: &Controller, status: &Status) -> Table {
             controller.port()
         ),
     );
-    row(
+    let protocol = row(
         "protocol",
         format!(
             "{}, table format {}, schema {:08x}, {} ticks/s{}",
@@ -140,6 +157,11 @@ pub(super) fn words(controller: &Controller, status: &Status) -> Table {
             }
         ),
     );
+    vec![named, protocol]
+}
+
+/// What it does, with which correction.
+fn motion_rows(status: &Status) -> Vec<Row> {
     let motion = format!("{:?}", status.motion).to_lowercase();
     let cause = status
         .fault
@@ -150,24 +172,28 @@ pub(super) fn words(controller: &Controller, status: &Status) -> Table {
     } else {
         ""
     };
-    row("motion", format!("{motion}{cause}{stop}"));
     let correction = match (status.active, status.bypass) {
         (None, _) => "bypass: no confirmed table".to_owned(),
         (Some(slot), true) => format!("bypass; table in slot {slot}"),
         (Some(slot), false) => format!("on, table in slot {slot}"),
     };
-    row("correction", correction);
-    match status.probation {
-        Probation::None => {}
-        Probation::Fresh => row("probation", "table not confirmed, has not run".to_owned()),
-        Probation::FirstRun => row(
-            "probation",
-            "table not confirmed, first run begun or done".to_owned(),
-        ),
-    }
-    for (number, slot) in status.slots.iter().enumerate() {
-        row(&format!("slot {number}"), slot_words(slot));
-    }
+    let mut rows = vec![
+        row("motion", format!("{motion}{cause}{stop}")),
+        row("correction", correction),
+    ];
+    let probation = match status.probation {
+        Probation::None => None,
+        Probation::Fresh => Some("table not confirmed, has not run"),
+        Probation::FirstRun => Some("table not confirmed, first run begun or done"),
+    };
+    rows.extend(probation.map(|words| row("probation", words.to_owned())));
+    let slots = status.slots.iter().enumerate();
+    rows.extend(slots.map(|(number, slot)| row(&format!("slot {number}"), slot_words(slot))));
+    rows
+}
+
+/// Where it stands.
+fn position_rows(status: &Status) -> Vec<Row> {
     let place = |nm: [i32; 3]| {
         let [x, y, z] = nm.map(millimetres);
         format!("{x:.6} {y:.6} {z:.6} mm")
@@ -177,81 +203,83 @@ pub(super) fn words(controller: &Controller, status: &Status) -> Table {
         PositionState::Known => "known",
         PositionState::Kept => "kept over the last reset",
     };
-    row("position", known.to_owned());
-    row("programmed", place(status.raw_nm));
-    row("corrected", place(status.corrected_nm));
+    vec![
+        row("position", known.to_owned()),
+        row("programmed", place(status.raw_nm)),
+        row("corrected", place(status.corrected_nm)),
+    ]
+}
+
+/// What it has counted since it booted.
+fn counter_rows(status: &Status) -> Vec<Row> {
     let counts = &status.counters;
-    row(
-        "ticks",
-        format!(
-            "{} since boot ({}), {} overrun{}{}",
-            status.tick,
-            format!("{:?}", status.reset).to_lowercase(),
-            counts.tick_overruns,
-            status
-                .worst_tick_permille
-                .map_or(String::new(), |p| format!(
-                    ", longest {:.1} % of a period",
-                    f64::from(p) / 10.0
-                )),
-            match status.clock {
-                ClockSource::Crystal => "",
-                ClockSource::Internal => ", NO CRYSTAL: counted by the internal oscillator",
-            }
-        ),
+    let ticks = format!(
+        "{} since boot ({}), {} overrun{}{}",
+        status.tick,
+        format!("{:?}", status.reset).to_lowercase(),
+        counts.tick_overruns,
+        status
+            .worst_tick_permille
+            .map_or(String::new(), |p| format!(
+                ", longest {:.1} % of a period",
+                f64::from(p) / 10.0
+            )),
+        match status.clock {
+            ClockSource::Crystal => "",
+            ClockSource::Internal => ", NO CRYSTAL: counted by the internal oscillator",
+        }
     );
-    row(
-        "clamps",
-        format!(
-            "offset {}, rate {}",
-            counts.offset_clamps, counts.slew_clamps
-        ),
+    let clamps = format!(
+        "offset {}, rate {}",
+        counts.offset_clamps, counts.slew_clamps
     );
-    row(
-        "segments",
-        format!(
-            "{} done, {} waiting, {} dropped, {} uncorrected; {} stops, {} runs without a host",
-            counts.segments,
-            status.queued,
-            counts.dropped_segments,
-            counts.uncorrected_segments,
-            counts.stops,
-            counts.link_losses
-        ),
+    let segments = format!(
+        "{} done, {} waiting, {} dropped, {} uncorrected; {} stops, {} runs without a host",
+        counts.segments,
+        status.queued,
+        counts.dropped_segments,
+        counts.uncorrected_segments,
+        counts.stops,
+        counts.link_losses
     );
-    row(
-        "link",
-        format!(
-            "{} CRC errors, {} malformed, {} overlong, {} repeated, {} bytes and {} set-points lost",
-            counts.crc_errors,
-            counts.malformed_frames,
-            counts.overlong_frames,
-            counts.repeated_requests,
-            counts.lost_bytes,
-            counts.dropped_set_points
-        ),
+    let link = format!(
+        "{} CRC errors, {} malformed, {} overlong, {} repeated, {} bytes and {} set-points lost",
+        counts.crc_errors,
+        counts.malformed_frames,
+        counts.overlong_frames,
+        counts.repeated_requests,
+        counts.lost_bytes,
+        counts.dropped_set_points
     );
-    row(
-        "streams",
-        format!(
-            "{} set-points missing, {} late, {} beyond the feed",
-            counts.missing_set_points, counts.late_set_points, counts.rejected_set_points
-        ),
+    let streams = format!(
+        "{} set-points missing, {} late, {} beyond the feed",
+        counts.missing_set_points, counts.late_set_points, counts.rejected_set_points
     );
-    if let Some(permille) = status.idle_permille {
+    vec![
+        row("ticks", ticks),
+        row("clamps", clamps),
+        row("segments", segments),
+        row("link", link),
+        row("streams", streams),
+    ]
+}
+
+/// How much of its time and memory it uses, where it measures that.
+fn load_rows(status: &Status) -> Vec<Row> {
+    let idle = status.idle_permille.map(|permille| {
         row(
             "idle",
             format!("{:.1} % of the time", f64::from(permille) / 10.0),
-        );
-    }
-    if status.stack_bytes > 0 {
+        )
+    });
+    let stack = (status.stack_bytes > 0).then(|| {
         row(
             "stack",
             format!(
                 "{} bytes at the deepest, {} never used",
                 status.stack_bytes, status.stack_left_bytes
             ),
-        );
-    }
-    table
+        )
+    });
+    idle.into_iter().chain(stack).collect()
 }

@@ -72,6 +72,34 @@ impl Controller {
     /// # Errors
     /// [`ControllerError::Table`] if the image is no table (nothing is sent then), [`ControllerError::Refused`],
     /// [`ControllerError::ReadBack`], those of the link. The old table is then in use, or returns at the next boot.
+    ///
+    /// ```
+    /// use giotto::model_file::ModelFile;
+    /// # use std::path::Path;
+    /// use giotto::table_from_model::table_from_model;
+    /// use giotto_link::flash::Verdict;
+    /// use giotto_link::{OpenOptions, Port, open};
+    /// use giotto_shared::table::{MAX_IMAGE_BYTES, encode};
+    ///
+    /// let model = ModelFile::parse(
+    ///     "format = 2\ncampaign = \"lab\"\nmachine = \"mill\"\n\
+    ///      [servo]\nkind = \"lag\"\nkv_per_s = 50.0\n\
+    ///      [valid]\nradius_mm = [50.0, 150.0]\nfeed_mm_s = [20.0, 300.0]",
+    ///     Path::new("model.toml"),
+    /// )?;
+    /// let mut image = [0; MAX_IMAGE_BYTES];
+    /// let length = encode(&table_from_model(&model)?.table, &mut image)?;
+    /// let image = &image[..length];
+    ///
+    /// let mut controller = open(&Port::Sim, &OpenOptions::default(), &mut |_| {})?;
+    /// assert_eq!(controller.verify(image)?, Verdict::None);
+    /// let flashed = controller.flash(image, &mut |_| {})?;
+    /// assert_eq!(flashed.bytes, length);
+    /// // The table is there, byte for byte, and what is no table is not sent.
+    /// assert!(matches!(controller.verify(image)?, Verdict::Same { .. }));
+    /// assert!(controller.flash(b"no table", &mut |_| {}).is_err());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn flash(
         &mut self,
         image: &[u8],

@@ -14,6 +14,13 @@ use std::time::{SystemTime, UNIX_EPOCH};
 pub const BAUD: u32 = 460_800;
 
 /// Where a controller is.
+///
+/// ```
+/// use giotto_link::Port;
+///
+/// assert_eq!("sim".parse(), Ok(Port::Sim));
+/// assert_eq!("/dev/ttyUSB0".parse(), Ok(Port::Device("/dev/ttyUSB0".into())));
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Port {
     /// The firmware's library in this process, in simulated time.

@@ -45,6 +45,19 @@ impl Controller {
     ///
     /// # Errors
     /// [`ControllerError::Path`] and [`ControllerError::Refused`] with the step; as [`Controller::run_circle`] otherwise.
+    ///
+    /// ```
+    /// use giotto_link::{OpenOptions, Port, Segment, Step, open};
+    ///
+    /// let line = Segment::Line { to_m: [0.01, 0.0, 0.0], feed_m_s: 0.05 };
+    /// let mut controller = open(&Port::Sim, &OpenOptions::default(), &mut |_| {})?;
+    /// let run = controller.run_program(&[Step { segment: line, tolerance_m: 0.0 }], 1)?;
+    /// // It goes there and stands, and its limits make it slower than the feed alone.
+    /// let last = run.points.last().unwrap();
+    /// assert!((last.programmed_m[0] - 0.01).abs() < 1e-8);
+    /// assert!(last.time_s > 0.01 / 0.05);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn run_program(&mut self, steps: &[Step], every: u16) -> Result<Recording, ProgramError> {
         let from_nm = self.status()?.raw_nm;
         let segments = exact(steps, from_nm)?;

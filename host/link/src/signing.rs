@@ -9,6 +9,19 @@ use std::path::Path;
 const MARK: &str = "giotto-key-1 ";
 
 /// A secret key.
+///
+/// ```
+/// use giotto_link::signing::SigningKey;
+///
+/// let folder = tempfile::tempdir()?;
+/// let file = folder.path().join("key");
+/// let key = SigningKey::generate();
+/// key.save(&file)?;
+/// assert_eq!(SigningKey::load(&file)?.public(), key.public());
+/// // A key is never written over another file.
+/// assert!(key.save(&file).is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct SigningKey(KeyPair);
 
 /// Why a file is no key.

@@ -24,6 +24,21 @@ impl Controller {
     /// # Errors
     /// [`ControllerError::Starved`] if they did not come in time and the controller gave the stream up; as
     /// [`Controller::run_circle`] otherwise.
+    ///
+    /// ```
+    /// use giotto_link::{OpenOptions, Port, open};
+    ///
+    /// // Set-points of another planner, one a tick: 10 µm along X, in a cosine from rest to rest.
+    /// let places_nm: Vec<[i32; 3]> = (0..=500)
+    ///     .map(|tick| (std::f64::consts::PI * f64::from(tick) / 500.0).cos())
+    ///     .map(|c| [(5_000.0 * (1.0 - c)) as i32, 0, 0])
+    ///     .collect();
+    /// let mut controller = open(&Port::Sim, &OpenOptions::default(), &mut |_| {})?;
+    /// let streamed = controller.run_stream(&places_nm, 0.01, 1)?;
+    /// assert_eq!((streamed.missing, streamed.late, streamed.rejected), (0, 0, 0));
+    /// assert_eq!(controller.status()?.raw_nm, [10_000, 0, 0]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn run_stream(
         &mut self,
         places_nm: &[[i32; 3]],

@@ -3,26 +3,23 @@
 //! The correction is an offset across the programmed path: δ on an arc, none on a line. A servo chain answers
 //! after the command, so that the offset it needs begins to change at the joint and not before: for one lag
 //! exactly as (s/σf)² over the way σf behind the joint, σ = √κ2. How the step goes on, and what remains at the
-//! joint, is for `transition` to say. An arc's own blocks carry the change at its start; after its end the
+//! joint, is for `joint` to say. An arc's own blocks carry the change at its start; after its end the
 //! following arc does, or a run-out along the following line, whose block then starts from a point farther along
 //! it and is not touched. From standstill the machine falls behind only as it gets going, and the step is longer.
 //! Where nothing may follow (a stop, a corner, increments, a word that acts where it stands), the offset ends inside the
 //! arc, and what remains at that point is said. Pairs of arcs (biarcs) follow the step with a common
 //! tangent at every joint.
 use super::state::{Arc, sub};
-use super::transition::Transition;
+use super::steps::Step;
+use super::transition::Node;
 
 /// How a corrected arc begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Entry {
     /// Outward offset at the start, mm: that of the arc before, carried on.
     pub(super) from_mm: f64,
-    /// Way to the arc's own offset, mm; 0: it is there already.
-    pub(super) length_mm: f64,
-    /// How it gets there.
-    pub(super) shape: Transition,
-    /// Largest error that the step leaves, mm; 0 where that is not known.
-    pub(super) remaining_mm: f64,
+    /// How it gets to the arc's own offset; of no length: it is there already.
+    pub(super) step: Step,
     /// It goes on where the corrected arc before it ends.
     pub(super) held: bool,
 }
@@ -34,23 +31,13 @@ pub(super) enum Exit {
     Held,
     /// The offset runs out along the line that follows.
     RunOut {
-        /// Way, mm.
-        length_mm: f64,
-        /// How.
-        shape: Transition,
-        /// Largest error that it leaves, mm.
-        remaining_mm: f64,
+        step: Step,
         /// Direction of the line.
         along: [f64; 2],
     },
     /// The offset is gone at the programmed end.
     Inside {
-        /// Way, mm.
-        length_mm: f64,
-        /// How.
-        shape: Transition,
-        /// Largest error that it leaves, mm.
-        remaining_mm: f64,
+        step: Step,
         /// A last stretch on the programmed circle, mm, so that the arc ends in its own G-code.
         tail_mm: f64,
     },
@@ -59,11 +46,8 @@ pub(super) enum Exit {
 impl Exit {
     /// Way inside the arc, mm.
     pub(super) fn inside_mm(self) -> f64 {
-        if let Self::Inside {
-            length_mm, tail_mm, ..
-        } = self
-        {
-            length_mm + tail_mm
+        if let Self::Inside { step, tail_mm } = self {
+            step.length_mm + tail_mm
         } else {
             0.0
         }
@@ -84,6 +68,8 @@ pub(super) struct Piece {
     pub(super) length_mm: f64,
     /// Behind the arc's end, on the line that follows.
     pub(super) beyond: bool,
+    /// Share of the feed of the arc.
+    pub(super) speed: f64,
 }
 
 /// An arc that bulges by less, mm, is written as a line: half the last digit of a program, and far from where the f32 of
@@ -111,7 +97,7 @@ pub(super) fn pieces(arc: &Arc, delta_mm: f64, entry: Entry, exit: Exit) -> Vec<
             raw.map(|v| v / norm),
         )
     };
-    let in_rad = entry.length_mm / arc.radius_mm;
+    let in_rad = entry.step.length_mm / arc.radius_mm;
     let out_rad = exit.inside_mm() / arc.radius_mm;
     let mut list = Vec::new();
     let mut last = node(0.0, entry.from_mm, 0.0);
@@ -120,13 +106,18 @@ pub(super) fn pieces(arc: &Arc, delta_mm: f64, entry: Entry, exit: Exit) -> Vec<
     }
     if in_rad > 0.0 {
         let rise = delta_mm - entry.from_mm;
-        for (u, g, slope) in entry.shape.nodes() {
+        for Node {
+            place,
+            value,
+            slope,
+        } in entry.step.shape.nodes()
+        {
             let next = node(
-                u * in_rad,
-                entry.from_mm + rise * g,
-                rise * slope / entry.length_mm,
+                place * in_rad,
+                entry.from_mm + rise * value,
+                rise * slope / entry.step.length_mm,
             );
-            biarc(&mut list, last, next, u * in_rad / total);
+            biarc(&mut list, last, next, place * in_rad / total);
             last = next;
         }
     }
@@ -142,28 +133,30 @@ pub(super) fn pieces(arc: &Arc, delta_mm: f64, entry: Entry, exit: Exit) -> Vec<
         share: 1.0 - out_rad / total,
         length_mm: swept * (arc.radius_mm + delta_mm),
         beyond: false,
+        speed: 1.0,
     });
     last = next;
     match exit {
         Exit::Held => {}
-        Exit::Inside {
-            length_mm,
-            shape,
-            tail_mm,
-            ..
-        } => {
+        Exit::Inside { step, tail_mm } => {
+            let arc_pieces = list.len();
             // The programmed end may lie off the circle by the program's rounding; it stays.
             let [x, y] = sub(arc.end, arc.centre);
             let end_mm = x.hypot(y) - arc.radius_mm;
             let fall = end_mm - delta_mm;
-            for (u, g, slope) in shape.nodes() {
-                let behind = (tail_mm + (1.0 - u) * length_mm) / arc.radius_mm;
+            for Node {
+                place,
+                value,
+                slope,
+            } in step.shape.nodes()
+            {
+                let behind = (tail_mm + (1.0 - place) * step.length_mm) / arc.radius_mm;
                 let mut next = node(
                     total - behind,
-                    delta_mm + fall * g,
-                    fall * slope / length_mm,
+                    delta_mm + fall * value,
+                    fall * slope / step.length_mm,
                 );
-                if u >= 1.0 && tail_mm == 0.0 {
+                if place >= 1.0 && tail_mm == 0.0 {
                     next.0 = arc.end;
                 }
                 biarc(&mut list, last, next, 1.0 - behind / total);
@@ -178,23 +171,27 @@ pub(super) fn pieces(arc: &Arc, delta_mm: f64, entry: Entry, exit: Exit) -> Vec<
                     share: 1.0,
                     length_mm: tail_mm,
                     beyond: false,
+                    speed: 1.0,
                 });
             }
+            list[arc_pieces..]
+                .iter_mut()
+                .for_each(|p| p.speed = step.speed);
         }
-        Exit::RunOut {
-            length_mm,
-            shape,
-            along,
-            ..
-        } => {
+        Exit::RunOut { step, along } => {
             let arc_pieces = list.len();
             // Outward of a CCW arc is to the right of travel.
             let across = [along[1] * side, -along[0] * side];
-            for (u, g, slope) in shape.nodes() {
+            for Node {
+                place,
+                value,
+                slope,
+            } in step.shape.nodes()
+            {
                 let (way, offset, tilt) = (
-                    u * length_mm,
-                    delta_mm * (1.0 - g),
-                    -delta_mm * slope / length_mm,
+                    place * step.length_mm,
+                    delta_mm * (1.0 - value),
+                    -delta_mm * slope / step.length_mm,
                 );
                 let norm = tilt.hypot(1.0);
                 let place =
@@ -209,10 +206,11 @@ pub(super) fn pieces(arc: &Arc, delta_mm: f64, entry: Entry, exit: Exit) -> Vec<
     list
 }
 
-type Node = ([f64; 2], [f64; 2]);
+/// A place and a direction of travel.
+type Stand = ([f64; 2], [f64; 2]);
 
 /// Two arcs from node to node (place, direction) with a common tangent where they meet.
-fn biarc(list: &mut Vec<Piece>, (p0, t0): Node, (p1, t1): Node, share: f64) {
+fn biarc(list: &mut Vec<Piece>, (p0, t0): Stand, (p1, t1): Stand, share: f64) {
     let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
     let v = sub(p1, p0);
     let t = [t0[0] + t1[0], t0[1] + t1[1]];
@@ -246,6 +244,7 @@ fn piece(from: [f64; 2], end: [f64; 2], at: [f64; 2], tangent: [f64; 2], share: 
         more_turns: 0,
         share,
         beyond: false,
+        speed: 1.0,
         length_mm: if straight {
             chord
         } else {

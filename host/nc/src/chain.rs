@@ -10,7 +10,7 @@
 //! | < 0 | up to 3 | second order, ζ < 0.707, swinging out |
 //! | < 0 | above 3 | none that is simple: the error at a joint is not known |
 use giotto::model_file::Servo;
-use giotto_shared::model::{Cumulants, Element};
+use giotto_shared::model::Cumulants;
 
 /// A chain in units of its own time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,37 +34,6 @@ pub(super) struct Response {
 /// Step of time in units.
 pub(super) const STEP: f64 = 0.02;
 
-/// Cumulants of a model's radius law.
-pub(super) fn cumulants(servo: &Servo) -> Cumulants<f64> {
-    match *servo {
-        Servo::Beta {
-            beta1_s2, beta2_s4, ..
-        } => {
-            let kappa2_s2 = -2.0 * beta1_s2;
-            Cumulants {
-                kappa2_s2,
-                kappa4_s4: 24.0 * beta2_s4 - 3.0 * kappa2_s2 * kappa2_s2,
-            }
-        }
-        _ => element(servo).map_or_else(Cumulants::default, |e| e.cumulants()),
-    }
-}
-
-/// The element that a model names, if it names one.
-pub(super) fn element(servo: &Servo) -> Option<Element<f64>> {
-    match *servo {
-        Servo::Lag { kv_per_s } => Some(Element::Lag { kv_per_s }),
-        Servo::SecondOrder {
-            omega_n_rad_s,
-            zeta,
-        } => Some(Element::SecondOrder {
-            omega_n_rad_s,
-            zeta,
-        }),
-        Servo::Beta { .. } => None,
-    }
-}
-
 impl Response {
     /// The chain of a model; `None` where it does nothing or none is known.
     pub(super) fn of(servo: &Servo) -> Option<Self> {
@@ -78,7 +47,7 @@ impl Response {
                 unit_s: omega_n_rad_s.recip(),
             });
         }
-        Self::of_cumulants(&cumulants(servo))
+        Self::of_cumulants(&servo.cumulants())
     }
 
     pub(super) fn of_cumulants(cumulants: &Cumulants<f64>) -> Option<Self> {
@@ -232,6 +201,7 @@ fn second_order(x: &[f64], zeta: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use giotto_shared::model::Element;
 
     fn sum(elements: &[Element<f64>]) -> Cumulants<f64> {
         elements

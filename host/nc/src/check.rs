@@ -27,6 +27,15 @@ pub struct Trouble {
 }
 
 /// The lines of a program that a controller would refuse.
+///
+/// ```
+/// use giotto_nc::check::{Controller, check};
+///
+/// assert!(check(b"G21\nG1 X10 F300\n", Controller::Grbl).is_empty());
+/// // Grbl knows no cutter compensation.
+/// let trouble = check(b"G21\nG41 D1\n", Controller::Grbl);
+/// assert_eq!(trouble[0].line, 2);
+/// ```
 pub fn check(program: &[u8], controller: Controller) -> Vec<Trouble> {
     if controller == Controller::Abb {
         return rapid::check(program);

@@ -3,9 +3,8 @@ use super::blend::{Entry, Exit, Piece, pieces};
 use super::inverse::{Inverse, Twin};
 use super::state::{Action, Arc, Plane, Straight};
 use super::steps::{Meeting, Side, Step};
-use super::transition::Transition;
 use super::word::{Line, Sort};
-use super::{Fate, Left, Options};
+use super::{Fate, FreeSide, Led, Left, Options};
 
 /// Smallest correction worth a block, mm.
 const NEGLIGIBLE_MM: f64 = 5e-4;
@@ -20,6 +19,8 @@ pub(super) struct Plan {
     pub(super) twin: Twin,
     pub(super) entry: Entry,
     pub(super) exit: Exit,
+    /// The machine stands where it begins, and where it ends.
+    pub(super) rests: [bool; 2],
 }
 
 impl Plan {
@@ -28,25 +29,27 @@ impl Plan {
         let share = |remaining_mm: f64| remaining_mm / self.twin.delta_mm.abs();
         let exit = match self.exit {
             Exit::Held => 0.0,
-            Exit::RunOut { remaining_mm, .. } => share(remaining_mm),
-            Exit::Inside { remaining_mm, .. } => share(remaining_mm),
+            Exit::RunOut { step, .. } | Exit::Inside { step, .. } => share(step.remaining_mm),
         };
-        share(self.entry.remaining_mm).max(exit)
+        share(self.entry.step.remaining_mm).max(exit)
     }
 
-    pub(super) fn fate(&self, arc: &Arc, blocks: usize) -> Fate {
+    pub(super) fn fate(&self, arc: &Arc, blocks: usize, led: Led) -> Fate {
         Fate::Corrected {
             radius_mm: arc.radius_mm,
             feed_mm_s: arc.feed_mm_s,
             delta_mm: self.twin.delta_mm,
             blocks,
             joint_share: self.joint_share(),
+            led,
         }
     }
 }
 
 /// A line keeps at least this much of its length behind a run-out, mm.
 const LINE_LEFT_MM: f64 = 0.1;
+/// What a step at one end of an arc may take of its length, so that one at the other end has room.
+const ROOM_SHARE: f64 = 0.45;
 
 /// A line as it is run, and what the law makes of its arc.
 #[derive(Clone, Debug)]
@@ -56,6 +59,8 @@ pub(super) struct Visit<'a> {
     pub(super) line: Line<'a>,
     pub(super) action: Action,
     pub(super) twin: Option<Result<Twin, Left>>,
+    /// Where the comment before it says that there is no material.
+    pub(super) free_side: Option<FreeSide>,
 }
 
 impl<'a> Visit<'a> {
@@ -70,6 +75,7 @@ impl<'a> Visit<'a> {
             line,
             action,
             twin,
+            free_side: None,
         }
     }
 
@@ -142,11 +148,18 @@ impl Room<'_, '_> {
             return None;
         };
         let (entry, exit) = (self.entry(i, arc, twin), self.exit(i, arc, twin));
-        let room = entry.length_mm + exit.inside_mm() < arc.length_mm();
+        let room = entry.step.length_mm + exit.inside_mm() < arc.length_mm();
         let long = |piece: &Piece| piece.length_mm >= self.law.least_mm;
         let fits = room && pieces(arc, twin.delta_mm, entry, exit).iter().all(long);
         Some(if fits {
-            Ok(Plan { twin, entry, exit })
+            let rests =
+                [false, true].map(|after| matches!(self.neighbour(i, arc, after), Neighbour::Rest));
+            Ok(Plan {
+                twin,
+                entry,
+                exit,
+                rests,
+            })
         } else {
             Err(Left::TooShort)
         })
@@ -160,12 +173,14 @@ impl Room<'_, '_> {
         (side * faster * faster / arc.radius_mm, -side * delta_mm)
     }
 
-    fn step(&self, f: f64, before: (f64, f64), behind: (f64, f64), side: Side) -> Step {
+    /// The step on a stretch of `room_mm` where two stretches meet, each a curvature and an offset.
+    fn step(&self, f: f64, stretches: [(f64, f64); 2], side: Side, room_mm: f64) -> Step {
         self.law.inverse.step(&Meeting {
             feed_mm_s: f,
-            curvature: [before.0, behind.0],
-            offset_mm: [before.1, behind.1],
+            curvature: stretches.map(|s| s.0),
+            offset_mm: stretches.map(|s| s.1),
             side,
+            room_mm,
         })
     }
 
@@ -173,6 +188,7 @@ impl Room<'_, '_> {
         let f = arc.feed_mm_s;
         let own = Self::left(arc, twin.delta_mm, f);
         let straight = (0.0, 0.0);
+        let room = ROOM_SHARE * arc.length_mm();
         let (from_mm, held, step) = match self.neighbour(i, arc, false) {
             Neighbour::Corrected(before, other) => {
                 // The same offset in space is outward of one and inward of the other where the turn changes.
@@ -180,25 +196,30 @@ impl Room<'_, '_> {
                 if (twin.delta_mm - from_mm).abs() < SAME_OFFSET_MM {
                     return Entry {
                         from_mm,
-                        length_mm: 0.0,
-                        shape: Transition::SMOOTH,
-                        remaining_mm: 0.0,
+                        step: Step::NONE,
                         held: true,
                     };
                 }
                 let before = Self::left(before, other.delta_mm, f);
-                (from_mm, true, self.step(f, before, own, Side::Behind))
+                (
+                    from_mm,
+                    true,
+                    self.step(f, [before, own], Side::Behind, room),
+                )
             }
-            Neighbour::Line { .. } | Neighbour::OtherArc => {
-                (0.0, false, self.step(f, straight, own, Side::Behind))
+            Neighbour::Line { .. } | Neighbour::OtherArc => (
+                0.0,
+                false,
+                self.step(f, [straight, own], Side::Behind, room),
+            ),
+            Neighbour::Rest => {
+                let stretches = [(own.0, 0.0), own];
+                (0.0, false, self.step(f, stretches, Side::FromRest, room))
             }
-            Neighbour::Rest => (0.0, false, self.step(f, (own.0, 0.0), own, Side::FromRest)),
         };
         Entry {
             from_mm,
-            length_mm: step.length_mm,
-            shape: step.shape,
-            remaining_mm: step.remaining_mm,
+            step,
             held,
         }
     }
@@ -207,43 +228,34 @@ impl Room<'_, '_> {
         let f = arc.feed_mm_s;
         let own = Self::left(arc, twin.delta_mm, f);
         let inside = |curvature: f64, side: Side| {
-            let step = self.step(f, own, (curvature, 0.0), side);
+            let room = ROOM_SHARE * arc.length_mm();
             Exit::Inside {
-                length_mm: step.length_mm,
-                shape: step.shape,
-                remaining_mm: step.remaining_mm,
+                step: self.step(f, [own, (curvature, 0.0)], side, room),
                 tail_mm: self.law.tail_mm,
             }
         };
         match self.neighbour(i, arc, true) {
             Neighbour::Corrected(..) => Exit::Held,
             Neighbour::Line { line, along, clean } => {
-                let step = self.step(f, own, (0.0, 0.0), Side::Behind);
                 let [first, second, third] = arc.plane.axes();
-                let long = |s: f64, e: f64, t: f64, u: f64| {
-                    (e - s).hypot(u - t) > step.length_mm + LINE_LEFT_MM
-                };
-                let reaches = match (
+                let length = match (
                     line.start[first],
                     line.end[first],
                     line.start[second],
                     line.end[second],
                 ) {
-                    (Some(s), Some(e), Some(t), Some(u)) => long(s, e, t, u),
-                    _ => false,
+                    (Some(s), Some(e), Some(t), Some(u)) => (e - s).hypot(u - t),
+                    _ => 0.0,
                 };
+                let room = length - LINE_LEFT_MM;
+                let step = self.step(f, [own, (0.0, 0.0)], Side::Behind, room);
                 let level = line.start[third] == line.end[third];
                 let as_fast = line
                     .feed_mm_s
                     .is_none_or(|speed| (speed / f - 1.0).abs() < 1e-9);
                 let plain = line.bare && clean && line.absolute && arc.modes.absolute;
-                if plain && level && reaches && as_fast {
-                    Exit::RunOut {
-                        length_mm: step.length_mm,
-                        shape: step.shape,
-                        remaining_mm: step.remaining_mm,
-                        along,
-                    }
+                if plain && level && step.length_mm < room && as_fast {
+                    Exit::RunOut { step, along }
                 } else {
                     inside(0.0, Side::Before)
                 }

@@ -37,6 +37,8 @@ impl Writer {
         let start = [arc.start[0] + dx, arc.start[1] + dy];
         let mut block = Block::new(line, arc, pieces, start);
         let factor = plan.twin.feed_factor;
+        let even = scaled_feed(arc, factor);
+        let mut in_force = arc.feed_word;
         for (k, piece) in pieces.iter().enumerate() {
             let last = k + 1 == pieces.len();
             let code: &[u8] = match piece.centre {
@@ -51,10 +53,12 @@ impl Writer {
             block.centre(piece, &mut words);
             let feed = match arc.modes.feed_mode {
                 // Each block takes its own time at the speed of the arc.
-                FeedMode::InverseTime => Some(60.0 * arc.feed_mm_s * factor / piece.length_mm),
-                _ if factor != 1.0 && k == 0 => Some(scaled_feed(arc, factor)),
-                _ => None,
+                FeedMode::InverseTime => {
+                    Some(60.0 * arc.feed_mm_s * factor * piece.speed / piece.length_mm)
+                }
+                _ => Some(even * piece.speed).filter(|feed| *feed != in_force),
             };
+            in_force = feed.unwrap_or(in_force);
             if let Some(feed) = feed {
                 words.extend_from_slice(b" F");
                 push_number(&mut words, feed, 6);
@@ -68,7 +72,7 @@ impl Writer {
             out.extend_from_slice(if last { line.end } else { &self.end });
             block.place = block.next;
         }
-        if factor != 1.0 && arc.modes.feed_mode == FeedMode::PerMinute {
+        if in_force != arc.feed_word && arc.modes.feed_mode == FeedMode::PerMinute {
             if line.end.is_empty() {
                 out.extend_from_slice(&self.end);
             }
@@ -82,6 +86,9 @@ impl Writer {
 
 /// F word with the angular rate kept: the block, with its lift, takes its time.
 fn scaled_feed(arc: &Arc, factor: f64) -> f64 {
+    if factor == 1.0 {
+        return arc.feed_word;
+    }
     let climb = arc.lift.map_or(0.0, |[from, to]| to - from);
     let length = arc.length_mm();
     arc.feed_word * (length * factor).hypot(climb) / length.hypot(climb)

@@ -2,13 +2,14 @@
 //!
 //! What becomes of an arc depends on the arcs and lines that it meets, no further than the next line or stop on either side.
 //! So lines are held back up to there and let go; a program of any length needs the memory of its longest chain of arcs.
-use super::blend;
-use super::correct::{Law, Visit, decide};
+use super::blend::{self, Piece};
+use super::correct::{Law, Plan, Visit, decide};
 use super::emit::Writer;
 use super::flow::{Order, order};
 use super::inverse::Inverse;
+use super::lead::{self, FreeSide, Leads, Led};
 use super::state::{Action, Arc, Reading, State};
-use super::word::{self, Line, Sort};
+use super::word::{self, Line, Sort, Word};
 use super::{Fate, Left, Options, Report};
 use giotto::model_file::ModelFile;
 use std::collections::{BTreeMap, HashSet};
@@ -32,10 +33,19 @@ struct Engine<'a> {
     window: Vec<Visit<'a>>,
     /// Lines of the window that are let go already.
     gone: usize,
+    /// What the last comment names.
+    free_side: Option<FreeSide>,
 }
 
 impl<'a> Engine<'a> {
-    fn push(&mut self, visit: Visit<'a>, sink: &mut Sink<'_>) -> io::Result<()> {
+    fn push(&mut self, mut visit: Visit<'a>, sink: &mut Sink<'_>) -> io::Result<()> {
+        if self.law.options.leads == Leads::ByName {
+            let comment = visit.line.text.iter().any(|b| matches!(b, b'(' | b';'));
+            if comment {
+                self.free_side = Leads::named(visit.line.text);
+            }
+            visit.free_side = self.free_side;
+        }
         let wall = visit.is_wall();
         self.window.push(visit);
         if wall {
@@ -61,14 +71,16 @@ impl<'a> Engine<'a> {
         } else {
             let plans = decide(&mut self.window, &self.law);
             let mut text = Vec::new();
-            for (visit, plan) in self.window.iter().zip(&plans).take(keep).skip(self.gone) {
+            for at in self.gone..keep {
+                let (visit, plan) = (&self.window[at], &plans[at]);
                 match (&visit.action, plan) {
                     (Action::Arc(arc), Some(Ok(plan))) => {
                         let arc = from_its_start(arc);
-                        let pieces = blend::pieces(&arc, plan.twin.delta_mm, plan.entry, plan.exit);
+                        let (plan, pieces, led) = self.run_of(at, &arc, plan);
                         text.clear();
-                        self.writer.arc(&visit.line, &arc, plan, &pieces, &mut text);
-                        let fate = plan.fate(&arc, pieces.len());
+                        self.writer
+                            .arc(&visit.line, &arc, &plan, &pieces, &mut text);
+                        let fate = plan.fate(&arc, pieces.len(), led);
                         sink(&visit.line, visit.index, Some(&text), Some(fate))?;
                     }
                     (_, plan) => {
@@ -81,6 +93,28 @@ impl<'a> Engine<'a> {
         self.window.drain(..keep);
         self.gone = 0;
         Ok(())
+    }
+
+    /// The blocks of the arc of a visit, with leads where they are asked for and needed.
+    fn run_of(&self, at: usize, arc: &Arc, plan: &Plan) -> (Plan, Vec<Piece>, Led) {
+        let leads = self.law.options.leads;
+        let plain = |led| {
+            let pieces = blend::pieces(arc, plan.twin.delta_mm, plan.entry, plan.exit);
+            (*plan, pieces, led)
+        };
+        if leads == Leads::No || !lead::needed(arc, plan) {
+            return plain(Led::Not);
+        }
+        let Some(side) = leads.side(self.window[at].free_side) else {
+            return plain(Led::SideUnknown);
+        };
+        let moves = |v: &&Visit<'_>| v.line.has_any(b"XYZIJKR");
+        let next = self.window[at + 1..].iter().find(moves);
+        let own_code = next.is_some_and(|v| v.line.words.iter().any(Word::is_motion));
+        match lead::lead(arc, plan, &self.law, side, own_code) {
+            Some(lead) => (lead.plan, lead.pieces, Led::Tangent),
+            None => plain(Led::NoRoom),
+        }
     }
 
     fn finish(mut self, sink: &mut Sink<'_>) -> io::Result<()> {
@@ -154,6 +188,7 @@ impl<'a> Engine<'a> {
             writer: Writer::new(line_end(program)),
             window: Vec::new(),
             gone: 0,
+            free_side: None,
         }
     }
 }

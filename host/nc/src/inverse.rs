@@ -1,5 +1,5 @@
 //! The circle to program so that the machine makes the wanted one.
-use super::chain::{Response, element};
+use super::chain::Response;
 use super::steps::{Meeting, Step, Steps};
 use super::{Keep, Left, Options};
 use giotto::model_file::{ModelFile, Servo};
@@ -37,7 +37,7 @@ impl Inverse {
             keep: options.keep,
             omega_max: OMEGA_MARGIN * model.valid.feed_mm_s[1] / model.valid.radius_mm[0],
             max_offset_mm: options.max_offset_mm,
-            steps: Steps::new(Response::of(&model.servo), options.acceleration_mm_s2),
+            steps: Steps::new(Response::of(&model.servo), options),
         }
     }
 
@@ -50,7 +50,7 @@ impl Inverse {
     pub(super) fn twin(&self, radius_mm: f64, feed_mm_s: f64) -> Result<Twin, Left> {
         let omega = feed_mm_s / radius_mm;
         let (r, f) = (radius_mm * 1e-3, feed_mm_s * 1e-3);
-        let solved = match (self.servo, element(&self.servo)) {
+        let solved = match (self.servo, self.servo.element()) {
             (
                 Servo::Beta {
                     beta1_s2, beta2_s4, ..

@@ -16,11 +16,15 @@ mod chain;
 pub mod check;
 mod codes;
 mod correct;
+mod dialect;
 mod digits;
 mod emit;
 mod engine;
 mod flow;
 mod inverse;
+mod joint;
+mod lead;
+mod least_squares;
 mod left;
 mod mark;
 #[cfg(test)]
@@ -37,6 +41,7 @@ mod transition;
 mod word;
 
 use giotto::model_file::ModelFile;
+pub use lead::{FreeSide, Leads, Led};
 pub use left::{Because, Code, Left};
 pub use mark::{Mark, marked};
 use std::io;
@@ -68,6 +73,11 @@ pub struct Options {
     pub printer: bool,
     /// Codes of the machine's own that move nothing.
     pub harmless: Vec<Code>,
+    /// The last stretch of an arc before a stop may be run more slowly than F says, where the machine would leave the
+    /// circle otherwise.
+    pub slow_to_stops: bool,
+    /// Leads of full circles that begin or end at a stop; not in RAPID.
+    pub leads: Leads,
 }
 
 impl Default for Options {
@@ -80,6 +90,8 @@ impl Default for Options {
             absolute_centres: false,
             printer: false,
             harmless: Vec::new(),
+            slow_to_stops: true,
+            leads: Leads::No,
         }
     }
 }
@@ -108,6 +120,8 @@ pub enum Fate {
         blocks: usize,
         /// Largest share of `delta_mm` that is expected to remain as an error where the arc meets its neighbours.
         joint_share: f64,
+        /// Its leads.
+        led: Led,
     },
     /// As it was.
     Left(Left),
@@ -123,18 +137,51 @@ pub struct Compensated {
 }
 
 /// Whether any line is a block: words that were understood, or what steers a program.
+///
+/// ```
+/// use giotto_nc::is_program;
+///
+/// assert!(is_program(b"G21\nG1 X10 F300\nM2\n"));
+/// assert!(!is_program(b"Dear machine, please draw a circle.\n"));
+/// ```
 pub fn is_program(program: &[u8]) -> bool {
     let block = |line: word::Line<'_>| match line.sort {
         word::Sort::Plain | word::Sort::Optional => {
             !line.words.is_empty() && line.words.iter().any(|w| !w.value.is_nan())
         }
         word::Sort::Flow(_) | word::Sort::Setting => true,
-        word::Sort::Unread => false,
+        word::Sort::Unread => dialect::arc(line.text).is_some(),
     };
     word::lines(program).any(block)
 }
 
 /// Rewrites the arcs of a program. The text need not be UTF-8; bytes outside rewritten arcs are copied.
+///
+/// ```
+/// use giotto_nc::{Fate, Options, compensate};
+/// use giotto::model_file::ModelFile;
+/// # use std::path::Path;
+///
+/// let model = ModelFile::parse(
+///     "format = 2\ncampaign = \"lab\"\nmachine = \"mill\"\n\
+///      [servo]\nkind = \"lag\"\nkv_per_s = 43.3\n\
+///      [valid]\nradius_mm = [20.0, 150.0]\nfeed_mm_s = [5.0, 700.0]",
+///     Path::new("model.toml"),
+/// )?;
+/// // A quarter of a circle of 50 mm at 15 m/min, between two straight lines that touch it.
+/// let program = "G21 G17 G90\nG0 X-20 Y0\nG1 X0 Y0 F15000\nG3 X50 Y50 I0 J50\nG1 Y80\nM2\n";
+/// let corrected = compensate(program.as_bytes(), &model, &Options::default());
+/// let Fate::Corrected { radius_mm, delta_mm, .. } = corrected.arcs[0].fate else {
+///     unreachable!("{:?}", corrected.arcs)
+/// };
+/// // The machine draws it 333 µm too small: it is programmed larger.
+/// assert_eq!(radius_mm, 50.0);
+/// assert!(delta_mm > 0.3 && delta_mm < 0.4, "{delta_mm}");
+/// // Everything but the arc is copied to the letter.
+/// let text = String::from_utf8(corrected.program)?;
+/// assert!(text.starts_with("G21 G17 G90\nG0 X-20 Y0\n") && text.ends_with("G1 Y80\nM2\n"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn compensate(program: &[u8], model: &ModelFile, options: &Options) -> Compensated {
     let mut text = Vec::with_capacity(program.len());
     // Writing into memory does not fail.

@@ -45,6 +45,22 @@ pub struct NotRunnable {
 ///
 /// # Errors
 /// [`NotRunnable`] for the first line that cannot be run as it stands.
+///
+/// ```
+/// use giotto_nc::program::{Running, blocks};
+/// use giotto_shared::path::Segment;
+///
+/// let running = Running { start_mm: [0.0; 3], rapid_mm_s: 100.0, tolerance_mm: 0.01, tool_loaded: false };
+/// let read = blocks(b"G21 G90\nG1 X10 F600\nM2\n", &running)?;
+/// assert_eq!(read.len(), 1);
+/// assert_eq!(read[0].line, 2);
+/// assert!(matches!(read[0].step.segment, Segment::Line { to_m, feed_m_s }
+///     if (to_m[0] - 0.01).abs() < 1e-12 && (feed_m_s - 0.01).abs() < 1e-12));
+/// // What nobody here can run is refused with its place.
+/// let refused = blocks(b"G21 G90\nG1 X10 F600\nG77 X3\n", &running).unwrap_err();
+/// assert_eq!(refused.line, 3);
+/// # Ok::<(), giotto_nc::program::NotRunnable>(())
+/// ```
 pub fn blocks(program: &[u8], running: &Running) -> Result<Vec<Block>, NotRunnable> {
     let mut reader = Reader {
         state: State::at(running.start_mm),

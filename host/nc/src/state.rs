@@ -177,6 +177,9 @@ impl State {
                 let code = Code::Named("what stands there");
                 let arc = self.moves_on_arc(line);
                 self.forget(code);
+                if let Some(name) = super::dialect::arc(line.text) {
+                    return Action::LostArc(Left::Dialect(name));
+                }
                 if arc {
                     Action::LostArc(Left::Unread(self.because(code)))
                 } else {

@@ -20,7 +20,7 @@ pub(super) fn model(servo: Servo) -> ModelFile {
 }
 
 /// κ2 = 533e-6 s², as a lag of 23 ms.
-fn lag() -> ModelFile {
+pub(super) fn lag() -> ModelFile {
     model(Servo::Lag { kv_per_s: 43.3 })
 }
 
@@ -171,6 +171,22 @@ fn reasons_to_leave_an_arc() {
     );
 }
 
+/// Arcs of other dialects are counted and keep their name; no byte changes.
+#[test]
+fn other_dialects_are_named() {
+    for (line, name) in [
+        ("12 C X+30 Y+10 DR+ F500", "a circle of Heidenhain"),
+        ("CIRC {X 10, Y 5}, {X 20, Y 0}", "CIRC of KUKA"),
+        ("9:C P[1]", "a circular motion of a Fanuc robot"),
+        ("CIP X10 Y0 I1=5 J1=5", "CIP of Siemens"),
+    ] {
+        assert_eq!(left(&format!("{line}\n")), Left::Dialect(name));
+        assert!(is_program(line.as_bytes()), "{line}");
+        let behind = format!("{HEAD}{line}\nG3 X-20 Y0 I-20 J0\n");
+        assert!(matches!(left(&behind), Left::UnknownModes(b) if b.line == 3));
+    }
+}
+
 /// Comments, harmless codes and modes that have ended keep nothing from being corrected.
 #[test]
 fn nothing_is_left_without_need() {
@@ -274,6 +290,7 @@ fn every_way_to_write_a_circle_gives_the_same_circle() {
         format!("{HEAD}N7 G2 (cw) X20 Y0 I-20 J0 ; end\n"),
         format!("{HEAD}G3 X-20 R20\n"),
         format!("{HEAD}G3 X-20 R-20\n"),
+        format!("{HEAD}G3 X-20 CR=20\n"),
     ];
     for keep in [Keep::Feed, Keep::Omega] {
         let options = Options {
@@ -384,15 +401,15 @@ fn halves_of_a_circle_share_their_offset() {
     let [
         Fate::Corrected {
             delta_mm,
-            blocks: 7,
+            blocks: 9,
             ..
         },
-        Fate::Corrected { blocks: 6, .. },
+        Fate::Corrected { blocks: 8, .. },
     ] = fates[..]
     else {
         panic!("{fates:?}")
     };
-    let first = &arcs(&text)[6];
+    let first = &arcs(&text)[8];
     assert!((first.end[0] + 20.0 + delta_mm).abs() < 1e-5, "{text}");
     let last = arcs(&text).last().unwrap().end;
     assert_eq!(last, [20.0, 0.0]);

@@ -233,6 +233,9 @@ impl Reader<'_> {
                         .iter()
                         .take_while(|b| b.is_ascii_alphabetic())
                         .count();
+                    if letters == 2 && self.radius_of_siemens() {
+                        continue;
+                    }
                     if letters > 1 {
                         return self.keyword(letters);
                     }
@@ -265,6 +268,31 @@ impl Reader<'_> {
         let next = self.text.get(self.blanks(end));
         (!next.is_some_and(|b| b.is_ascii_digit() || matches!(b, b'.' | b'-' | b'+' | b'[' | b'=')))
             .then_some(())
+    }
+
+    /// `CR=12.5`: an R by another name.
+    fn radius_of_siemens(&mut self) -> bool {
+        let text = &self.text[self.at..];
+        if !text[..2].eq_ignore_ascii_case(b"CR") {
+            return false;
+        }
+        let equals = self.blanks(self.at + 2);
+        if self.text.get(equals) != Some(&b'=') {
+            return false;
+        }
+        let digits = self.blanks(equals + 1);
+        let Some((length, value)) = self.value(digits, false).filter(|(length, _)| *length > 0)
+        else {
+            return false;
+        };
+        let range = self.at..digits + length;
+        self.at = range.end;
+        self.words.push(Word {
+            letter: b'R',
+            value,
+            range,
+        });
+        true
     }
 
     /// Length and value of what may stand behind a letter.
@@ -469,7 +497,12 @@ mod tests {
         assert_eq!(read("G1 X1.2.3").1, Sort::Unread);
         assert_eq!(read("G1 X1 0").1, Sort::Unread);
         assert_eq!(read("G1 X1,5").1, Sort::Unread);
-        assert_eq!(read("G2 X1 Y1 CR=5").1, Sort::Unread);
+        let siemens = [('G', 2.0), ('X', 1.0), ('R', -5.5), ('F', 300.0)];
+        assert_eq!(read("G2 X1 CR=-5.5 F300"), (siemens.to_vec(), Sort::Plain));
+        assert_eq!(read("G2 X1 cr = -5.5F300").0, siemens);
+        assert_eq!(read("G2 X1 Y1 CR=").1, Sort::Unread);
+        assert_eq!(read("G2 X1 Y1 CR5").1, Sort::Unread);
+        assert_eq!(read("G2 X1 Y1 I=AC(5)").1, Sort::Unread);
         assert_eq!(
             read("M117 Layer X5 of 7"),
             (vec![('M', 117.0)], Sort::Plain)

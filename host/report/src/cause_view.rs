@@ -1,9 +1,9 @@
 //! What the page says of one cause, and the pictures of each alone and of what has no name.
-use super::alone::Alone;
+use super::each_cause_alone::Alone;
 use super::number::{fixed, number, plain};
+use super::page_content::ways;
 use super::portrait::{self, Curve};
 use super::verdict::{self, look_alike};
-use super::view::ways;
 use giotto::campaign::{Campaign, Run};
 use giotto::diagnosis::picture::RunPicture;
 use giotto::diagnosis::{Diagnosis, Finding};

@@ -63,6 +63,30 @@ struct Series {
 ///
 /// # Errors
 /// [`FigureError`] if the drawing library fails.
+///
+/// ```
+/// use giotto::campaign::Direction;
+/// use giotto::fit::{Observation, RadiusFit};
+/// use giotto_report::figures::figures;
+///
+/// let runs: Vec<Observation> = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
+///     .into_iter()
+///     .flat_map(|feed_m_s| [0.1, 0.2].map(|radius_m| Observation {
+///         radius_m,
+///         feed_m_s,
+///         radius_error_m: -200e-6 * feed_m_s * feed_m_s / radius_m + 1e-6 * (90.0 * feed_m_s).sin(),
+///         out_of_roundness_m: None,
+///     }))
+///     .collect();
+/// let fit = RadiusFit::new(&runs, Default::default())?;
+/// let drawn = figures(&fit.points(&runs), &[Direction::Ccw; 12], &fit.model)?;
+/// // Figure 9 needs out-of-roundness, which these runs have not.
+/// let names: Vec<&str> = drawn.iter().map(|figure| figure.file.as_str()).collect();
+/// assert_eq!(names, ["figure08.svg", "figure10.svg", "figure11.svg"]);
+/// // Each holds the numbers that it draws: a line a run and its head.
+/// assert!(drawn[0].svg.contains("<svg") && drawn[0].csv.lines().count() > 12);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn figures(
     points: &[Point],
     directions: &[Direction],

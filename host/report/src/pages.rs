@@ -53,6 +53,25 @@ fn render(page: &Page) -> Result<String, ReportError> {
 ///
 /// # Errors
 /// As [`super::html`].
+///
+/// ```
+/// use giotto::simulation::{self, Plan};
+/// use giotto::diagnosis;
+/// # use std::path::Path;
+/// let plan = Plan::parse(
+///     "[machine]\nboth = { kv_per_s = 50.0 }\ny = { backlash_um = 12.0 }\n\
+///      [grid]\nradii_mm = [50.0, 150.0]\nfeeds_mm_s = [20.0, 100.0, 300.0]",
+///     Path::new("plan.toml"),
+/// )?;
+/// let campaign = simulation::campaign(&plan, 1);
+/// use giotto::{analysis, comparison::compare, summary::Summary};
+///
+/// let report = analysis::of_campaign(&campaign).map_err(|(_, error)| error)?;
+/// let summary = Summary::of(&report, &diagnosis::diagnose(&campaign, &Default::default())?);
+/// let page = giotto_report::comparison_page(&[compare(&summary, &summary)])?;
+/// assert!(page.contains("before and after"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn comparison_page(comparisons: &[Comparison]) -> Result<String, ReportError> {
     let first = comparisons.first().map_or("", |c| c.before.as_str());
     let part = |c: &Comparison| Part {

@@ -1,11 +1,10 @@
 //! Plots of all runs: the collapse test, sizes and forms over the acceleration, what is left.
 use super::chart::{Chart, Point};
 use super::number::{fixed, plain};
-use super::view::ways;
+use super::page_content::ways;
 use giotto::analysis;
 use giotto::campaign::{Campaign, Direction};
 use giotto::diagnosis::Diagnosis;
-use giotto::diagnosis::survey::Response;
 
 fn shape_of(radii: &[f64], radius_m: f64) -> usize {
     radii.iter().position(|r| *r == radius_m).unwrap_or(0)
@@ -53,7 +52,7 @@ pub(super) fn collapse(campaign: &Campaign, d: &Diagnosis, radii: &[f64]) -> Str
         .collect();
     before.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let fastest = d.picture.iter().map(|p| p.omega_rad_s).fold(0.0, f64::max);
-    let response = Response::of(&d.model.servo);
+    let response = d.model.servo.response();
     let after = (0..=60)
         .map(|i| fastest * f64::from(i) / 60.0)
         .map(|omega| [omega * omega, 1e3 * response.gain(omega).ln()])

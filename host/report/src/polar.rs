@@ -1,5 +1,5 @@
 //! What the polar plot draws: profiles of each circle as JSON inside the page.
-use super::alone::Alone;
+use super::each_cause_alone::Alone;
 use super::number::{fixed, plain};
 use giotto::campaign::{Campaign, Direction};
 use giotto::diagnosis::Diagnosis;

@@ -41,6 +41,27 @@ pub fn profile(run: &Run, sectors: usize) -> Vec<f64> {
 }
 
 /// Splits a pair of runs of the same radius and feed.
+///
+/// ```
+/// use giotto::analysis::even_odd;
+/// use giotto::campaign::Direction;
+/// use giotto::simulation::{self, Plan};
+/// # use std::path::Path;
+/// // A radius error is the same both ways round; the lag of a single axis flips.
+/// let plan = Plan::parse(
+///     "[machine]\nx = { kv_per_s = 50.0 }\ny = { kv_per_s = 60.0 }\n[instrument]\n\
+///      [grid]\nradii_mm = [100.0]\nfeeds_mm_s = [100.0]\norder = \"listed\"",
+///     Path::new("plan.toml"),
+/// )?;
+/// let campaign = simulation::campaign(&plan, 1);
+/// let [ccw, cw] = &campaign.runs[..] else { unreachable!() };
+/// assert_eq!(cw.direction, Direction::Cw);
+/// let split = even_odd(cw, ccw, 72);
+/// let largest = |values: &[f64]| values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+/// // ½fΔτ = 0.5 · 0.1 m/s · 3.3 ms = 167 µm.
+/// assert!((largest(&split.odd_m) - 167e-6).abs() < 5e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn even_odd(cw: &Run, ccw: &Run, sectors: usize) -> EvenOdd {
     let (a, b) = (profile(ccw, sectors), profile(cw, sectors));
     EvenOdd {

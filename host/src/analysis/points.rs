@@ -1,5 +1,5 @@
 //! Polar samples as points of the plane, computed on each walk.
-use crate::fit::lanes;
+use crate::fit::simd_sums;
 use giotto_shared::circle::{BLOCK, Merge, Part, Points, Walk};
 use rayon::prelude::*;
 
@@ -46,7 +46,7 @@ impl<'a> Polar<'a> {
             let ((sin, cos), r) = (a.sin_cos(), self.radius_m + v);
             (x[k], y[k]) = (r * cos, r * sin);
         }
-        lanes::sum(part, Walk::ALL, &x[..n], &y[..n])
+        simd_sums::sum(part, Walk::ALL, &x[..n], &y[..n])
     }
 
     /// Sums over blocks of (angle, deviation), in order.

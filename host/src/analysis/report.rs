@@ -32,6 +32,24 @@ pub struct Report {
 ///
 /// # Errors
 /// A run through which no circle goes, by index.
+///
+/// ```
+/// use giotto::analysis;
+/// use giotto::simulation::{self, Plan};
+/// # use std::path::Path;
+/// let plan = Plan::parse(
+///     "[machine]\nboth = { kv_per_s = 50.0 }\n[grid]\nradii_mm = [100.0]\nfeeds_mm_s = [300.0]",
+///     Path::new("plan.toml"),
+/// )?;
+/// let report = analysis::of_campaign(&simulation::campaign(&plan, 1)).map_err(|(_, e)| e)?;
+/// // ΔR = −½ τ² f²/R of a lag of 20 ms: −180 µm, in both directions, which make one pair.
+/// for run in &report.runs {
+///     assert!((run.radius_error_m + 180e-6).abs() < 3e-6);
+/// }
+/// assert_eq!(report.iso230_4.len(), 1);
+/// assert!(report.iso230_4[0].g_b_m.is_some_and(|g| g < 15e-6));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn of_campaign(campaign: &Campaign) -> Result<Report, (usize, CircleError)> {
     let runs: Result<Vec<_>, _> = campaign
         .runs
@@ -110,40 +128,10 @@ pub fn of_files(manifest: &Manifest, progress: impl Fn() + Sync) -> Result<Repor
             .map(|r| (r.radius_m, r.feed_m_s, r.direction)),
     );
     let pairs: Vec<[Option<usize>; 2]> = groups.concat();
-    let one = |index: usize| -> Result<Done, (usize, CampaignError)> {
-        let mut loaded = manifest.load(index).map_err(|e| (index, e))?;
-        let mut analysis = of_run(&loaded.run, loaded.turn_s).map_err(|e| {
-            let at = Place::at(&manifest.runs[index].path, 2, 1);
-            (
-                index,
-                CampaignError::new(
-                    at,
-                    Problem::NoCircle {
-                        reason: e.to_string(),
-                    },
-                ),
-            )
-        })?;
-        if let Some(frame) = loaded.location {
-            // The axes of the nearest coordinate plane, in its order.
-            let normal = loaded.run.frame.normal();
-            let across = (0..3).max_by(|a, b| normal[*a].total_cmp(&normal[*b]));
-            let axes = [[1, 2], [2, 0], [0, 1]][across.unwrap_or(2)];
-            let [a, b] = analysis.centre_m;
-            analysis.centre_m = [frame.origin_m[axes[0]] + a, frame.origin_m[axes[1]] + b];
-        }
-        let samples = &mut loaded.run.samples;
-        let kept = Kept::of(
-            std::mem::take(&mut samples.angle_rad),
-            std::mem::take(&mut samples.deviation_m),
-        );
+    let one = |index: usize| {
+        let done = read_and_analyse(manifest, index)?;
         progress();
-        Ok(Done {
-            index,
-            analysis,
-            kept,
-            loaded,
-        })
+        Ok(done)
     };
     let done: Vec<Result<Pair, (usize, CampaignError)>> = pairs
         .par_iter()
@@ -180,6 +168,47 @@ pub fn of_files(manifest: &Manifest, progress: impl Fn() + Sync) -> Result<Repor
     runs.sort_by_key(|d| d.index);
     runs.iter().for_each(|d| together.add(d.index, &d.loaded));
     together.check()?;
+    Ok(assembled(manifest, iso, runs))
+}
+
+/// Reads a run, analyses it and keeps what its pair needs.
+fn read_and_analyse(manifest: &Manifest, index: usize) -> Result<Done, (usize, CampaignError)> {
+    let mut loaded = manifest.load(index).map_err(|e| (index, e))?;
+    let mut analysis = of_run(&loaded.run, loaded.turn_s).map_err(|e| {
+        let at = Place::at(&manifest.runs[index].path, 2, 1);
+        (
+            index,
+            CampaignError::new(
+                at,
+                Problem::NoCircle {
+                    reason: e.to_string(),
+                },
+            ),
+        )
+    })?;
+    if let Some(frame) = loaded.location {
+        // The axes of the nearest coordinate plane, in its order.
+        let normal = loaded.run.frame.normal();
+        let across = (0..3).max_by(|a, b| normal[*a].total_cmp(&normal[*b]));
+        let axes = [[1, 2], [2, 0], [0, 1]][across.unwrap_or(2)];
+        let [a, b] = analysis.centre_m;
+        analysis.centre_m = [frame.origin_m[axes[0]] + a, frame.origin_m[axes[1]] + b];
+    }
+    let samples = &mut loaded.run.samples;
+    let kept = Kept::of(
+        std::mem::take(&mut samples.angle_rad),
+        std::mem::take(&mut samples.deviation_m),
+    );
+    Ok(Done {
+        index,
+        analysis,
+        kept,
+        loaded,
+    })
+}
+
+/// The report of runs in file order.
+fn assembled(manifest: &Manifest, iso: Vec<Iso230>, runs: Vec<Done>) -> Report {
     let mut report = Report {
         name: manifest.name.clone(),
         machine: manifest.machine.clone(),
@@ -195,5 +224,5 @@ pub fn of_files(manifest: &Manifest, progress: impl Fn() + Sync) -> Result<Repor
         report.frames.push(done.loaded.location);
         report.notes.extend(done.loaded.notes);
     }
-    Ok(report)
+    report
 }

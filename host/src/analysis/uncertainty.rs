@@ -311,6 +311,15 @@ pub enum Verdict {
 }
 
 /// Decides a figure against a tolerance, all in m.
+///
+/// ```
+/// use giotto::analysis::uncertainty::{Verdict, decide};
+///
+/// // 8 µm ± 1 µm against 10 µm; then too close to tell; then certainly beyond.
+/// assert_eq!(decide(8e-6, 1e-6, 10e-6), Verdict::Pass);
+/// assert_eq!(decide(9.5e-6, 1e-6, 10e-6), Verdict::Undecided);
+/// assert_eq!(decide(-12e-6, 1e-6, 10e-6), Verdict::Fail);
+/// ```
 pub fn decide(figure_m: f64, expanded_m: f64, tolerance_m: f64) -> Verdict {
     let size = figure_m.abs();
     if size + expanded_m <= tolerance_m {

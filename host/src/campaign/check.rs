@@ -1,24 +1,22 @@
 //! Whether the numbers of a run can be what the campaign says they are. What cannot is refused by name;
 //! what is odd but possible becomes a note.
+mod angles;
+mod deviations;
+
+pub(super) use angles::angles;
+pub(super) use deviations::{called_um, deviation};
+
 use super::Note;
 use super::clock::Clock;
+use super::column_sums::sum;
 use super::error::{CampaignError, Problem};
-use super::lanes::{bounds, sum};
 use super::manifest::Entry;
-use giotto_shared::Direction;
 use std::f64::consts::TAU;
 
 /// Largest mean deviation that still is one, share of the radius: a slow loop at full feed draws circles a tenth too small.
 pub(super) const LARGEST_SIZE_ERROR: f64 = 0.25;
-/// Largest departure of a reading from the mean of its run, share of the radius.
-const LARGEST_FORM: f64 = 0.05;
-/// Largest sample noise, share of the radius: trackers and encoders are ten times better.
-const LARGEST_NOISE: f64 = 0.003;
-/// A sample that far from both neighbours is no motion of a machine: the larger of 1 mm and 1 % of the radius.
-const SPIKE_M: f64 = 1e-3;
 /// Readings this far out that do not move any more stand at the end of a ballbar's range (±1 mm).
 pub(super) const INSTRUMENT_LIMIT_M: f64 = 0.99e-3;
-const ROWS_AT_LIMIT: usize = 5;
 /// A turn shorter than this share of the programmed one is not whole: feed overrides end at 125 %.
 const SHORTEST_TURN: f64 = 0.79;
 /// A turn longer than this many programmed ones is a wrong unit: controllers slow down by less.
@@ -62,169 +60,6 @@ pub(super) fn gaps(
         "about {lost} samples are missing (largest hole {gap_deg:.2}°); angles follow the time stamps"
     );
     notes.push(Note { at, text });
-    Ok(())
-}
-
-/// Deviations must be those of a circle of the programmed radius. Gives their noise, m.
-pub(super) fn deviation(
-    entry: &Entry,
-    deviation: &[f64],
-    field: usize,
-    column: &str,
-) -> Result<f64, CampaignError> {
-    let radius = entry.radius_m;
-    let mean = sum(deviation) / deviation.len() as f64;
-    let [lowest, highest] = bounds(deviation);
-    let far = |v: &f64| (v - mean).abs() > LARGEST_FORM * radius;
-    let refuse = |row: usize, hint: String, expected: String| {
-        let value = if column == "radius_mm" {
-            format!("{:.6} mm", (deviation[row] + radius) * 1e3)
-        } else {
-            format!("{:.1} µm", deviation[row] * 1e6)
-        };
-        let (column, radius_mm) = (column.to_owned(), tidy(radius * 1e3));
-        Err(err(
-            entry,
-            row,
-            field,
-            Problem::Implausible {
-                column,
-                value,
-                radius_mm,
-                hint,
-                expected,
-            },
-        ))
-    };
-    if mean.abs() > LARGEST_SIZE_ERROR * radius {
-        let hint = if column == "radius_mm" {
-            unit_hint((mean + radius) / radius)
-        } else if (mean / radius - 1.0).abs() < 0.1 {
-            "these look like radii, not deviations".to_owned()
-        } else {
-            "the unit may be wrong".to_owned()
-        };
-        return refuse(
-            0,
-            hint,
-            format!(
-                "a mean within ±{} mm",
-                tidy(LARGEST_SIZE_ERROR * radius * 1e3)
-            ),
-        );
-    }
-    if let (true, Some(row)) = (
-        far(&lowest) || far(&highest),
-        deviation.iter().position(far),
-    ) {
-        let few = deviation.iter().filter(|v| far(v)).count() * 20 < deviation.len();
-        let hint = if few {
-            "an outlier"
-        } else {
-            "the unit may be wrong"
-        };
-        let expected = format!(
-            "within {} mm of the mean",
-            tidy(LARGEST_FORM * radius * 1e3)
-        );
-        return refuse(row, hint.to_owned(), expected);
-    }
-    let noise_m = sample_noise(deviation);
-    if noise_m > LARGEST_NOISE * radius {
-        let noise_mm = (noise_m * 1e5).round() / 1e2;
-        let hint = format!("neighbours scatter by {noise_mm} mm, the unit may be wrong");
-        return refuse(
-            0,
-            hint,
-            format!("noise below {} mm", tidy(LARGEST_NOISE * radius * 1e3)),
-        );
-    }
-    let spike = SPIKE_M.max(0.01 * radius);
-    let lone = |w: &[f64]| (w[1] - w[0]).abs().min((w[1] - w[2]).abs()) > spike;
-    if deviation.len() >= 90
-        && highest - lowest > spike
-        && let Some(k) = deviation.windows(3).position(lone)
-    {
-        let expected = format!("within {} mm of its neighbours", tidy(spike * 1e3));
-        return refuse(
-            k + 1,
-            "a single reading far from its neighbours".to_owned(),
-            expected,
-        );
-    }
-    if highest.max(-lowest) >= INSTRUMENT_LIMIT_M && lowest != highest {
-        at_limit(entry, deviation, field, [lowest, highest])?;
-    }
-    Ok(noise_m)
-}
-
-/// Deviations that span less than any instrument resolves are millimetres called micrometres: refused where the file is
-/// foreign, noted where a campaign says so.
-pub(super) fn called_um(
-    entry: &Entry,
-    deviation: &[f64],
-    noise_m: f64,
-    field: usize,
-    is_radius: bool,
-    notes: &mut Vec<Note>,
-) -> Result<(), CampaignError> {
-    const SPAN_M: f64 = 1e-6;
-    const NOISE_M: [f64; 2] = [0.05e-9, 20e-9];
-    const STEP_M: f64 = 1.1e-9;
-    let [lowest, highest] = bounds(deviation);
-    let small = highest - lowest < SPAN_M && highest.max(-lowest) < SPAN_M;
-    if is_radius || !small || !(NOISE_M[0]..NOISE_M[1]).contains(&noise_m) {
-        return Ok(());
-    }
-    // Micrometres have one or two decimals; these have more.
-    let steps = deviation.windows(2).map(|w| (w[1] - w[0]).abs());
-    let finest = steps
-        .filter(|step| *step > 0.0)
-        .fold(f64::INFINITY, f64::min);
-    if finest > STEP_M {
-        return Ok(());
-    }
-    let problem = Problem::CalledMicrometres {
-        span_um: ((highest - lowest) * 1e9).round() / 1e3,
-        noise_nm: (noise_m * 1e11).round() / 1e2,
-    };
-    if entry.slice.is_some() {
-        return Err(err(entry, 0, field, problem));
-    }
-    notes.push(Note {
-        at: entry.row(0),
-        text: problem.to_string(),
-    });
-    Ok(())
-}
-
-/// Readings that stay where none lies further out stand at the end of the instrument's range.
-fn at_limit(
-    entry: &Entry,
-    deviation: &[f64],
-    field: usize,
-    ends: [f64; 2],
-) -> Result<(), CampaignError> {
-    let mut run = 1;
-    for k in 1..deviation.len() {
-        let value = deviation[k];
-        let stays = value == deviation[k - 1] && value.abs() >= INSTRUMENT_LIMIT_M;
-        run = if stays { run + 1 } else { 1 };
-        if run >= ROWS_AT_LIMIT && value == ends[usize::from(value > 0.0)] {
-            let rows = run
-                + deviation[k + 1..]
-                    .iter()
-                    .take_while(|&&v| v == value)
-                    .count();
-            let value_um = tidy(value * 1e6);
-            return Err(err(
-                entry,
-                k + 1 - run,
-                field,
-                Problem::OutOfInstrumentRange { value_um, rows },
-            ));
-        }
-    }
     Ok(())
 }
 
@@ -413,123 +248,4 @@ pub(super) fn fingerprint(deviation: &[f64], noise_m: f64) -> Option<u64> {
         prints = std::array::from_fn(|k| mix(prints[k], chunk[k].to_bits()));
     }
     Some(rest.iter().map(|v| v.to_bits()).chain(prints).fold(0, mix))
-}
-
-/// Unwrapped angles must make one turn (or the declared arc) in the direction of travel.
-pub(super) fn angles(
-    entry: &Entry,
-    angle: &[f64],
-    field: usize,
-    covered: &mut f64,
-    notes: &mut Vec<Note>,
-) -> Result<(), CampaignError> {
-    let n = angle.len();
-    let d = f64::from(entry.direction.sign());
-    let (lowest, highest) = angle
-        .iter()
-        .fold((f64::MAX, f64::MIN), |(l, h), &a| (l.min(a), h.max(a)));
-    if (highest - lowest).to_degrees() < 0.5 {
-        return Err(err(
-            entry,
-            n - 1,
-            field,
-            Problem::AngleConstant {
-                at_deg: angle[0].to_degrees(),
-            },
-        ));
-    }
-    let span = angle[n - 1] - angle[0];
-    if span * d < 0.0 {
-        let words = |up: bool| {
-            if up {
-                "counter-clockwise (growing)"
-            } else {
-                "clockwise (falling)"
-            }
-        };
-        let ccw = entry.direction == Direction::Ccw;
-        let direction = if ccw { "ccw" } else { "cw" };
-        let problem = Problem::DirectionContradicted {
-            found: words(!ccw),
-            expected: words(ccw),
-            direction,
-        };
-        return Err(err(entry, n - 1, field, problem));
-    }
-    let one_degree = 1f64.to_radians();
-    if let Some(k) = angle
-        .windows(2)
-        .position(|w| d * (w[1] - w[0]) < -one_degree)
-    {
-        let back_deg = (d * (angle[k] - angle[k + 1])).to_degrees();
-        return Err(err(
-            entry,
-            k + 1,
-            field,
-            Problem::AngleBackwards { back_deg },
-        ));
-    }
-    let spacing = span.abs() / (n - 1) as f64;
-    *covered = span.abs() + spacing;
-    let tolerance = 2.0 * spacing + 1f64.to_radians();
-    let covered_deg = covered.to_degrees();
-    match entry.arc_rad {
-        Some(declared) if (*covered - declared).abs() > tolerance => {
-            let problem = Problem::ArcContradicted {
-                covered_deg,
-                declared_deg: tidy(declared.to_degrees()),
-            };
-            return Err(err(entry, n - 1, field, problem));
-        }
-        Some(_) => {}
-        None if *covered < TAU - tolerance => {
-            return Err(err(entry, n - 1, field, Problem::Arc { covered_deg }));
-        }
-        None if *covered > TAU + tolerance => {
-            let row = angle
-                .iter()
-                .position(|a| (a - angle[0]).abs() >= TAU)
-                .unwrap_or(n - 1);
-            return Err(err(
-                entry,
-                row,
-                field,
-                Problem::SeveralTurns {
-                    turns: *covered / TAU,
-                },
-            ));
-        }
-        None => {}
-    }
-    if let Some(k) = angle.windows(2).position(|w| {
-        let hole = (w[1] - w[0]).abs();
-        hole.to_degrees() > LARGEST_GAP_DEG && hole > 3.0 * spacing
-    }) {
-        let gap_deg = (angle[k + 1] - angle[k]).abs().to_degrees();
-        let gap_s = gap_deg.to_radians() * entry.radius_m / entry.feed_m_s;
-        return Err(err(
-            entry,
-            k + 1,
-            field,
-            Problem::Gap {
-                gap_s,
-                gap_deg,
-                limit_deg: LARGEST_GAP_DEG,
-            },
-        ));
-    }
-    if let Some(start) = entry.start_angle_rad {
-        let off = ((angle[0] - start + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0).to_degrees();
-        if off.abs() > 5.0 + spacing.to_degrees() {
-            let (said, found) = (start.to_degrees(), angle[0].to_degrees());
-            let text = format!(
-                "start_angle_deg = {said:.1}, the first sample lies at {found:.1}°: the file is believed"
-            );
-            notes.push(Note {
-                at: entry.place(0, field),
-                text,
-            });
-        }
-    }
-    Ok(())
 }

@@ -1,6 +1,6 @@
 //! Time stamps, seen once and forgotten: order, duration, spacing, the largest hole.
+use super::column_sums::{bounds, sum};
 use super::error::{CampaignError, Problem};
-use super::lanes::{bounds, sum};
 use super::manifest::Entry;
 use super::thinned::Thinned;
 

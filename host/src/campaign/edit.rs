@@ -31,6 +31,23 @@ pub struct Change {
 ///
 /// # Errors
 /// A run that the campaign does not list, and whatever the changed run would be refused for; the campaign is then as it was.
+///
+/// ```
+/// use giotto::campaign::{self, edit::{Change, set}};
+/// use giotto::simulation::{self, Plan};
+/// # use std::path::Path;
+/// # let plan = Plan::parse("[grid]\nradii_mm = [100.0]\nfeeds_mm_s = [50.0]", Path::new("plan.toml"))?;
+/// # let folder = tempfile::tempdir()?;
+/// # campaign::write(&simulation::campaign(&plan, 1), folder.path())?;
+///
+/// // The wrong feed was noted down.
+/// let change = Change { feed_m_s: Some(0.06), ..Change::default() };
+/// let manifest = set(folder.path(), "run000.csv", &change)?;
+/// assert_eq!(manifest.runs[0].feed_m_s, 0.06);
+/// // A run that the campaign does not list is refused.
+/// assert!(set(folder.path(), "run999.csv", &change).is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn set(dir: &Path, file: &str, change: &Change) -> Result<Manifest, CampaignError> {
     edit(dir, file, |list, index| {
         if let Some(table) = list.get_mut(index) {

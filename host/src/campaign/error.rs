@@ -319,6 +319,22 @@ pub enum Problem {
     DuplicateName { index: usize, file: String },
 }
 
+impl CampaignError {
+    /// Whether a file contradicts what the campaign says of it (radius, feed, direction, a whole turn): a label that was confused,
+    /// and no file that cannot be read.
+    pub fn contradicts_its_label(&self) -> bool {
+        matches!(
+            *self.problem,
+            Problem::DirectionContradicted { .. }
+                | Problem::ArcContradicted { .. }
+                | Problem::TooShort { .. }
+                | Problem::TooLong { .. }
+                | Problem::Implausible { .. }
+                | Problem::WrongRadius { .. }
+        )
+    }
+}
+
 const SHAPES: &str = "`time_s,deviation_um`, `angle_deg,deviation_um`, `time_s,x_mm,y_mm[,z_mm]` or `x_mm,y_mm[,z_mm]` (`deviation_mm` and `radius_mm` serve as well)";
 
 /// The columns that do not make a circular test.

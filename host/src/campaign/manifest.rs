@@ -8,6 +8,21 @@ use std::path::{Component, Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+/// What a run may say of itself.
+const RUN_KEYS: [&str; 11] = [
+    "file",
+    "radius_mm",
+    "feed_mm_s",
+    "direction",
+    "start_angle_deg",
+    "started_s",
+    "temperature_c",
+    "centre_mm",
+    "arc_deg",
+    "plane",
+    "setup",
+];
+
 const EXPECTED: &str = "a directory with campaign.toml and one CSV a run";
 const EXPECTED_TOML: &str = "[campaign] and [[run]] tables";
 /// Shortest arc that a campaign may declare, degrees.
@@ -297,22 +312,7 @@ impl Source<'_> {
         plane: Option<Plane>,
     ) -> Result<(Entry, Range<usize>), CampaignError> {
         let table = self.table(value, "run")?;
-        self.known_keys(
-            table,
-            &[
-                "file",
-                "radius_mm",
-                "feed_mm_s",
-                "direction",
-                "start_angle_deg",
-                "started_s",
-                "temperature_c",
-                "centre_mm",
-                "arc_deg",
-                "plane",
-                "setup",
-            ],
-        )?;
+        self.known_keys(table, &RUN_KEYS)?;
         let need = |key, expected| {
             table
                 .get(key)
@@ -321,22 +321,7 @@ impl Source<'_> {
         let file_value = need("file", "the name of the run's CSV")?;
         let file = self.string(file_value, "file")?;
         let span = file_value.span();
-        let relative = Path::new(&file);
-        if file.is_empty() {
-            let problem = Problem::OutOfRange {
-                key: "file",
-                value: "\"\"".into(),
-                expected: "the name of the run's CSV",
-            };
-            return Err(self.error(span, problem));
-        }
-        if !relative
-            .components()
-            .all(|c| matches!(c, Component::Normal(_) | Component::CurDir))
-        {
-            return Err(self.error(span, Problem::OutsideDirectory { file }));
-        }
-        let path = self.file.parent().unwrap_or(Path::new("")).join(relative);
+        let path = self.path_of(&file, span.clone())?;
         let line = Place::of_byte(self.file, self.text.as_bytes(), span.start)
             .line
             .unwrap_or(1);
@@ -353,16 +338,7 @@ impl Source<'_> {
             |v| v > 0.0 && v <= 1e5,
         )?;
         let direction_value = need("direction", "\"ccw\" or \"cw\"")?;
-        let direction = match self.string(direction_value, "direction")?.as_str() {
-            "ccw" => Direction::Ccw,
-            "cw" => Direction::Cw,
-            other => {
-                let problem = Problem::UnknownDirection {
-                    found: other.to_owned(),
-                };
-                return Err(self.error(direction_value.span(), problem));
-            }
-        };
+        let direction = self.direction(direction_value)?;
         let optional = |key: &'static str, expected, ok: fn(f64) -> bool| {
             table
                 .get(key)
@@ -531,6 +507,42 @@ impl Source<'_> {
             });
         }
         Ok(())
+    }
+}
+
+impl Source<'_> {
+    /// Where the file of a run lies: in the campaign's directory.
+    fn path_of(&self, file: &str, span: Range<usize>) -> Result<PathBuf, CampaignError> {
+        if file.is_empty() {
+            let problem = Problem::OutOfRange {
+                key: "file",
+                value: "\"\"".into(),
+                expected: "the name of the run's CSV",
+            };
+            return Err(self.error(span, problem));
+        }
+        let relative = Path::new(file);
+        if !relative
+            .components()
+            .all(|c| matches!(c, Component::Normal(_) | Component::CurDir))
+        {
+            let file = file.to_owned();
+            return Err(self.error(span, Problem::OutsideDirectory { file }));
+        }
+        Ok(self.file.parent().unwrap_or(Path::new("")).join(relative))
+    }
+
+    fn direction(&self, value: &Value<'_>) -> Result<Direction, CampaignError> {
+        match self.string(value, "direction")?.as_str() {
+            "ccw" => Ok(Direction::Ccw),
+            "cw" => Ok(Direction::Cw),
+            other => {
+                let problem = Problem::UnknownDirection {
+                    found: other.to_owned(),
+                };
+                Err(self.error(value.span(), problem))
+            }
+        }
     }
 }
 

@@ -6,13 +6,13 @@
 //! | `blocks` | large files in blocks of whole lines, on all cores |
 //! | `table` | the numbers of a contract's CSV, fast |
 //! | `decimal` | plain decimals, fast |
-//! | `shape` | decimals that look like the one above, faster |
+//! | `similar_decimals` | decimals that look like the one above, faster |
 //! | `run_file` | a run's file, own or foreign: its columns in SI |
 //! | `clock`, `thinned` | time stamps and other rows, seen once and forgotten |
-//! | `lanes` | sums and bounds of long columns, fast |
+//! | `column_sums` | sums and bounds of long columns, fast |
 //! | `samples` | columns → one turn of polar samples |
 //! | `steady` | how long a turn takes without its start, stop and pauses |
-//! | `strays` | dust and held values |
+//! | `outliers` | dust and held values |
 //! | `check` | whether numbers can be what the campaign says they are |
 //! | `read`, `write` | whole campaigns; run by run where memory counts |
 //! | `edit` | changes of runs, checked |
@@ -21,18 +21,18 @@
 mod blocks;
 mod check;
 mod clock;
+mod column_sums;
 mod decimal;
 pub mod edit;
 mod error;
 pub mod import;
-mod lanes;
 mod manifest;
+mod outliers;
 mod read;
 mod run_file;
 mod samples;
-mod shape;
+mod similar_decimals;
 mod steady;
-mod strays;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -43,7 +43,7 @@ pub use check::sample_noise;
 pub use error::{CampaignError, Place, Problem};
 pub use giotto_shared::{Direction, Frame, Plane};
 pub use manifest::{Entry, Manifest, SHORTEST_ARC_DEG};
-pub use read::{Together, read, read_with_notes};
+pub use read::{Mislabelled, Together, read, read_with_notes};
 pub use samples::{Loaded, Location, Tilt};
 pub(crate) use table::is_contract_header;
 pub use write::replace;
@@ -83,6 +83,20 @@ pub struct Campaign {
 }
 
 /// One circular test.
+///
+/// ```
+/// use giotto::simulation::{self, Plan};
+/// # use std::path::Path;
+/// # let plan = Plan::parse("[grid]\nradii_mm = [100.0]\nfeeds_mm_s = [50.0]\ndirections = [\"cw\"]", Path::new("plan.toml"))?;
+/// let campaign = simulation::campaign(&plan, 1);
+///
+/// let run = &campaign.runs[0];
+/// assert_eq!(run.omega_rad_s(), 0.05 / 0.1);
+/// assert_eq!(run.sign(), -1.0);
+/// // A turn of 2π·100 mm at 50 mm/s.
+/// assert!((run.turn_s().unwrap() - 12.566).abs() < 1e-3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run {
     /// File name as the campaign gives it; identifies the run.
@@ -154,11 +168,17 @@ impl Run {
 }
 
 impl Samples {
-    /// Angle covered, rad, counting one spacing for the last sample; `None` for a whole turn.
+    /// Angle covered, rad, counting one spacing for the last sample; `None` for a whole turn, of which measured angles may lack as
+    /// much at its seam as anywhere else.
     pub fn arc_rad(&self) -> Option<f64> {
         let n = self.angle_rad.len() as f64;
         let span = (self.angle_rad.last()? - self.angle_rad.first()?).abs();
         let spacing = span / (n - 1.0).max(1.0);
-        (span + spacing < TAU - 2.0 * spacing - 1f64.to_radians()).then_some(span + spacing)
+        let seam = if self.angle_inferred {
+            1f64.to_radians()
+        } else {
+            check::LARGEST_GAP_DEG.to_radians()
+        };
+        (span + spacing < TAU - 2.0 * spacing - seam).then_some(span + spacing)
     }
 }

@@ -13,6 +13,33 @@ use std::path::Path;
 ///
 /// # Errors
 /// The first problem in file order, with file, line and column.
+///
+/// ```
+/// use giotto::campaign;
+///
+/// let folder = tempfile::tempdir()?;
+/// std::fs::write(
+///     folder.path().join("campaign.toml"),
+///     "[campaign]\nname = \"lab\"\nmachine = \"mill\"\n[[run]]\nfile = \"a.csv\"\n\
+///      radius_mm = 100.0\nfeed_mm_s = 50.0\ndirection = \"ccw\"\n",
+/// )?;
+/// let mut rows = String::from("angle_deg,deviation_um\n");
+/// for degree in 0..360 {
+///     let deviation_um = -25.0 + 3.0 * f64::from(2 * degree).to_radians().cos();
+///     rows += &format!("{degree},{deviation_um:.3}\n");
+/// }
+/// std::fs::write(folder.path().join("a.csv"), rows)?;
+///
+/// let campaign = campaign::read(folder.path())?;
+/// let run = &campaign.runs[0];
+/// // Metres and radians inside, whatever the file has.
+/// assert_eq!(run.radius_m, 0.1);
+/// assert!((run.samples.deviation_m[0] + 22e-6).abs() < 1e-12);
+/// // A file that is not there is refused with its place.
+/// std::fs::remove_file(folder.path().join("a.csv"))?;
+/// assert!(campaign::read(folder.path()).is_err_and(|error| error.to_string().contains("a.csv")));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn read(path: &Path) -> Result<Campaign, CampaignError> {
     read_with_notes(path).map(|(campaign, _)| campaign)
 }
@@ -25,12 +52,40 @@ pub fn read_with_notes(path: &Path) -> Result<(Campaign, Vec<Note>), CampaignErr
     Manifest::open(path)?.read()
 }
 
+/// A run whose file contradicts its label, left out of a campaign.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mislabelled {
+    /// File of the run, as the campaign names it.
+    pub file: String,
+    /// What contradicts what.
+    pub error: CampaignError,
+}
+
+/// One run in so many may be labelled wrongly before the campaign as a whole is in doubt.
+const ONE_MISLABELLED_IN: usize = 12;
+
 impl Manifest {
     /// Reads and checks all runs, with notes.
     ///
     /// # Errors
     /// As [`read`].
     pub fn read(&self) -> Result<(Campaign, Vec<Note>), CampaignError> {
+        let (campaign, notes, _) = self.read_all_but(0)?;
+        Ok((campaign, notes))
+    }
+
+    /// As [`Manifest::read`], but leaves out runs whose files contradict their labels, one in twelve at most.
+    ///
+    /// # Errors
+    /// As [`read`]; more such runs than that.
+    pub fn read_labelled(&self) -> Result<(Campaign, Vec<Note>, Vec<Mislabelled>), CampaignError> {
+        self.read_all_but(self.runs.len() / ONE_MISLABELLED_IN)
+    }
+
+    fn read_all_but(
+        &self,
+        most: usize,
+    ) -> Result<(Campaign, Vec<Note>, Vec<Mislabelled>), CampaignError> {
         let loaded: Vec<Result<Loaded, CampaignError>> = self
             .runs
             .par_iter()
@@ -39,8 +94,16 @@ impl Manifest {
         let mut together = Together::new(self);
         let mut runs = Vec::with_capacity(loaded.len());
         let mut notes = self.notes.clone();
+        let mut left_out: Vec<Mislabelled> = Vec::new();
         for (index, loaded) in loaded.into_iter().enumerate() {
-            let loaded = loaded?;
+            let loaded = match loaded {
+                Err(error) if left_out.len() < most && error.contradicts_its_label() => {
+                    let file = self.runs[index].file.clone();
+                    left_out.push(Mislabelled { file, error });
+                    continue;
+                }
+                loaded => loaded?,
+            };
             together.add(index, &loaded);
             notes.extend(loaded.notes);
             runs.push(loaded.run);
@@ -55,6 +118,7 @@ impl Manifest {
                 runs,
             },
             notes,
+            left_out,
         ))
     }
 

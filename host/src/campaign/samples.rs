@@ -3,8 +3,8 @@ use super::clock::{Clock, Stamps};
 use super::error::{CampaignError, Place, Problem};
 use super::import::Quantity;
 use super::manifest::Entry;
+use super::outliers::Strays;
 use super::run_file::{Field, RunFile};
-use super::strays::Strays;
 use super::table::Batch;
 use super::thinned::Thinned;
 use super::{Direction, Frame, Note, Plane as NamedPlane, Run, Samples, check, steady};
@@ -387,8 +387,52 @@ fn by_angle(
         let turn = steady.unwrap_or(mean);
         check::feed(entry, turn, &mut notes)?;
         turn_s = Some(turn);
+        keep_steady(entry, &points, &mut run, &mut kept, &mut notes);
     }
     Ok(finish(run, location, turn_s, kept, notes, None, noise_m))
+}
+
+/// Takes out the rows while the machine got up to speed and slowed down, and says so.
+fn keep_steady(
+    entry: &Entry,
+    points: &[(f64, f64)],
+    run: &mut Run,
+    time: &mut Option<Vec<f64>>,
+    notes: &mut Vec<Note>,
+) {
+    let Some([from, to]) = steady::window_rad(points) else {
+        return;
+    };
+    let sign = (to - from).signum();
+    let angle = &run.samples.angle_rad;
+    let first = angle.partition_point(|a| sign * (a - from) < 0.0);
+    let end = angle.partition_point(|a| sign * (a - to) <= 0.0);
+    if end < first + FEWEST {
+        return;
+    }
+    // A larger hole than any recording may have makes an arc of the turn: only where the slower part shows.
+    let lost = (TAU - (to - from).abs()).to_degrees();
+    if lost > check::LARGEST_GAP_DEG && !steady::shows(&run.samples, first..end) {
+        return;
+    }
+    notes.push(Note {
+        at: entry.row(0),
+        text: format!(
+            "{} rows left out: getting up to speed ({first}) and slowing down ({}), slower than the programmed feed",
+            first + angle.len() - end,
+            angle.len() - end,
+        ),
+    });
+    let cut = |column: &mut Vec<f64>| {
+        column.truncate(end);
+        column.drain(..first);
+    };
+    cut(&mut run.samples.angle_rad);
+    cut(&mut run.samples.deviation_m);
+    if let Some(time) = time {
+        cut(time);
+    }
+    run.start_angle_rad = run.samples.angle_rad[0];
 }
 
 /// Points in a plane other than XY go round as they do; which side of the plane was meant, a foreign file does not say.

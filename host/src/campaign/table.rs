@@ -2,7 +2,7 @@
 use super::blocks::{BLOCK, Fault, Text};
 use super::decimal;
 use super::error::{CampaignError, Place, Problem};
-use super::shape::Shape;
+use super::similar_decimals::Shape;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};

@@ -17,6 +17,21 @@ use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, value};
 ///
 /// # Errors
 /// A file name that is used twice or leaves the directory, and what the operating system says.
+///
+/// ```
+/// use giotto::campaign;
+/// use giotto::simulation::{self, Plan};
+/// # use std::path::Path;
+///
+/// let plan = Plan::parse("[grid]\nradii_mm = [100.0]\nfeeds_mm_s = [50.0]", Path::new("plan.toml"))?;
+/// let simulated = simulation::campaign(&plan, 1);
+/// let folder = tempfile::tempdir()?;
+/// campaign::write(&simulated, folder.path())?;
+/// let read = campaign::read(folder.path())?;
+/// assert_eq!(read.runs.len(), simulated.runs.len());
+/// assert_eq!(read.runs[0].radius_m, simulated.runs[0].radius_m);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn write(campaign: &Campaign, dir: &Path) -> Result<(), CampaignError> {
     let mut names = HashSet::new();
     for (index, run) in campaign.runs.iter().enumerate() {

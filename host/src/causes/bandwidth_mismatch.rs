@@ -13,6 +13,8 @@ const WORDS: Words = Words {
     what: "an oval along the axes that grows with the centripetal acceleration and is the same in both directions: one axis shrinks more than the other",
     usual: "unequal acceleration filters or resonances of the two axes",
     adjust: "match the acceleration and jerk filters of the axes",
+    positive: "{a} rounds off its motion more than {b}, by {size}: shorten the filter of {a}, or lengthen that of {b}",
+    negative: "{b} rounds off its motion more than {a}, by {size}: shorten the filter of {b}, or lengthen that of {a}",
     never_told_from: &[],
     next: "circles at the highest safe speed, or a frequency response of each axis",
     not_compensable: None,

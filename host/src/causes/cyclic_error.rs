@@ -15,6 +15,8 @@ const WORDS: Words = Words {
     what: "a ripple with a fixed period along one axis: dense where the axis is fast, stretched where it turns round",
     usual: "pitch error of the screw, gear or resolver",
     adjust: "map the axis over one pitch and enter it in the pitch compensation",
+    positive: "{a} is off by up to {size} within each pitch: map it, or look at the alignment of screw and scale",
+    negative: "{a} is off by up to {size} within each pitch: map it, or look at the alignment of screw and scale",
     never_told_from: &[],
     next: "a slow line along the axis over a few pitches",
     not_compensable: None,
@@ -39,12 +41,6 @@ const PHASE_RAD: Parameter = Parameter::needed(
     [-6.3, 6.3],
     "phase at machine position 0, one turn to either side",
 );
-
-/// Waves a metre of the shortest pitch that is looked for: 300 to the diameter of the largest circle, 1 mm at least.
-pub fn finest_wave_per_m(views: &[RunView]) -> f64 {
-    let travel = 2.0 * views.iter().map(|view| view.radius_m).fold(0.0, f64::max);
-    1.0 / (travel / 300.0).max(1e-3)
-}
 
 /// Pitches of screws, racks, belts and gears as they are built, m. A longer period within the travel is a bend of the axis.
 const PITCH_M: [f64; 2] = [2e-4, 0.12];
@@ -87,8 +83,9 @@ impl CauseModel for CyclicError {
     fn shapes(&self, views: &[RunView]) -> Vec<Vec<f64>> {
         let travel = 2.0 * views.iter().map(|view| view.radius_m).fold(0.0, f64::max);
         let mut shapes = Vec::new();
+        let finest = self.finest_wave_per_m(views).unwrap_or(0.0);
         let mut wave_per_m = 1.0 / (0.5 * travel).max(1e-3);
-        while wave_per_m <= finest_wave_per_m(views) && travel > 0.0 {
+        while wave_per_m <= finest && travel > 0.0 {
             shapes.push(vec![1.0 / wave_per_m]);
             wave_per_m += 0.35 / travel;
         }
@@ -142,6 +139,12 @@ impl CauseModel for CyclicError {
                 (*sine, *cosine) = ((scaled * sin).as_array()[k], (scaled * cos).as_array()[k]);
             }
         }
+    }
+
+    /// Waves a metre of the shortest pitch that is looked for: 300 to the diameter of the largest circle, 1 mm at least.
+    fn finest_wave_per_m(&self, views: &[RunView]) -> Option<f64> {
+        let travel = 2.0 * views.iter().map(|view| view.radius_m).fold(0.0, f64::max);
+        Some(1.0 / (travel / 300.0).max(1e-3))
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {

@@ -12,6 +12,8 @@ const WORDS: Words = Words {
     what: "small fast circles run slower than programmed: the controller limits the centripetal acceleration",
     usual: "the acceleration limit of the controller, a smoothing or safety function",
     adjust: "programme speeds that the controller keeps, or raise its limit if the machine allows it",
+    positive: "arcs are slowed to {size} of centripetal acceleration: raise that limit, or program what the machine can hold",
+    negative: "arcs are slowed to {size} of centripetal acceleration: raise that limit, or program what the machine can hold",
     never_told_from: &[],
     next: "the duration of the turn, over speeds around the limit",
     not_compensable: Some(

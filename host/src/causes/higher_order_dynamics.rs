@@ -15,6 +15,10 @@ const WORDS: Words = Words {
     what: "the radius shrinks faster than the square of the speed: the chain behind the command is not one servo lag",
     usual: "flexible joints or drives, a loop tuned with little damping, filters in series",
     adjust: "use the extended model; if the gain may be changed, raise the damping or lower the acceleration of small fast circles",
+    positive: "at the highest speeds circles come out larger than the lag alone would make them: the machine swings out; lower the \
+                   feed-forward, or the jerk and acceleration of the path",
+    negative: "at the highest speeds circles shrink more than the lag alone would make them: raise the velocity feed-forward, or \
+                   shorten the acceleration filters",
     never_told_from: &[],
     next: "smaller radii at the highest safe speed, and a step or line test with an accelerometer",
     not_compensable: None,
@@ -39,6 +43,15 @@ impl CauseModel for HigherOrderDynamics {
     fn harmonics(&self, _site: Site, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
         let (r, w) = (view.radius_m, view.omega_rad_s);
         Some(Harmonics::mean(r * w.powi(4) * view.gain.powi(3)))
+    }
+
+    fn is_response(&self) -> bool {
+        true
+    }
+
+    /// κ4 = 24β2 − 3κ2².
+    fn kappa4_s4(&self, effect: &Effect) -> Option<f64> {
+        Some(24.0 * effect.value())
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {

@@ -1,5 +1,5 @@
 //! Set-points every Δt joined by chords: scallops of period Δt, as deep as f²Δt²/(8R) before the servo smooths them.
-use super::{Cause, CauseModel, Effect, Evidence, Parameter, Words};
+use super::{Amplitude, Cause, CauseModel, Effect, Evidence, Parameter, Words};
 use crate::simulation::machine::Machine;
 
 /// See the module.
@@ -12,6 +12,8 @@ const WORDS: Words = Words {
     what: "the controller issues too few set-points: the circle is a polygon whose sides last a fixed time",
     usual: "a slow interpolation cycle, points from a CAM program or a network at a low rate",
     adjust: "raise the set-point rate or switch on the fine interpolator of the drive",
+    positive: "the path is a polygon with a set-point every {size}: shorten the cycle of the interpolator",
+    negative: "the path is a polygon with a set-point every {size}: shorten the cycle of the interpolator",
     never_told_from: &[],
     next: "the same circle at half the speed: the scallops shrink to a quarter, their period in time stays",
     not_compensable: Some("it arises in the interpolator behind the correction"),
@@ -52,7 +54,12 @@ impl CauseModel for InterpolationChord {
     }
 
     fn evidence(&self) -> Evidence {
-        Evidence::Tone
+        Evidence::Tone(Amplitude::Centripetal)
+    }
+
+    fn of_frequency(&self, hz: f64, se_hz: f64) -> [f64; 2] {
+        let period = 1.0 / hz;
+        [period, 2.0 * se_hz * period * period]
     }
 
     fn allows(&self, period_s: f64) -> bool {

@@ -12,6 +12,8 @@ const WORDS: Words = Words {
     what: "one direction draws larger circles than the other, in proportion to the speed: the joints of a serial arm lag unequally",
     usual: "unequal position gains of the joints",
     adjust: "match the position gains of the joints that move in this plane",
+    positive: "{a} follows {size} later than the joints on average: raise its gain",
+    negative: "{a} follows {size} earlier than the joints on average: lower its gain, or raise that of the others",
     never_told_from: &[],
     next: "the same circles at another place of the work space, where the Jacobian differs",
     not_compensable: Some("the table has no model of the arm: its size changes with the place"),

@@ -12,6 +12,8 @@ const WORDS: Words = Words {
     what: "spikes where a joint of a serial arm turns round, not at the quadrants",
     usual: "friction of one joint",
     adjust: "friction compensation of that joint",
+    positive: "{a} sticks where it turns back, {size} at the tool: raise its friction compensation, look at its gear",
+    negative: "{a} is pushed too far where it turns back, {size} at the tool: lower its friction compensation",
     never_told_from: &[],
     next: "the same circle elsewhere: the spikes move with the joint angles",
     not_compensable: Some("the table has no model of the arm"),

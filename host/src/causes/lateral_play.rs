@@ -15,6 +15,9 @@ const WORDS: Words = Words {
     what: "one axis shifts sideways when the other turns round, so that one direction draws larger circles than the other",
     usual: "play in the guides of one axis",
     adjust: "adjust the gibs or replace the guide blocks of that axis",
+    positive: "{a} shifts sideways by {size} when it turns back: raise the preload of its guide until the {size} are gone",
+    negative: "{a} shifts sideways by {size}, against its usual side, when it turns back: raise the preload of its guide until the \
+                   {size} are gone",
     never_told_from: &[],
     next: "a line along the moving axis, forth and back, with an indicator square to it",
     not_compensable: None,

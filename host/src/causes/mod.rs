@@ -1,10 +1,10 @@
 //! Causes: one file each. A cause knows its signature in measured circles, its element in the
 //! simulation, its inverse if it has one, and the words for a person. Causes know nothing of each other.
 //!
-//! To add a cause: write its file, name its module and add one line to the list of [`register`].
+//! To add a cause: write its file, name its module and add one line to the list of `register`.
 mod backlash;
 mod bandwidth_mismatch;
-pub mod cyclic_error;
+mod cyclic_error;
 mod feed_clamp;
 mod harmonics;
 mod higher_order_dynamics;
@@ -97,13 +97,44 @@ impl Cause {
     }
 }
 
+/// How the amplitude of a tone follows the motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Amplitude {
+    /// The same at every speed: a structure that swings.
+    Constant,
+    /// ∝ f²/R: the height of a chord's arc, an interpolator.
+    Centripetal,
+}
+
+impl Amplitude {
+    /// The other law.
+    pub const fn other(self) -> Self {
+        match self {
+            Self::Constant => Self::Centripetal,
+            Self::Centripetal => Self::Constant,
+        }
+    }
+}
+
+/// The cause that shows by this evidence, which one cause at most has.
+pub fn shown_by(evidence: Evidence) -> Option<&'static dyn CauseModel> {
+    ALL.iter()
+        .copied()
+        .find(|model| model.evidence() == evidence)
+}
+
+/// The cause that is the fourth order of the response which all axes share.
+pub fn of_response() -> Option<&'static dyn CauseModel> {
+    ALL.iter().copied().find(|model| model.is_response())
+}
+
 /// How the search looks for a cause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Evidence {
     /// The same deviation at the same place of every run: a signature linear in the value.
     Signature,
-    /// Periodic in time, with a phase of its own in each run.
-    Tone,
+    /// Periodic in time, with a phase of its own in each run and an amplitude that follows a law.
+    Tone(Amplitude),
     /// The measured duration of the turn.
     Duration,
     /// Power near reversals without a fixed phase.
@@ -227,6 +258,32 @@ pub trait CauseModel: Sync {
 
     /// Puts the effect into a simulated machine.
     fn apply(&self, effect: &Effect, machine: &mut Machine);
+
+    /// Whether it is the fourth order of the response that all axes share: it is refined with that response and stands in a
+    /// model's servo law, not beside it.
+    fn is_response(&self) -> bool {
+        false
+    }
+
+    /// Where its first shape parameter is a period in place, found by a spectrum: the finest wave looked for, 1/m.
+    fn finest_wave_per_m(&self, _views: &[RunView]) -> Option<f64> {
+        None
+    }
+
+    /// Of a cause that shows as a tone: its value and half the 95 % interval, from frequency and standard error in Hz.
+    fn of_frequency(&self, hz: f64, se_hz: f64) -> [f64; 2] {
+        [hz, 2.0 * se_hz]
+    }
+
+    /// Whether the controller can correct it: by a term, or by κ4 of the chain.
+    fn is_compensable(&self, effect: &Effect) -> bool {
+        self.term(effect).is_some() || self.kappa4_s4(effect).is_some()
+    }
+
+    /// What it adds to κ4 of the chain of all axes, s⁴, where a table corrects it so.
+    fn kappa4_s4(&self, _effect: &Effect) -> Option<f64> {
+        None
+    }
 
     /// The term that the controller can correct; `None`: not compensable, see the words.
     fn term(&self, _effect: &Effect) -> Option<Term<f64>> {

@@ -174,6 +174,19 @@ impl Parameters {
 }
 
 /// A cause with its size: an entry of an extended model. It holds every number that its cause needs.
+///
+/// ```
+/// use giotto::causes::{Cause, Effect, EffectError, Site};
+/// use giotto_shared::Actuator;
+///
+/// let cause = Cause::from_id("cyclic_error").unwrap();
+/// let on_z = Site::One(Actuator::Z);
+/// let full = [("pitch_mm", 10.0), ("phase_rad", 0.5)];
+/// assert_eq!(Effect::new(cause, on_z, 2.0, [1.8, 2.2], full)?.value(), 2.0);
+/// // Nothing is invented: a missing parameter is refused.
+/// assert!(Effect::new(cause, on_z, 2.0, [1.8, 2.2], []).is_err());
+/// # Ok::<(), EffectError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Effect {
     cause: Cause,

@@ -18,6 +18,8 @@ const WORDS: Words = Words {
     what: "a short outward spike just after an axis turns round, of the same height at every speed",
     usual: "friction of guides and drives against a loop that integrates slowly",
     adjust: "lubricate; raise the integral gain; set the friction (quadrant) compensation of that axis",
+    positive: "{a} sticks for {size} after it turns back: raise its friction compensation by {size}, or lubricate the guide",
+    negative: "{a} is pushed {size} too far after it turns back: lower its friction compensation by {size}",
     never_told_from: &[],
     next: "the same circle slower and faster: the spike keeps its height and its duration in time",
     not_compensable: None,

@@ -14,6 +14,8 @@ const WORDS: Words = Words {
     what: "every circle is wrong in proportion to its radius",
     usual: "scale or encoder calibration, a machine at another temperature than at its calibration",
     adjust: "set the scale of both axes, or measure at 20 °C",
+    positive: "both axes travel {size} too far: lower the scale of both by {size}",
+    negative: "both axes travel {size} too little: raise the scale of both by {size}",
     never_told_from: &[],
     next: "a wide range of radii, and the temperature of machine and bar",
     not_compensable: None,

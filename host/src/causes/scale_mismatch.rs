@@ -14,6 +14,8 @@ const WORDS: Words = Words {
     what: "an oval along the axes that grows with the radius and is the same in both directions: X and Y differ in scale",
     usual: "encoder or screw calibration of one axis, unequal warming of the axes",
     adjust: "set the scale of one axis",
+    positive: "{a} travels {size} more than {b}: lower the scale of {a} by {size}, or raise that of {b}",
+    negative: "{a} travels {size} less than {b}: raise the scale of {a} by {size}, or lower that of {b}",
     never_told_from: &[],
     next: "a line test along each axis with a laser or a scale",
     not_compensable: None,

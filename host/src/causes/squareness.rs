@@ -13,6 +13,8 @@ const WORDS: Words = Words {
     what: "an oval at 45° that grows with the radius and is the same in both directions: the axes are not square to each other",
     usual: "alignment of the guides, a crash, a foundation that has settled; on a serial arm, link parameters",
     adjust: "align the axes or enter the squareness correction in the controller",
+    positive: "the angle between {a} and {b} is {size} under 90°: open it by {size}",
+    negative: "the angle between {a} and {b} is {size} over 90°: close it by {size}",
     never_told_from: &[],
     next: "the same circle in the other quadrants of the work space, or a square",
     not_compensable: None,

@@ -12,6 +12,8 @@ const WORDS: Words = Words {
     what: "teeth near the reversals of an axis at low axis speed: it sticks and jumps",
     usual: "dry guides, a worn lubrication system, low stiffness of the drive",
     adjust: "lubricate; raise the integral gain with care; avoid very low axis speeds",
+    positive: "an axis sticks and slips by {size} when it is slow: lubricate its guide, or raise the gain at low speed",
+    negative: "an axis sticks and slips by {size} when it is slow: lubricate its guide, or raise the gain at low speed",
     never_told_from: &[],
     next: "a slow line along the axis at several speeds",
     not_compensable: Some("its teeth have no fixed place"),

@@ -14,6 +14,8 @@ const WORDS: Words = Words {
     what: "three smooth lobes that grow with the square of the radius and are the same in both directions: a guide is bowed",
     usual: "a bent or unevenly seated guide, sag of a cross beam",
     adjust: "re-seat the guide or enter a straightness (sag) correction",
+    positive: "the guide of {a} bows by {size} over the circle, its ends towards plus: align or map it",
+    negative: "the guide of {a} bows by {size} over the circle, its ends towards minus: align or map it",
     never_told_from: &[],
     next: "a straight line along the axis with a straight edge or laser",
     not_compensable: None,

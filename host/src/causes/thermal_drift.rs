@@ -13,6 +13,8 @@ const WORDS: Words = Words {
     what: "the circles change size while the campaign lasts, whatever their speed and direction",
     usual: "warming of drives, screws and the hall",
     adjust: "warm up before measuring; measure in random order with a repeated reference run",
+    positive: "circles grew by {size}: warm up longer before measuring or working, or compensate for the temperature",
+    negative: "circles shrank by {size}: warm up longer before measuring or working, or compensate for the temperature",
     never_told_from: &[],
     next: "repeat the first run now and again: only time can have changed it",
     not_compensable: Some("it changes with time, and the controller does not know the temperature"),

@@ -1,5 +1,5 @@
 //! A tone of fixed frequency: order 2πR·f0/f, which moves over the circle with speed and radius.
-use super::{Cause, CauseModel, Effect, Evidence, Parameter, Seat, Words};
+use super::{Amplitude, Cause, CauseModel, Effect, Evidence, Parameter, Seat, Words};
 use crate::simulation::machine::Machine;
 use crate::simulation::machine::Vibration as Tone;
 
@@ -13,6 +13,8 @@ const WORDS: Words = Words {
     what: "a ripple of fixed frequency in time: its number of waves on the circle changes with the speed",
     usual: "a structural resonance excited by the motion, a motor or a neighbour machine",
     adjust: "stiffen or damp the structure; keep accelerations below those that excite it; set a notch filter",
+    positive: "something swings at {size}: find it with a shaker or an accelerometer; stiffen or damp it, or keep the speed from it",
+    negative: "something swings at {size}: find it with a shaker or an accelerometer; stiffen or damp it, or keep the speed from it",
     never_told_from: &[],
     next: "an accelerometer on the tool, with the drives on and at rest",
     not_compensable: Some("it is faster than the position loop and its phase is not known"),
@@ -57,7 +59,7 @@ impl CauseModel for Vibration {
     }
 
     fn evidence(&self) -> Evidence {
-        Evidence::Tone
+        Evidence::Tone(Amplitude::Constant)
     }
 
     fn parameters(&self) -> &'static [&'static Parameter] {

@@ -15,6 +15,11 @@ pub struct Words {
     pub usual: &'static str,
     /// What to adjust.
     pub adjust: &'static str,
+    /// What to turn, which way and how far, where the value is positive: `{a}` and `{b}` are its actuators, `{size}` its
+    /// size with its unit.
+    pub positive: &'static str,
+    /// The same where the value is negative.
+    pub negative: &'static str,
     /// What cannot be told from it by circles at all.
     pub never_told_from: &'static [&'static str],
     /// The measurement that would separate it from its look-alikes.

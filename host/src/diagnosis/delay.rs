@@ -6,8 +6,8 @@
 use super::explain::{Start, explain};
 use super::explained::{Explained, residual};
 use super::finding::Finding;
-use super::item::Kind;
-use super::orders;
+use super::hypothesis::Kind;
+use super::residual_waves;
 use super::spread;
 use super::survey::Survey;
 use super::tangent;
@@ -141,7 +141,7 @@ fn has_place(found: &Explained) -> bool {
 
 fn item_has_place(found: &Explained, item: usize) -> bool {
     found.items[item].columns.iter().any(|&column| {
-        let column = found.ledger.column(column);
+        let column = found.gram.column(column);
         let outside = found.runs.iter().any(|run| !column.outside(run).is_empty());
         outside
             || column
@@ -178,7 +178,7 @@ fn cost(found: &Explained) -> f64 {
         count += run.visible() as f64;
     }
     let samples = left.all_samples(&found.runs);
-    let colour = orders::colour(&found.runs, &samples, spread::sample_noise_m2(&samples));
+    let colour = residual_waves::colour(&found.runs, &samples, spread::sample_noise_m2(&samples));
     cost += count / colour * (sum / count.max(1.0)).max(f64::MIN_POSITIVE).ln();
     cost + found
         .chosen

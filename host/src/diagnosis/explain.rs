@@ -1,8 +1,8 @@
 //! From a campaign to the set of explanations: prepare, search, refine, and again about the better model.
-use super::column::Column;
+use super::design_column::Column;
 use super::explained::{Explained, chosen_kinds, refit, residual};
-use super::item::Kind;
-use super::ledger::Ledger;
+use super::gram::Gram;
+use super::hypothesis::Kind;
 use super::linear::Solution;
 use super::material::{is_material, prune};
 use super::pattern::Pattern;
@@ -14,7 +14,7 @@ use super::spread;
 use super::survey::{Lag, Prepared, Response, Survey, misfit};
 use super::tangent;
 use super::tone::{self, Tone};
-use crate::causes::{ALL, Cause, Evidence, Harmonics, RunView, Site};
+use crate::causes::{ALL, Evidence, Harmonics, RunView, Site, of_response};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -114,13 +114,10 @@ fn refined_response(found: &Explained, response: Response) -> Response {
         }
     }
     for &item in &found.chosen {
-        let Kind::Cause {
-            cause: Cause::HigherOrderDynamics,
-            ..
-        } = found.items[item].kind
-        else {
-            continue;
-        };
+        match &found.items[item].kind {
+            Kind::Cause { cause, .. } if cause.model().is_response() => {}
+            _ => continue,
+        }
         if let Some(at) = columns
             .iter()
             .position(|&c| c == found.items[item].columns[0])
@@ -212,7 +209,7 @@ fn pass(
                 .map(|teeth| roughness::energy_m2(teeth, &runs))
                 .sum::<f64>(),
         solution: Solution::default(),
-        ledger: Ledger::open(&runs, &spread, data),
+        gram: Gram::open(&runs, &spread, data),
         runs: runs.into(),
         bases: survey.bases(),
         response,
@@ -229,19 +226,26 @@ fn pass(
     };
     enter(&mut found, start, kinds);
     let all = found.all();
+    search(&mut found, &all);
+    let longer_s = tangent::finish(&mut found, &all);
+    (found, longer_s)
+}
+
+/// Refits, improves, proposes and selects until the same explanations are chosen again.
+fn search(found: &mut Explained, all: &[f64]) {
     let mut barred: Vec<usize> = Vec::new();
     let mut polished: Vec<Kind> = Vec::new();
     for _ in 0..6 {
-        let before: Vec<Kind> = chosen_kinds(&found);
-        refit(&mut found, &all);
-        shape::improve(&mut found);
-        refit(&mut found, &all);
+        let before: Vec<Kind> = chosen_kinds(found);
+        refit(found, all);
+        shape::improve(found);
+        refit(found, all);
         if before != polished {
-            tangent::polish(&mut found, &all);
-            polished = chosen_kinds(&found);
+            tangent::polish(found, all);
+            polished = chosen_kinds(found);
         }
-        propose_patterns(&mut found);
-        let products = found.ledger.white(&all);
+        propose_patterns(found);
+        let products = found.gram.white(all);
         found.chosen = select(
             &products,
             &found.nuisance,
@@ -249,18 +253,16 @@ fn pass(
             &found.chosen,
             &barred,
         );
-        found.chosen = prune(&found, &all, found.chosen.clone(), &mut barred);
-        bar_impossible(&mut found, &all, &mut barred);
-        if chosen_kinds(&found) == before {
+        found.chosen = prune(found, all, found.chosen.clone(), &mut barred);
+        bar_impossible(found, all, &mut barred);
+        if chosen_kinds(found) == before {
             break;
         }
     }
-    refit(&mut found, &all);
-    if chosen_kinds(&found) != polished {
-        tangent::polish(&mut found, &all);
+    refit(found, all);
+    if chosen_kinds(found) != polished {
+        tangent::polish(found, all);
     }
-    let longer_s = tangent::finish(&mut found, &all);
-    (found, longer_s)
 }
 
 /// Enters the columns of the model itself, of what was chosen before, and of everything that may compete.
@@ -276,7 +278,7 @@ fn enter(found: &mut Explained, start: &Start, kinds: &[Kind]) {
     };
     found.nuisance.push(
         found
-            .ledger
+            .gram
             .push(Column::within(runs.iter().map(own).collect())),
     );
     let before = kinds
@@ -286,22 +288,22 @@ fn enter(found: &mut Explained, start: &Start, kinds: &[Kind]) {
     found.chosen = found.enter(before).collect();
     // The data no longer hold what the response has taken in; its column still does.
     if start.own_fourth_order {
-        let fourth = Kind::Cause {
-            cause: Cause::HigherOrderDynamics,
-            site: Site::Machine,
-            shape: Vec::new(),
-        };
-        let columns = fourth.columns_over(&runs);
-        found.nuisance.extend(found.ledger.push_all(columns));
+        if let Some(model) = of_response() {
+            let fourth = Kind::Cause {
+                cause: model.cause(),
+                site: Site::Machine,
+                shape: Vec::new(),
+            };
+            let columns = fourth.columns_over(&runs);
+            found.nuisance.extend(found.gram.push_all(columns));
+        }
     } else if found.response.b_s4 != 0.0 {
         restore_fourth_order(found);
     }
     let mut further = Vec::new();
     let no_fourth = start.own_fourth_order || !shows_fourth_order(&views);
     for model in ALL {
-        if model.evidence() != Evidence::Signature
-            || (no_fourth && model.cause() == Cause::HigherOrderDynamics)
-        {
+        if model.evidence() != Evidence::Signature || (no_fourth && model.is_response()) {
             continue;
         }
         let shapes = model.shapes(&views);
@@ -381,7 +383,7 @@ fn restore_fourth_order(found: &mut Explained) {
             -0.5 * found.response.b_s4 * run.view.radius_m * w.powi(4) * g.powi(3),
         ))
     };
-    let mut data = found.ledger.column(0).clone();
+    let mut data = found.gram.column(0).clone();
     data.add(1.0, &Column::within(found.runs.iter().map(shift).collect()));
-    found.ledger.replace_all([(0, data)]);
+    found.gram.replace_all([(0, data)]);
 }

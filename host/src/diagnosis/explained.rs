@@ -1,9 +1,9 @@
 //! What a search found, with all that is needed to refit it.
-use super::basis::Basis;
-use super::column::Column;
-use super::item::{Item, Kind, scarcity};
-use super::ledger::Ledger;
+use super::design_column::Column;
+use super::gram::Gram;
+use super::hypothesis::{Hypothesis, Kind, scarcity};
 use super::linear::{Factor, Solution, solve};
+use super::low_orders::Basis;
 use super::roughness::Teeth;
 use super::search::columns_of;
 use super::spread::Spread;
@@ -28,11 +28,11 @@ pub struct Explained {
     /// Noise and scatter.
     pub spread: Spread,
     /// Products of all columns.
-    pub ledger: Ledger,
+    pub gram: Gram,
     /// Columns of the model's own parameters: always free.
     pub nuisance: Vec<usize>,
     /// Every explanation considered.
-    pub items: Vec<Item>,
+    pub items: Vec<Hypothesis>,
     /// The chosen ones.
     pub chosen: Vec<usize>,
     /// Those of them that another cause explains as well to the last digit: fitted, but not stated.
@@ -72,19 +72,19 @@ impl Explained {
             .par_iter()
             .map(|(kind, _)| kind.columns_over(&self.runs))
             .collect();
-        let mut next = self.ledger.size();
+        let mut next = self.gram.size();
         let scarcity = scarcity(self.runs.len());
         for ((kind, shapes), columns) in kinds.into_iter().zip(&columns) {
             let own = (next..next + columns.len()).collect();
             next += columns.len();
-            self.items.push(Item {
+            self.items.push(Hypothesis {
                 price: kind.price(shapes, scarcity),
                 columns: own,
                 kind,
                 fitted_beside: None,
             });
         }
-        self.ledger.push_all(columns.into_iter().flatten());
+        self.gram.push_all(columns.into_iter().flatten());
         first..self.items.len()
     }
 
@@ -97,22 +97,21 @@ impl Explained {
         let at = items
             .iter()
             .flat_map(|&item| self.items[item].columns.iter().copied());
-        self.ledger
-            .replace_all(at.zip(columns.into_iter().flatten()));
+        self.gram.replace_all(at.zip(columns.into_iter().flatten()));
     }
 }
 
 /// What nuisance and chosen explanations leave.
 pub fn residual(found: &Explained) -> Column {
-    let mut left = found.ledger.column(0).clone();
+    let mut left = found.gram.column(0).clone();
     let columns = columns_of(&found.nuisance, &found.items, &found.chosen);
     for (&column, &amount) in columns.iter().zip(&found.solution.coefficients) {
-        left.add(-amount, found.ledger.column(column));
+        left.add(-amount, found.gram.column(column));
     }
     left
 }
 
-/// The chosen explanations, free of the ledger they were found in.
+/// The chosen explanations, free of the Gram matrices they were found in.
 pub fn chosen_kinds(found: &Explained) -> Vec<Kind> {
     found
         .chosen
@@ -128,7 +127,7 @@ pub fn energies(found: &Explained, weights: &[f64]) -> (Vec<f64>, f64) {
 
 /// The same for any set.
 pub fn energies_of(found: &Explained, weights: &[f64], set: &[usize]) -> (Vec<f64>, f64) {
-    let products = found.ledger.plain(weights);
+    let products = found.gram.plain(weights);
     let gain = |set: &[usize]| {
         Factor::new(&products, &columns_of(&found.nuisance, &found.items, set))
             .map_or(0.0, |factor| factor.gain())
@@ -150,7 +149,7 @@ pub fn energies_of(found: &Explained, weights: &[f64], set: &[usize]) -> (Vec<f6
 
 /// Fits nuisance and chosen again.
 pub fn refit(found: &mut Explained, weights: &[f64]) {
-    let products = found.ledger.white(weights);
+    let products = found.gram.white(weights);
     let columns = columns_of(&found.nuisance, &found.items, &found.chosen);
     if let Some(solution) = solve(&products, &columns) {
         found.solution = solution;

@@ -6,16 +6,18 @@
 use super::baseline::{Size, fit_lag};
 use super::duration::Clamp;
 use super::explained::Explained;
-use super::item::Kind;
+use super::hypothesis::Kind;
 use super::linear::solve;
+use super::low_orders::Basis;
 use super::survey::Response;
 use super::vector::dot;
 use super::veto;
 use crate::campaign::{Campaign, Run};
-use crate::causes::{Cause, Effect};
+use crate::causes::Effect;
 use crate::model_file::{ModelFile, Servo};
-use crate::simulation::machine::{Machine, PositionLoop};
+use crate::simulation::machine::Machine;
 use crate::simulation::{CircleTest, SAMPLES_PER_TURN, circle};
+use giotto_shared::model::{Element, RadiusModel};
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -51,11 +53,13 @@ const RESAMPLES: usize = 1000;
 pub fn machine(response: &Response, effects: &[Effect], lag_s: Option<f64>) -> Machine {
     let mut machine = Machine::default();
     if response.a_s2 > 0.0 {
-        let servo = PositionLoop {
-            kv_per_s: response.a_s2.powf(-0.5),
-            feed_forward: 0.0,
+        let lag = Response {
+            b_s4: 0.0,
+            ..*response
         };
-        machine.servo = [servo; 3];
+        if let Some(element) = lag.element() {
+            machine.set_servo(element);
+        }
         if response.b_s4 != 0.0 {
             machine.add_beta2(-0.5 * response.b_s4);
         }
@@ -67,7 +71,7 @@ pub fn machine(response: &Response, effects: &[Effect], lag_s: Option<f64>) -> M
     }
     for effect in effects {
         // Already in the response.
-        if effect.cause() != Cause::HigherOrderDynamics {
+        if !effect.cause().model().is_response() {
             effect.cause().model().apply(effect, &mut machine);
         }
     }
@@ -76,10 +80,10 @@ pub fn machine(response: &Response, effects: &[Effect], lag_s: Option<f64>) -> M
 
 /// Eq. 15 with the same κ2 and κ4.
 pub fn beta(response: &Response) -> Servo {
-    let (a, b) = (response.a_s2, response.b_s4);
+    let RadiusModel { beta1_s2, beta2_s4 } = RadiusModel::from(*response);
     Servo::Beta {
-        beta1_s2: -0.5 * a,
-        beta2_s4: 0.375 * a * a - 0.5 * b,
+        beta1_s2,
+        beta2_s4,
         half_width95: [0.0; 2],
     }
 }
@@ -88,7 +92,7 @@ pub fn beta(response: &Response) -> Servo {
 fn fitted(found: &Explained, weights: &[f64], set: &[usize]) -> Option<(Response, Vec<Effect>)> {
     // The stated set, as far as these runs determine it.
     let (set, columns) = veto::determined(found, weights, set);
-    let solution = solve(&found.ledger.white(weights), &columns)?;
+    let solution = solve(&found.gram.white(weights), &columns)?;
     let value = |column: usize| {
         columns
             .iter()
@@ -126,7 +130,7 @@ fn fitted(found: &Explained, weights: &[f64], set: &[usize]) -> Option<(Response
             .iter()
             .map(|&c| value(c))
             .collect();
-        if *cause == Cause::HigherOrderDynamics {
+        if cause.model().is_response() {
             response.b_s4 = -2.0 * values[0];
         }
         let size = if values.len() == 2 {
@@ -156,13 +160,7 @@ fn fitted(found: &Explained, weights: &[f64], set: &[usize]) -> Option<(Response
 const CLEAR: f64 = 3.0;
 
 fn is_fourth_order(found: &Explained, item: usize) -> bool {
-    matches!(
-        found.items[item].kind,
-        Kind::Cause {
-            cause: Cause::HigherOrderDynamics,
-            ..
-        }
-    )
+    matches!(&found.items[item].kind, Kind::Cause { cause, .. } if cause.model().is_response())
 }
 
 /// Measures the gain. `start` is the baseline if a model was given; else kv is fitted in each fold.
@@ -173,10 +171,10 @@ pub fn measure(
     clamp: Option<Clamp>,
     seed: u64,
 ) -> Gain {
-    let circles: Vec<[f64; 2]> = campaign
+    let circles: Vec<[f64; 3]> = campaign
         .runs
         .iter()
-        .map(|run| [run.radius_m, run.feed_m_s])
+        .map(|run| [run.radius_m, run.feed_m_s, run.sign()])
         .collect();
     let [radii, feeds] = veto::folds(&circles);
     let count = [radii.len(), feeds.len()];
@@ -292,21 +290,8 @@ fn fold(
                 Some(started_s) => test.started_s = started_s - started,
                 None => test.started_s = found.runs[i].view.elapsed * found.runs[i].view.campaign_s,
             }
-            // What the search hid from itself is measured all the same.
-            let basis = &found.bases[i];
+            let left = |prediction: &[f64]| left_of(run, &found.bases[i], prediction);
             let samples = run.samples.deviation_m.len() as f64;
-            let left = |prediction: &[f64]| -> f64 {
-                let rest: Vec<f64> = run
-                    .samples
-                    .deviation_m
-                    .iter()
-                    .zip(prediction)
-                    .map(|(y, p)| y - p)
-                    .collect();
-                // The centre is the operator's.
-                let [cos, sin] = basis.centre(&rest);
-                (dot(&rest, &rest) - cos * cos - sin * sin).max(0.0) / samples
-            };
             let simulated = |machine: &Machine| left(&at_samples(machine, &test, run));
             let base = simulated(&baseline);
             let x = run.feed_m_s.powi(2) / run.radius_m;
@@ -331,6 +316,19 @@ fn fold(
             }
         })
         .collect()
+}
+
+/// Mean square of what a prediction leaves of a run, m². The centre is the operator's, and what the search hid from itself is
+/// measured all the same.
+fn left_of(run: &Run, basis: &Basis, prediction: &[f64]) -> f64 {
+    let deviation = &run.samples.deviation_m;
+    let rest: Vec<f64> = deviation
+        .iter()
+        .zip(prediction)
+        .map(|(y, p)| y - p)
+        .collect();
+    let [cos, sin] = basis.centre(&rest);
+    (dot(&rest, &rest) - cos * cos - sin * sin).max(0.0) / deviation.len() as f64
 }
 
 /// Deviations of a simulated circle where a run has its samples, m. A whole turn by the clock is sampled as the run is;
@@ -429,19 +427,16 @@ pub fn extended_model(
     let weights = found.all();
     let response =
         fitted(found, &weights, &found.chosen).map_or(found.response, |(response, _)| response);
-    let servo = if response.b_s4 > 0.0 {
-        let omega_n2 = response.b_s4.powf(-0.5);
-        let zeta = (0.5 + 0.25 * response.a_s2 * omega_n2).max(1e-4).sqrt();
-        Servo::SecondOrder {
-            omega_n_rad_s: omega_n2.sqrt(),
+    let servo = match response.element() {
+        Some(Element::SecondOrder {
+            omega_n_rad_s,
             zeta,
-        }
-    } else if response.b_s4 == 0.0 && response.a_s2 > 0.0 {
-        Servo::Lag {
-            kv_per_s: response.a_s2.powf(-0.5),
-        }
-    } else {
-        beta(&response)
+        }) => Servo::SecondOrder {
+            omega_n_rad_s,
+            zeta,
+        },
+        Some(Element::Lag { kv_per_s }) => Servo::Lag { kv_per_s },
+        _ => beta(&response),
     };
     let range = |value: &dyn Fn(&crate::campaign::Run) -> f64| {
         campaign
@@ -463,7 +458,7 @@ pub fn extended_model(
         },
         effects: effects
             .into_iter()
-            .filter(|e| e.cause() != Cause::HigherOrderDynamics)
+            .filter(|e| !e.cause().model().is_response())
             .collect(),
         delay_s,
     }

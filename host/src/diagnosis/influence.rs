@@ -3,8 +3,8 @@
 //!
 //! Every place on the circle, and the size, is fitted over the runs by a few laws in direction, feed and radius. A run
 //! whose own prediction, made without it, fails far worse than that of any other run, is not of the same machine.
-use super::orders::median;
-use super::places::PLACES;
+use super::angular_bins::BINS;
+use super::residual_waves::median;
 use super::survey::Prepared;
 use nalgebra::DMatrix;
 use serde::Serialize;
@@ -41,7 +41,7 @@ const SIZE_OF_MEDIAN: f64 = 200.0;
 const SIZE_OF_NEXT: f64 = 8.0;
 
 /// The one run that stands out, if there is one. `profiles` are the means of each place, `sizes` the mean of each run.
-pub fn find(runs: &[Prepared], profiles: &[[f64; PLACES]], sizes: &[f64]) -> Option<Spoilt> {
+pub fn find(runs: &[Prepared], profiles: &[[f64; BINS]], sizes: &[f64]) -> Option<Spoilt> {
     if runs.len() < FEWEST {
         return None;
     }
@@ -53,9 +53,9 @@ pub fn find(runs: &[Prepared], profiles: &[[f64; PLACES]], sizes: &[f64]) -> Opt
 }
 
 /// What each run fails at each place to be as the others foretell, m.
-fn failed_at(laws: &Laws, profiles: &[[f64; PLACES]]) -> Vec<[f64; PLACES]> {
-    let mut failed = vec![[0.0; PLACES]; profiles.len()];
-    for place in 0..PLACES {
+fn failed_at(laws: &Laws, profiles: &[[f64; BINS]]) -> Vec<[f64; BINS]> {
+    let mut failed = vec![[0.0; BINS]; profiles.len()];
+    for place in 0..BINS {
         let values: Vec<f64> = profiles.iter().map(|profile| profile[place]).collect();
         for (failed, value) in failed.iter_mut().zip(laws.foretold_wrong(&values)) {
             failed[place] = value;
@@ -70,8 +70,8 @@ const OF_PLACE: f64 = 10.0;
 const OF_OTHERS: f64 = 2.0;
 
 /// A run that fails at one place where the others hardly scatter, though steps and spikes may fail more elsewhere.
-fn by_place(failed: &[[f64; PLACES]]) -> Option<Spoilt> {
-    let scales: Vec<f64> = (0..PLACES)
+fn by_place(failed: &[[f64; BINS]]) -> Option<Spoilt> {
+    let scales: Vec<f64> = (0..BINS)
         .map(|place| {
             let mut sizes: Vec<f64> = failed.iter().map(|run| run[place].abs()).collect();
             // The median of |N(0, σ)| is 0.6745σ.
@@ -79,9 +79,9 @@ fn by_place(failed: &[[f64; PLACES]]) -> Option<Spoilt> {
         })
         .collect();
     let floor = median(&mut scales.clone());
-    let worst = |run: &[f64; PLACES]| {
+    let worst = |run: &[f64; BINS]| {
         let by = |place: usize| run[place].abs() / scales[place].max(floor).max(f64::MIN_POSITIVE);
-        (0..PLACES)
+        (0..BINS)
             .map(|place| (by(place), place))
             .fold((0.0, 0), |a, b| if b.0 > a.0 { b } else { a })
     };
@@ -95,23 +95,22 @@ fn by_place(failed: &[[f64; PLACES]]) -> Option<Spoilt> {
     (ratio > OF_PLACE && ratio > OF_OTHERS * next).then(|| Spoilt {
         run,
         ratio,
-        at_rad: Some(std::f64::consts::TAU * (place as f64 + 0.5) / PLACES as f64),
+        at_rad: Some(std::f64::consts::TAU * (place as f64 + 0.5) / BINS as f64),
         off_m: failed[run][place],
     })
 }
 
-fn by_profile(failed: &[[f64; PLACES]]) -> Option<Spoilt> {
+fn by_profile(failed: &[[f64; BINS]]) -> Option<Spoilt> {
     let energies: Vec<f64> = failed
         .iter()
         .map(|run| run.iter().map(|x| x * x).sum())
         .collect();
     let (run, ratio) = stands_out(&energies, OF_MEDIAN, OF_NEXT)?;
-    let place =
-        (0..PLACES).max_by(|a, b| failed[run][*a].abs().total_cmp(&failed[run][*b].abs()))?;
+    let place = (0..BINS).max_by(|a, b| failed[run][*a].abs().total_cmp(&failed[run][*b].abs()))?;
     Some(Spoilt {
         run,
         ratio,
-        at_rad: Some(std::f64::consts::TAU * (place as f64 + 0.5) / PLACES as f64),
+        at_rad: Some(std::f64::consts::TAU * (place as f64 + 0.5) / BINS as f64),
         off_m: failed[run][place],
     })
 }
@@ -249,7 +248,7 @@ mod tests {
 
     #[test]
     fn a_bump_shows_at_its_place_beside_runs_that_fail_more_elsewhere() {
-        let mut failed = vec![[0.0; PLACES]; 24];
+        let mut failed = vec![[0.0; BINS]; 24];
         for (i, run) in failed.iter_mut().enumerate() {
             for (place, value) in run.iter_mut().enumerate() {
                 let scatter = ((i * 31 + place * 17) % 13) as f64 / 6.0 - 1.0;

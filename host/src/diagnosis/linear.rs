@@ -1,4 +1,4 @@
-//! Small least-squares problems of the search, on normal equations that the ledger has summed.
+//! Small least-squares problems of the search, on normal equations that the Gram matrices have summed.
 use super::products::Products;
 use nalgebra::{DMatrix, DVector};
 

@@ -17,7 +17,7 @@ pub fn is_material(found: &Explained, tone: &Tone) -> bool {
     let (_, explained) = energies(found, &found.all());
     // Teeth and other tones, too, leave something of the kind.
     let explained = explained + found.apart_m2;
-    let count = found.ledger.samples(&found.all());
+    let count = found.gram.samples(&found.all());
     let rms = (tone.whole_energy_m2() / count).sqrt();
     rms > 2.0 * SMALLEST_OF_NOISE * found.spread.noise_m()
         && rms > SMALLEST_OF_EXPLAINED[1] * (explained / count).sqrt()
@@ -30,7 +30,7 @@ pub fn prune(
     mut set: Vec<usize>,
     barred: &mut Vec<usize>,
 ) -> Vec<usize> {
-    let count = found.ledger.samples(weights);
+    let count = found.gram.samples(weights);
     loop {
         let (each, whole) = energies_of(found, weights, &set);
         // Beside what was taken out before, too, the search's own may be the error of another's form.

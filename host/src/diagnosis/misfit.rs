@@ -1,8 +1,8 @@
 //! The misfit, seen: what the baseline leaves, by kind.
-use super::basis::{COLUMNS, ORDERS};
-use super::column::Column;
+use super::angular_bins::{BINS, bin_means};
+use super::design_column::Column;
 use super::explained::{Explained, residual};
-use super::places::{PLACES, place_means};
+use super::low_orders::{COLUMNS, ORDERS};
 use super::roughness;
 use super::spread::WHOLE;
 use super::survey::Prepared;
@@ -36,7 +36,7 @@ pub struct Misfit {
 pub fn rms_um(found: &Explained) -> f64 {
     let left = residual(found);
     let sum: f64 = energies_m2(found, &left).iter().sum();
-    (sum / found.ledger.samples(&found.all()).max(1.0))
+    (sum / found.gram.samples(&found.all()).max(1.0))
         .max(0.0)
         .sqrt()
         * 1e6
@@ -54,10 +54,7 @@ fn energies_m2(found: &Explained, column: &Column) -> Vec<f64> {
 
 /// The baseline's misfit with its own coefficient fitted, by least squares of the samples; and the coefficient.
 pub fn of_baseline(found: &Explained) -> (Column, f64) {
-    let (data, own) = (
-        found.ledger.column(0),
-        found.ledger.column(found.nuisance[0]),
-    );
+    let (data, own) = (found.gram.column(0), found.gram.column(found.nuisance[0]));
     let (mut up, mut down) = (0.0, 0.0);
     for (index, run) in found.runs.iter().enumerate() {
         let (y, x) = (&data.low()[index], &own.low()[index]);
@@ -72,7 +69,7 @@ pub fn of_baseline(found: &Explained) -> (Column, f64) {
 
 /// Splits what the baseline leaves. The kinds are orthogonal but for drift, which is a part of size.
 pub fn split(found: &Explained) -> Misfit {
-    let count = found.ledger.samples(&found.all()).max(1.0);
+    let count = found.gram.samples(&found.all()).max(1.0);
     let (left, _) = of_baseline(found);
     // Of a circle that teeth hide for the most part no harmonics are read.
     let seen = |run: &Prepared| run.visible() as f64 > WHOLE * run.deviation_m.len() as f64;
@@ -96,7 +93,7 @@ pub fn split(found: &Explained) -> Misfit {
         .map(|(run, waves)| run.place.len() as f64 * waves.0[0][0].powi(2))
         .sum();
     let [even, odd] = parity(found, &harmonics);
-    let places = localised(&place_means(&found.runs, &left), count);
+    let places = localised(&bin_means(&found.runs, &left), count);
     let tone: f64 = found.tones.iter().map(Tone::whole_energy_m2).sum();
     let teeth: f64 = found
         .teeth
@@ -149,19 +146,19 @@ fn parity(found: &Explained, harmonics: &[Harmonics]) -> [f64; 2] {
 }
 
 /// Energy at fixed places beyond the eighth harmonic.
-fn localised(places: &[[f64; PLACES]], count: f64) -> f64 {
+fn localised(places: &[[f64; BINS]], count: f64) -> f64 {
     let runs = places.len().max(1) as f64;
-    let mut mean = [0.0; PLACES];
+    let mut mean = [0.0; BINS];
     for run in places {
         for (mean, value) in mean.iter_mut().zip(run) {
             *mean += value / runs;
         }
     }
-    let angle = |bin: usize| std::f64::consts::TAU * (bin as f64 + 0.5) / PLACES as f64;
-    let n = PLACES as f64;
+    let angle = |bin: usize| std::f64::consts::TAU * (bin as f64 + 0.5) / BINS as f64;
+    let n = BINS as f64;
     for order in 1..=ORDERS {
         let wave = |bin: usize| (order as f64 * angle(bin)).sin_cos();
-        let (s, c) = (0..PLACES).fold((0.0, 0.0), |(s, c), bin| {
+        let (s, c) = (0..BINS).fold((0.0, 0.0), |(s, c), bin| {
             let (sin, cos) = wave(bin);
             (s + 2.0 / n * mean[bin] * sin, c + 2.0 / n * mean[bin] * cos)
         });

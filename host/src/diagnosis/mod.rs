@@ -7,34 +7,34 @@
 //! is found is stated with its doubts ([`verdict`], [`unexplained`]) and proven on runs left out ([`veto`], [`gain`]).
 //! What is left must be noise ([`omnibus`]). Before all this come what a session brings along: an override for all runs
 //! ([`feed_override`]), a spoilt run ([`influence`]), a delay that is not known ([`delay`]).
+pub mod angular_bins;
 pub mod baseline;
-pub mod basis;
-pub mod column;
 pub mod delay;
+pub mod design_column;
 pub mod duration;
 pub mod explain;
 pub mod explained;
 pub mod feed_override;
 pub mod finding;
 pub mod gain;
+pub mod gram;
+pub mod hypothesis;
 pub mod influence;
-pub mod item;
-pub mod ledger;
 pub mod linear;
+pub mod low_orders;
 pub mod material;
 pub mod misfit;
 pub mod omnibus;
-pub mod orders;
 pub mod pattern;
 pub mod picture;
 pub mod pitch;
-pub mod places;
 pub mod products;
 pub mod propose;
 pub mod recommendation;
+pub mod residual_waves;
 pub mod roughness;
+pub mod run_order;
 pub mod search;
-pub mod sequence;
 pub mod shape;
 pub mod spread;
 pub mod statement;
@@ -54,8 +54,8 @@ pub use influence::LeftOut;
 pub use recommendation::{Action, Recommendation};
 pub use status::Status;
 
-use crate::campaign::Campaign;
-use crate::causes::Effect;
+use crate::campaign::{Campaign, Run};
+use crate::causes::{Effect, Evidence};
 use crate::model_file::{ModelFile, Servo};
 use crate::simulation::machine::{Machine, MachineError};
 use baseline::{Size, fit_lag};
@@ -65,7 +65,7 @@ use explain::Start;
 use explained::Explained;
 use serde::Serialize;
 use status::Ground;
-use survey::{Response, Survey, believed_feed_m_s};
+use survey::{Survey, believed_feed_m_s};
 
 /// What a diagnosis may be told.
 #[derive(Clone, Debug)]
@@ -164,6 +164,8 @@ pub enum DiagnosisError {
     Empty,
 }
 
+/// Fewest samples of a run that can show a form.
+const FEWEST_SAMPLES: usize = 16;
 /// Fewest runs whose scatter says anything.
 const FEWEST_RUNS: usize = 6;
 
@@ -171,17 +173,35 @@ const FEWEST_RUNS: usize = 6;
 ///
 /// # Errors
 /// No runs, or a given model that cannot be simulated.
+///
+/// ```
+/// use giotto::diagnosis::{Action, Options, Status, diagnose};
+/// use giotto::simulation::{self, Plan};
+/// # use std::path::Path;
+/// // A machine whose X is not square to Y by 60 µm/m.
+/// let plan = Plan::parse(
+///     "[machine]\nboth = { kv_per_s = 50.0 }\nsquareness_um_per_m = 60.0\n\
+///      [grid]\nradii_mm = [50.0, 100.0, 150.0]\nfeeds_mm_s = [20.0, 100.0, 300.0]",
+///     Path::new("plan.toml"),
+/// )?;
+/// let found = diagnose(&simulation::campaign(&plan, 1), &Options::default())?;
+/// let first = &found.findings[0];
+/// assert_eq!(first.cause.id(), "squareness");
+/// assert_eq!(first.status, Status::Certain);
+/// let [low, high] = first.estimate.ci95;
+/// assert!(low < 60.0 && 60.0 < high && high - low < 10.0);
+/// // What it says is to be done something about.
+/// assert_ne!(found.recommendation.action, Action::Nothing);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn diagnose(campaign: &Campaign, options: &Options) -> Result<Diagnosis, DiagnosisError> {
     // From within the pool: who stands outside waits for a thread to wake up each time that work is shared.
     rayon::scope(|_| within_pool(campaign, options))
 }
 
 fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, DiagnosisError> {
-    if !campaign
-        .runs
-        .iter()
-        .any(|run| run.samples.deviation_m.len() >= 16)
-    {
+    let long_enough = |run: &Run| run.samples.deviation_m.len() >= FEWEST_SAMPLES;
+    if !campaign.runs.iter().any(long_enough) {
         return Err(DiagnosisError::Empty);
     }
     let session = Session::of(campaign, options);
@@ -228,33 +248,21 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
         ties.iter()
             .map(|(item, other)| tie_words(found, *item, *other)),
     );
-    let in_sample = misfit::rms_um(found);
-    let (heldout_base, heldout_extended) = proof.as_ref().map_or((in_sample, in_sample), |gain| {
-        (gain.baseline_rms_um, gain.extended_rms_um)
-    });
-    let effects: Vec<Effect> = baseline
-        .known
-        .iter()
-        .cloned()
-        .chain(stated.findings.iter().flat_map(|f| f.effects.clone()))
-        .collect();
-    // The delay with which the gain was proven.
-    let delay_s = survey.inferred().then_some(found.lag.tau_s.max(0.0));
-    let model = gain::extended_model(&session.campaign, found, effects, delay_s);
-    let mut picture = picture::draw(&session.campaign, &seen, found);
-    picture
-        .iter_mut()
-        .for_each(|run| run.index = session.places[run.index]);
+    let model = extended_model(&session.campaign, &survey, found, &baseline, &stated);
+    let picture = pictured(&session.campaign, &session.places, &seen, found);
+    // Where no run can be left out, what the search leaves of the runs it saw.
+    let in_sample_um = misfit::rms_um(found);
+    let heldout_um = |of: &dyn Fn(&Gain) -> f64| proof.as_ref().map_or(in_sample_um, of);
     let mut diagnosis = Diagnosis {
         noise_um: found.spread.noise_m() * 1e6,
         spread_um: found.spread.order_m2[0].sqrt() * 1e6,
         baseline: Baseline {
             name: baseline.name,
-            heldout_rms_um: heldout_base,
+            heldout_rms_um: heldout_um(&|gain| gain.baseline_rms_um),
         },
         unexplained: stated.unexplained,
         extended: Extended {
-            heldout_rms_um: heldout_extended,
+            heldout_rms_um: heldout_um(&|gain| gain.extended_rms_um),
         },
         gain_percent: proof.as_ref().map_or(0.0, |gain| gain.percent),
         misfit: misfit::split(found),
@@ -275,12 +283,26 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
     Ok(diagnosis)
 }
 
+/// What the plots of a report draw, run by run; `places` are those of the runs in the given campaign.
+fn pictured(
+    campaign: &Campaign,
+    places: &[usize],
+    seen: &Campaign,
+    found: &Explained,
+) -> Vec<picture::RunPicture> {
+    let mut picture = picture::draw(campaign, seen, found);
+    for run in &mut picture {
+        run.index = places[run.index];
+    }
+    picture
+}
+
 /// Whether a model holds something that can be called real: causes that are proven on runs left out, or, without any, a
 /// servo that foretells them better than no model.
 fn is_worth_writing(findings: &[Finding], model: &ModelFile, gain: Option<&Gain>) -> bool {
     let Some(gain) = gain else { return false };
     if findings.is_empty() {
-        Response::of(&model.servo).a_s2 != 0.0 && gain.baseline_rms_um < gain.no_model_rms_um
+        model.servo.response().a_s2 != 0.0 && gain.baseline_rms_um < gain.no_model_rms_um
     } else {
         recommendation::is_proven(gain)
     }
@@ -346,12 +368,12 @@ impl Session {
 
 fn spoilt_of(campaign: &Campaign, survey: &Survey, options: &Options) -> Option<influence::Spoilt> {
     let response = match &options.model {
-        Some(model) => Response::of(&model.servo),
+        Some(model) => model.servo.response(),
         None => fit_lag(&sizes(campaign, believed_feed_m_s)),
     };
     let (runs, _) = survey.prepare(&response, 0.0);
     let data = survey::misfit(&runs);
-    let profiles = places::place_means(&runs, &data);
+    let profiles = angular_bins::bin_means(&runs, &data);
     let means: Vec<f64> = runs
         .iter()
         .zip(data.low())
@@ -360,12 +382,28 @@ fn spoilt_of(campaign: &Campaign, survey: &Survey, options: &Options) -> Option<
     influence::find(&runs, &profiles, &means)
 }
 
-fn sizes(campaign: &Campaign, feed_m_s: impl Fn(&crate::campaign::Run) -> f64) -> Vec<Size> {
+fn sizes(campaign: &Campaign, feed_m_s: impl Fn(&Run) -> f64) -> Vec<Size> {
     campaign
         .runs
         .iter()
         .map(|run| Size::of(run, feed_m_s(run)))
         .collect()
+}
+
+/// What was known and what was found, as one model with the delay with which its gain was proven.
+fn extended_model(
+    campaign: &Campaign,
+    survey: &Survey,
+    found: &Explained,
+    baseline: &Simulation,
+    stated: &Stated,
+) -> ModelFile {
+    let known = baseline.known.iter().cloned();
+    let effects = known
+        .chain(stated.findings.iter().flat_map(|f| f.effects.clone()))
+        .collect();
+    let delay_s = survey.inferred().then_some(found.lag.tau_s.max(0.0));
+    gain::extended_model(campaign, found, effects, delay_s)
 }
 
 /// The simulation as it stands.
@@ -416,7 +454,7 @@ impl Simulation {
         };
         Ok(Self {
             start: Start {
-                response: Response::of(&model.servo),
+                response: model.servo.response(),
                 own_fourth_order: !matches!(model.servo, Servo::Lag { .. }),
                 repeatability_m,
                 more_lag_s: 0.0,
@@ -494,7 +532,7 @@ fn prove(
 /// Two names for one thing.
 fn tie_words(found: &Explained, item: usize, other: crate::causes::Cause) -> String {
     let largest = statement::largest(found, item);
-    let item::Kind::Cause { cause, .. } = found.items[item].kind else {
+    let hypothesis::Kind::Cause { cause, .. } = found.items[item].kind else {
         return String::new();
     };
     format!(
@@ -539,8 +577,12 @@ fn state(
             proven: proof.is_some_and(|gain| gain.ci95_percent[0] > 0.0),
         },
     );
+    // Where the scatter is assumed, an interval that holds zero shows nothing.
+    let shown = |[low, high]: [f64; 2]| footing.measured_scatter || !(low <= 0.0 && high >= 0.0);
     findings.retain(|finding| {
-        finding.probability > status::TIE && finding.cause.model().allows(finding.estimate.value)
+        finding.probability > status::TIE
+            && finding.cause.model().allows(finding.estimate.value)
+            && shown(finding.estimate.ci95)
     });
     let unexplained = if footing.measured_scatter {
         let mut unexplained = unexplained::describe(found, durations);
@@ -571,7 +613,7 @@ fn clamp_energy_m2(campaign: &Campaign, found: &Explained) -> f64 {
 fn knows_clamp(known: &[Effect]) -> bool {
     known
         .iter()
-        .any(|effect| effect.cause() == crate::causes::Cause::FeedClamp)
+        .any(|effect| effect.cause().model().evidence() == Evidence::Duration)
 }
 
 /// The campaign with what the given effects do taken out, by the simulation with and without them.
@@ -601,7 +643,7 @@ fn without_known(campaign: &Campaign, baseline: &Simulation) -> Option<Campaign>
 
 /// What the campaign is too poor to tell.
 fn poverty(campaign: &Campaign, repeatability_m: f64) -> Vec<String> {
-    let distinct = |key: &dyn Fn(&crate::campaign::Run) -> f64| {
+    let distinct = |key: &dyn Fn(&Run) -> f64| {
         let mut values: Vec<f64> = campaign.runs.iter().map(key).collect();
         values.sort_by(f64::total_cmp);
         values.dedup_by(|a, b| (*a - *b).abs() < 1e-6 * b.abs().max(1e-12));
@@ -613,6 +655,15 @@ fn poverty(campaign: &Campaign, repeatability_m: f64) -> Vec<String> {
             "{} run(s): the scatter between runs cannot be measured and is taken as {:.1} µm (`--repeatability` states another), so what is listed is provisional and nothing can be called real; measure at least {FEWEST_RUNS}, better 26",
             campaign.runs.len(),
             repeatability_m * 1e6
+        ));
+    }
+    if distinct(&|run| run.feed_m_s) < 2 {
+        let sizes = sizes(campaign, |run| run.feed_m_s);
+        let mean_m = sizes.iter().map(|size| size.error_m).sum::<f64>() / sizes.len().max(1) as f64;
+        out.push(format!(
+            "the circles are {:.0} µm too {}, and at one speed a servo that lags, an offset of the radius and a scale look alike",
+            (mean_m * 1e6).abs(),
+            if mean_m < 0.0 { "small" } else { "large" }
         ));
     }
     if distinct(&|run| run.radius_m) < 2 {

@@ -6,10 +6,10 @@
 //! scatter, which may itself grow with feed and radius; the higher ones by the level of the orders beside them, which
 //! holds for noise that is correlated along the turn as well. The mean size is held against the order of the runs, and
 //! against the radius. Each family of tests shares out one chance of a false alarm.
-use super::basis::Low;
 use super::explained::{Explained, residual};
 use super::finding::Signature;
-use super::orders::{self, Waves, median};
+use super::low_orders::Low;
+use super::residual_waves::{self, Waves, median};
 use super::survey::Prepared;
 use crate::causes::ORDERS;
 use std::f64::consts::LN_2;
@@ -59,7 +59,7 @@ pub fn test(found: &Explained) -> Vec<Leftover> {
     let all: Vec<Left> = found
         .runs
         .iter()
-        .zip(orders::waves(&found.runs, &samples))
+        .zip(residual_waves::waves(&found.runs, &samples))
         .zip(forms)
         .map(|((run, waves), form_m2)| Left {
             sign: run.view.sign,
@@ -82,7 +82,7 @@ pub fn test(found: &Explained) -> Vec<Leftover> {
     // The coordinate along the mean: of an arc, too, it is free of the centre.
     let size = |(low, run): (&Low, &Prepared)| low[0] / (run.visible().max(1) as f64).sqrt();
     let sizes: Vec<f64> = left.low().iter().zip(found.runs.iter()).map(size).collect();
-    out.extend(super::sequence::test(found, &sizes));
+    out.extend(super::run_order::test(found, &sizes));
     out.sort_by(|a, b| a.chance.total_cmp(&b.chance));
     out
 }
@@ -90,9 +90,9 @@ pub fn test(found: &Explained) -> Vec<Leftover> {
 /// Mean square of what the chosen explanations with a form, that is more than a size, do in each run, m².
 fn forms_m2(found: &Explained) -> Vec<f64> {
     let columns = super::search::columns_of(&found.nuisance, &found.items, &found.chosen);
-    let mut fitted = super::column::Column::zero(found.runs.len());
+    let mut fitted = super::design_column::Column::zero(found.runs.len());
     for (&column, &amount) in columns.iter().zip(&found.solution.coefficients) {
-        fitted.add(amount, found.ledger.column(column));
+        fitted.add(amount, found.gram.column(column));
     }
     found
         .runs

@@ -1,7 +1,7 @@
 //! Run by run, what was measured and what the simulation leaves of it, before and after: what plots draw.
-use super::column::Column;
+use super::design_column::Column;
 use super::explained::{Explained, residual};
-use super::item::Kind;
+use super::hypothesis::Kind;
 use super::misfit::of_baseline;
 use super::search::columns_of;
 use crate::campaign::Campaign;
@@ -31,10 +31,7 @@ pub struct RunPicture {
 pub fn draw(campaign: &Campaign, seen: &Campaign, found: &Explained) -> Vec<RunPicture> {
     // The baseline with its own coefficient fitted, as in `misfit`.
     let (_, amount) = of_baseline(found);
-    let (data, own) = (
-        found.ledger.column(0),
-        found.ledger.column(found.nuisance[0]),
-    );
+    let (data, own) = (found.gram.column(0), found.gram.column(found.nuisance[0]));
     let left = left_by_simulation(found);
     found
         .runs
@@ -95,7 +92,7 @@ fn left_by_simulation(found: &Explained) -> Column {
             let Some(at) = columns.iter().position(|column| column == own) else {
                 continue;
             };
-            left.add(found.solution.coefficients[at], found.ledger.column(*own));
+            left.add(found.solution.coefficients[at], found.gram.column(*own));
         }
     }
     left

@@ -2,7 +2,7 @@
 //!
 //! `r = A·cosψ·sin(w·x + φ)` with `x = R·cosψ` is one frequency over x, whatever the radius. What pulls at each
 //! place, folded into fine bins of x, holds every pitch at once in one transform; 1 % of a gain is lost to the bins.
-use super::column::Column;
+use super::design_column::Column;
 use super::survey::Prepared;
 use giotto_shared::Actuator;
 use rustfft::FftPlanner;

@@ -1,10 +1,10 @@
 //! Patterns that the data themselves suggest.
-use super::basis::{Low, ORDERS};
+use super::angular_bins::{BINS, bin_means, bump_weights};
 use super::explained::{Explained, residual};
-use super::item::{Kind, scarcity};
+use super::hypothesis::{Kind, scarcity};
+use super::low_orders::{Low, ORDERS};
 use super::material::smallest_pattern_m;
 use super::pattern::{LAWS, Law, Pattern};
-use super::places::{PLACES, bump_weights, place_means};
 use super::search::columns_of;
 use super::spread::is_arc;
 use super::survey::Prepared;
@@ -32,7 +32,7 @@ pub fn propose_patterns(found: &mut Explained) {
     let sizes = Sizes::new(&runs);
     let mut ranked = harmonics(found, &sizes);
     ranked.extend(bumps(found, &sizes));
-    let count = found.ledger.samples(&found.all());
+    let count = found.gram.samples(&found.all());
     let smallest_m = smallest_pattern_m(found);
     let scarcity = scarcity(runs.len());
     ranked.retain(|candidate| {
@@ -93,7 +93,7 @@ fn views(found: &Explained) -> Vec<Vec<Harmonics>> {
         let mut low: Vec<Low> = left.low().to_vec();
         for (column, amount) in columns.iter().zip(&found.solution.coefficients) {
             if without.contains(column) {
-                for (own, other) in low.iter_mut().zip(found.ledger.column(*column).low()) {
+                for (own, other) in low.iter_mut().zip(found.gram.column(*column).low()) {
                     axpy(*amount, other, own);
                 }
             }
@@ -162,13 +162,13 @@ fn harmonics(found: &Explained, sizes: &Sizes) -> Vec<Candidate> {
 
 fn bumps(found: &Explained, sizes: &Sizes) -> Vec<Candidate> {
     let noise_m2 = found.spread.noise_m2;
-    let places = place_means(&found.runs, &residual(found));
+    let places = bin_means(&found.runs, &residual(found));
     // Pull at each place and weight of all runs together, for each law and parity.
-    let laws: Vec<(Law, bool, [f64; PLACES], f64)> = Pattern::laws_of_bumps()
+    let laws: Vec<(Law, bool, [f64; BINS], f64)> = Pattern::laws_of_bumps()
         .map(|(law, odd)| {
-            let (mut pulls, mut own) = ([0.0; PLACES], 0.0);
+            let (mut pulls, mut own) = ([0.0; BINS], 0.0);
             for ((run, means), size) in found.runs.iter().zip(&places).zip(sizes.of(law, odd)) {
-                let variance = noise_m2 * PLACES as f64 / run.deviation_m.len() as f64;
+                let variance = noise_m2 * BINS as f64 / run.deviation_m.len() as f64;
                 axpy(size / variance, means, &mut pulls);
                 own += size * size / variance;
             }

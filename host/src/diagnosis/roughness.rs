@@ -81,6 +81,47 @@ fn find_on(
     spread: &Spread,
     known: &[Teeth],
 ) -> Option<Teeth> {
+    let power = powers(axis, runs, residual, spread, known);
+    let (reached, significance) = rough_up_to(&power)?;
+    let below_m_s = FIRST_EDGE_M_S * 2f64.powf(0.5 * reached as f64);
+    if !contrast(axis, below_m_s, runs, residual, spread.noise_m2) {
+        return None;
+    }
+    let (height_m, se_m) = height(axis, below_m_s, runs, residual, spread.noise_m2)?;
+    Some(Teeth {
+        axis,
+        below_m_s,
+        height_m,
+        se_m,
+        significance,
+    })
+}
+
+/// Squared second differences by the speed of an axis.
+struct Powers {
+    /// Sum in each bin as a multiple of the noise.
+    ratios: [f64; BINS],
+    /// Samples in each bin.
+    counts: [f64; BINS],
+}
+
+impl Powers {
+    /// Power as a multiple of the noise, and how many standard errors it is above 1. Second differences are
+    /// correlated: about a third of the samples count.
+    fn excess(&self, bin: usize) -> (f64, f64) {
+        let ratio = self.ratios[bin];
+        (ratio, (ratio - 1.0) * (self.counts[bin] / 6.0).sqrt())
+    }
+}
+
+/// Roughness of what is left by the speed of an axis, away from its reversals.
+fn powers(
+    axis: Actuator,
+    runs: &[Prepared],
+    residual: &[Vec<f64>],
+    spread: &Spread,
+    known: &[Teeth],
+) -> Powers {
     let (sums, counts) = runs
         .par_iter()
         .zip(residual)
@@ -117,38 +158,51 @@ fn find_on(
                 )
             },
         );
-    // Second differences are correlated: about a third of the samples count.
-    let excess = |bin: usize| -> (f64, f64) {
-        let ratio = sums[bin] / (counts[bin] * spread.noise_m2).max(f64::MIN_POSITIVE);
-        (ratio, (ratio - 1.0) * (counts[bin] / 6.0).sqrt())
-    };
+    Powers {
+        ratios: std::array::from_fn(|bin| {
+            sums[bin] / (counts[bin] * spread.noise_m2).max(f64::MIN_POSITIVE)
+        }),
+        counts,
+    }
+}
+
+/// The bin above those that are rough, and the largest significance among them. Rough up to a speed, which lies within
+/// the bin above the last rough one, and smooth beyond it; else it is something else.
+fn rough_up_to(power: &Powers) -> Option<(usize, f64)> {
+    let counts = &power.counts;
     let rough: Vec<usize> = (0..BINS)
         .filter(|&bin| counts[bin] >= 20.0)
         .filter(|&bin| {
-            let (ratio, sigmas) = excess(bin);
+            let (ratio, sigmas) = power.excess(bin);
             ratio > ROUGH && sigmas > SIGNIFICANT
         })
         .collect();
     let (&highest, &lowest) = (rough.last()?, rough.first()?);
-    // Rough up to a speed, which lies within the bin above the last rough one, and smooth beyond it; else it is
-    // something else.
     let above: Vec<usize> = (highest + 2..BINS)
         .filter(|&bin| counts[bin] >= 50.0)
         .collect();
     if above.is_empty()
         || highest - lowest + 1 > rough.len() + 2
-        || above.iter().any(|&bin| excess(bin).0 > SMOOTH)
+        || above.iter().any(|&bin| power.excess(bin).0 > SMOOTH)
     {
         return None;
     }
-    let significance = rough.iter().map(|&bin| excess(bin).1).fold(0.0, f64::max);
-    let reached =
-        highest + 1 + usize::from(counts[highest + 1] >= 20.0 && excess(highest + 1).0 > PARTLY);
-    let below_m_s = FIRST_EDGE_M_S * 2f64.powf(0.5 * reached as f64);
-    if !contrast(axis, below_m_s, runs, residual, spread.noise_m2) {
-        return None;
-    }
-    // Height from each run with enough of the zone.
+    let significance = rough
+        .iter()
+        .map(|&bin| power.excess(bin).1)
+        .fold(0.0, f64::max);
+    let partly = counts[highest + 1] >= 20.0 && power.excess(highest + 1).0 > PARTLY;
+    Some((highest + 1 + usize::from(partly), significance))
+}
+
+/// Height of the teeth and its standard error, m, from each run with enough samples below a speed.
+fn height(
+    axis: Actuator,
+    below_m_s: f64,
+    runs: &[Prepared],
+    residual: &[Vec<f64>],
+    noise_m2: f64,
+) -> Option<(f64, f64)> {
     let heights: Vec<(f64, f64)> = runs
         .iter()
         .zip(residual)
@@ -165,7 +219,7 @@ fn find_on(
                 .map(|i| (clean[i] / run.view.direction[i][axis.index()]).powi(2))
                 .collect();
             (zone.len() >= 30).then(|| {
-                let mean = zone.iter().sum::<f64>() / zone.len() as f64 - spread.noise_m2;
+                let mean = zone.iter().sum::<f64>() / zone.len() as f64 - noise_m2;
                 ((3.0 * mean.max(0.0)).sqrt(), zone.len() as f64)
             })
         })
@@ -183,13 +237,7 @@ fn find_on(
     let se_m = (variance / (heights.len() - 1) as f64)
         .sqrt()
         .max(0.07 * height_m);
-    Some(Teeth {
-        axis,
-        below_m_s,
-        height_m,
-        se_m,
-        significance,
-    })
+    Some((height_m, se_m))
 }
 
 /// Runs in which the axis is both slow and fast have to be rough where it is slow and smooth where it is fast: a

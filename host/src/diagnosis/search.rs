@@ -4,7 +4,7 @@
 //! each member. The price grows with the number of competitors and of shapes tried (extended BIC, Chen &
 //! Chen 2008, doi 10.1093/biomet/asn034), so that pure noise is left alone. Members enter one by one, leave
 //! when others make them needless, and are exchanged for better ones until nothing improves.
-use super::item::Item;
+use super::hypothesis::Hypothesis;
 use super::linear::Factor;
 use super::products::Products;
 use std::cell::Cell;
@@ -16,7 +16,7 @@ const MOST: usize = 14;
 pub fn evidence(
     products: &Products,
     nuisance: &[usize],
-    items: &[Item],
+    items: &[Hypothesis],
     set: &[usize],
 ) -> Option<f64> {
     let price: f64 = set.iter().map(|&i| items[i].price).sum();
@@ -24,7 +24,7 @@ pub fn evidence(
 }
 
 /// Columns of nuisance and set.
-pub fn columns_of(nuisance: &[usize], items: &[Item], set: &[usize]) -> Vec<usize> {
+pub fn columns_of(nuisance: &[usize], items: &[Hypothesis], set: &[usize]) -> Vec<usize> {
     nuisance
         .iter()
         .copied()
@@ -36,7 +36,7 @@ pub fn columns_of(nuisance: &[usize], items: &[Item], set: &[usize]) -> Vec<usiz
 pub fn select(
     products: &Products,
     nuisance: &[usize],
-    items: &[Item],
+    items: &[Hypothesis],
     start: &[usize],
     barred: &[usize],
 ) -> Vec<usize> {
@@ -121,7 +121,7 @@ fn without(set: &[usize], at: usize) -> Vec<usize> {
 mod tests {
     use super::*;
     use crate::causes::Cause;
-    use crate::diagnosis::item::Kind;
+    use crate::diagnosis::hypothesis::Kind;
 
     /// Products of the data and three columns: the first explains it, the second nearly does, the third not at all.
     fn products() -> Products {
@@ -140,11 +140,11 @@ mod tests {
         })
     }
 
-    fn items(price: f64) -> Vec<Item> {
+    fn items(price: f64) -> Vec<Hypothesis> {
         [Cause::ScaleError, Cause::RadiusOffset, Cause::Squareness]
             .into_iter()
             .enumerate()
-            .map(|(i, cause)| Item {
+            .map(|(i, cause)| Hypothesis {
                 kind: Kind::Cause {
                     cause,
                     site: crate::causes::Site::Machine,

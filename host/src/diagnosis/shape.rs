@@ -2,12 +2,12 @@
 //!
 //! A coarse scan on a stratified part of the runs, then along tangents to the nearest best, or by a simplex where there is no
 //! slope; each trial costs one column, not one refit of everything.
-use super::basis::{COLUMNS, Low};
-use super::column::Column;
+use super::design_column::Column;
 use super::explained::{Explained, residual};
-use super::item::Kind;
-use super::ledger::kept;
+use super::gram::kept;
+use super::hypothesis::Kind;
 use super::linear::{Factor, solve};
+use super::low_orders::{COLUMNS, Low};
 use super::pitch;
 use super::products::Products;
 use super::search::columns_of;
@@ -179,18 +179,15 @@ impl<'a> Fit<'a> {
         } else {
             // A scan of a part of the runs sees that part of the gain.
             let share = self.runs.len() as f64 / self.sample.len().max(1) as f64;
-            let best = match (task.cause, task.site) {
-                (Cause::CyclicError, Site::One(axis)) => {
-                    let finest = crate::causes::cyclic_error::finest_wave_per_m(&self.views);
-                    pitch::scan(
-                        &self.runs,
-                        &self.whitened,
-                        self.found.spread.noise_m2,
-                        axis,
-                        finest,
-                    )
-                    .map(|found| (found.gain / share, vec![found.pitch_m]))
-                }
+            let best = match (model.finest_wave_per_m(&self.views), task.site) {
+                (Some(finest), Site::One(axis)) => pitch::scan(
+                    &self.runs,
+                    &self.whitened,
+                    self.found.spread.noise_m2,
+                    axis,
+                    finest,
+                )
+                .map(|found| (found.gain / share, vec![found.pitch_m])),
                 _ => best_of(model.shapes(&self.views), &self.sample),
             };
             match best {
@@ -337,8 +334,8 @@ impl<'a> Fit<'a> {
     }
 
     fn add_run(&self, trials: &[Kind], base: &[usize], run: usize, products: &mut Products) {
-        let (ledger, prepared) = (&self.found.ledger, &self.runs[run]);
-        let (white, discount) = (ledger.white_of(run), ledger.discounts(run));
+        let (gram, prepared) = (&self.found.gram, &self.runs[run]);
+        let (white, discount) = (gram.white_of(run), gram.discounts(run));
         for (i, &a) in base.iter().enumerate() {
             for (j, &b) in base[..=i].iter().enumerate() {
                 *products.at_mut(i, j) += white.at(a, b);
@@ -351,15 +348,15 @@ impl<'a> Fit<'a> {
         for (index, part) in parts.iter().enumerate() {
             let at = base.len() + index;
             for (i, &other) in base.iter().enumerate() {
-                let other = ledger.column(other);
+                let other = gram.column(other);
                 // The samples still hold their low orders: what they are multiplied with here has none.
                 let outside = dot(&part.samples, other.outside(prepared));
                 let white = kept(&part.low, &other.low()[run], discount) + outside;
-                *products.at_mut(at, i) += white / ledger.noise_m2();
+                *products.at_mut(at, i) += white / gram.noise_m2();
             }
             for (earlier, other) in parts[..=index].iter().enumerate() {
                 *products.at_mut(at, base.len() + earlier) +=
-                    part.white(other, discount) / ledger.noise_m2();
+                    part.white(other, discount) / gram.noise_m2();
             }
         }
     }
@@ -426,7 +423,7 @@ fn whitened_residual(found: &Explained) -> Column {
     let left = residual(found);
     let mut whitened = Column::zero(found.runs.len());
     whitened.add(1.0 / noise_m2, &left);
-    let kept = |run: usize| found.ledger.discounts(run).map(|discount| 1.0 - discount);
+    let kept = |run: usize| found.gram.discounts(run).map(|discount| 1.0 - discount);
     whitened.scale_low((0..found.runs.len()).map(kept));
     whitened
 }

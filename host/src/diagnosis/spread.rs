@@ -3,9 +3,9 @@
 //! Both are measured before any cause is assumed: the noise from second differences of neighbouring samples,
 //! the scatter from what is left of each run's harmonics when any dependence on R, direction, f, f²/R and
 //! time has been taken out. Tests against the noise within a run alone would make everything significant.
-use super::basis::{COLUMNS, Low, ORDERS, order_of};
 use super::linear;
-use super::orders;
+use super::low_orders::{COLUMNS, Low, ORDERS, order_of};
+use super::residual_waves;
 use super::survey::Prepared;
 use crate::causes::Harmonics;
 use rayon::prelude::*;
@@ -70,7 +70,7 @@ pub const WHOLE: f64 = 0.7;
 pub fn measure(runs: &[Prepared], residual: &[Vec<f64>], modelled: bool) -> Spread {
     let sample_m2 = noise(residual);
     let colour = if modelled {
-        orders::colour(runs, residual, sample_m2)
+        residual_waves::colour(runs, residual, sample_m2)
     } else {
         1.0
     };

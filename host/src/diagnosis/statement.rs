@@ -4,8 +4,8 @@ use super::finding::Largest;
 use super::roughness::Teeth;
 use super::search::columns_of;
 use super::survey::Prepared;
-use super::tone::{Amplitude, Tone};
-use crate::causes::Cause;
+use super::tone::Tone;
+use crate::causes::{Amplitude, Cause};
 use giotto_shared::Actuator;
 
 /// What to set right, and which way.
@@ -42,7 +42,7 @@ pub fn largest(found: &Explained, item: usize) -> Largest {
     largest_of(found.runs.iter().enumerate().map(|(index, run)| {
         let mut sum = vec![0.0; run.deviation_m.len()];
         for (column, amount) in &own {
-            let samples = found.ledger.column(*column).samples(run, index);
+            let samples = found.gram.column(*column).samples(run, index);
             super::vector::axpy(*amount, &samples, &mut sum);
         }
         on(run, sum.iter().fold(0.0, |most, x| f64::max(most, x.abs())))

@@ -2,11 +2,10 @@
 //!
 //! A ballbar gives time, not angle: the recorded pattern is turned by the lag φ(ω) of the machine. The
 //! set-up offset does not move between runs, so the turn of the first harmonic with speed measures φ.
-use super::basis::{Basis, Low};
-use super::column::Column;
+use super::design_column::Column;
+use super::low_orders::{Basis, Low};
 use crate::campaign::{Campaign, Run};
 use crate::causes::{Harmonics, RunView};
-use crate::model_file::Servo;
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
@@ -32,77 +31,8 @@ pub struct Prepared {
     pub place: Range<usize>,
 }
 
-/// The part of the response that all runs share: (R/Rm)² = 1 + aω² + bω⁴.
-///
-/// Exact for one lag (a = 1/kv², b = 0) and for a second-order response (b = 1/ωn⁴).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Response {
-    /// a = κ2, s².
-    pub a_s2: f64,
-    /// b, s⁴.
-    pub b_s4: f64,
-}
-
-impl Response {
-    /// Of a model file.
-    pub fn of(servo: &Servo) -> Self {
-        match *servo {
-            Servo::Beta {
-                beta1_s2, beta2_s4, ..
-            } => {
-                let a_s2 = -2.0 * beta1_s2;
-                Self {
-                    a_s2,
-                    b_s4: 2.0 * (0.375 * a_s2 * a_s2 - beta2_s4),
-                }
-            }
-            Servo::Lag { kv_per_s } => Self {
-                a_s2: kv_per_s.powi(-2),
-                b_s4: 0.0,
-            },
-            Servo::SecondOrder {
-                omega_n_rad_s,
-                zeta,
-            } => Self {
-                a_s2: -2.0 * (1.0 - 2.0 * zeta * zeta) / omega_n_rad_s.powi(2),
-                b_s4: omega_n_rad_s.powi(-4),
-            },
-        }
-    }
-
-    /// Phase of the simplest chain with this gain, to third order in ω: one lag (b ≤ 0), or a second-order
-    /// response, φ = 2ζr + (2ζ − 8ζ³/3)r³, r = ω/ωn. What a radius alone says of the delay: dead time is not in it.
-    pub fn own_lag(&self) -> Lag {
-        if self.b_s4 > 0.0 {
-            let omega_n = self.b_s4.powf(-0.25);
-            let zeta = (0.5 + 0.25 * self.a_s2 * omega_n * omega_n).max(0.0).sqrt();
-            let tau3_s3 = (8.0 / 3.0 * zeta.powi(3) - 2.0 * zeta) / omega_n.powi(3);
-            Lag {
-                tau_s: 2.0 * zeta / omega_n,
-                tau3_s3,
-                measured: false,
-                se_s: UNSEEN_S,
-            }
-        } else {
-            let tau_s = self.a_s2.max(0.0).sqrt();
-            Lag {
-                tau_s,
-                tau3_s3: tau_s.powi(3) / 3.0,
-                measured: false,
-                se_s: UNSEEN_S,
-            }
-        }
-    }
-
-    /// |G(jω)|.
-    pub fn gain(&self, omega_rad_s: f64) -> f64 {
-        let w2 = omega_rad_s * omega_rad_s;
-        (1.0 + self.a_s2 * w2 + self.b_s4 * w2 * w2)
-            .max(1e-3)
-            .sqrt()
-            .recip()
-    }
-}
+/// The part of the response that all runs share.
+pub type Response = giotto_shared::model::Response<f64>;
 
 impl Prepared {
     /// Takes the recorded pattern as one that runs ahead of the machine by the lag `lag_rad`.
@@ -168,6 +98,17 @@ pub struct Lag {
 }
 
 impl Lag {
+    /// That of the simplest chain with a response: what a radius alone says of the delay. Dead time is not in it.
+    pub fn of(response: &Response) -> Self {
+        let [tau_s, tau3_s3] = response.phase();
+        Self {
+            tau_s,
+            tau3_s3,
+            measured: false,
+            se_s: UNSEEN_S,
+        }
+    }
+
     /// φ(ω), rad.
     pub fn phase(&self, omega_rad_s: f64) -> f64 {
         omega_rad_s * (self.tau_s - self.tau3_s3 * omega_rad_s * omega_rad_s)
@@ -204,9 +145,18 @@ pub struct Survey {
     inferred: bool,
 }
 
-impl Survey {
-    /// Reads a campaign.
-    pub fn new(campaign: &Campaign) -> Self {
+/// When the runs of a campaign were measured.
+struct CampaignClock {
+    /// Of each run, s; its number where the campaign has no times.
+    starts: Vec<f64>,
+    began: f64,
+    span: f64,
+    /// Whether every run states its start.
+    timed: bool,
+}
+
+impl CampaignClock {
+    fn of(campaign: &Campaign) -> Self {
         let starts: Vec<f64> = campaign
             .runs
             .iter()
@@ -215,12 +165,41 @@ impl Survey {
             .collect();
         let began = starts.iter().copied().fold(f64::INFINITY, f64::min);
         let span = starts.iter().copied().fold(f64::NEG_INFINITY, f64::max) - began;
-        let timed = campaign.runs.iter().all(|run| run.started_s.is_some());
-        // What a run shows of a drift is that of its middle.
-        let middle = |index: usize, omega: f64| match campaign.runs[index].started_s {
-            Some(started_s) => started_s + std::f64::consts::PI / omega,
-            None => starts[index],
+        Self {
+            began,
+            span,
+            timed: campaign.runs.iter().all(|run| run.started_s.is_some()),
+            starts,
+        }
+    }
+
+    /// Share of the campaign that had passed at a run. What it shows of a drift is that of its middle.
+    fn elapsed(&self, run: &Run, index: usize, omega_rad_s: f64) -> f64 {
+        let middle = match run.started_s {
+            Some(started_s) => started_s + std::f64::consts::PI / omega_rad_s,
+            None => self.starts[index],
         };
+        if self.span > 0.0 {
+            (middle - self.began) / self.span
+        } else {
+            0.0
+        }
+    }
+
+    /// Duration of the campaign, s.
+    fn campaign_s(&self) -> f64 {
+        if self.timed && self.span > 0.0 {
+            self.span
+        } else {
+            UNTIMED_S
+        }
+    }
+}
+
+impl Survey {
+    /// Reads a campaign.
+    pub fn new(campaign: &Campaign) -> Self {
+        let clock = CampaignClock::of(campaign);
         let largest = campaign
             .runs
             .iter()
@@ -268,12 +247,8 @@ impl Survey {
                         sign: run.sign(),
                         frame: run.frame,
                         centre_m: run.centre_m.unwrap_or_default(),
-                        elapsed: if span > 0.0 {
-                            (middle(index, omega) - began) / span
-                        } else {
-                            0.0
-                        },
-                        campaign_s: if timed && span > 0.0 { span } else { UNTIMED_S },
+                        elapsed: clock.elapsed(run, index, omega),
+                        campaign_s: clock.campaign_s(),
                         largest_radius_m: largest,
                         psi_rad: theta.as_slice().into(),
                         direction: Arc::default(),
@@ -330,7 +305,7 @@ impl Survey {
                 run.turn_to(lag.phase(omega));
             } else {
                 // An angle that was measured holds no lag, but the servo's own phase still turns its signatures.
-                run.view.lag_rad = response.own_lag().phase(omega);
+                run.view.lag_rad = Lag::of(response).phase(omega);
                 run.view.place(Arc::clone(&run.view.psi_rad));
             }
             run
@@ -371,7 +346,7 @@ impl Survey {
             .zip(&self.firsts)
             .map(|(run, first)| (run.view.sign, run.view.omega_rad_s, *first))
             .collect();
-        let unmeasured = response.own_lag();
+        let unmeasured = Lag::of(response);
         let guess = unmeasured.tau_s;
         let cost = |tau: f64, tau3: f64| -> (f64, f64) {
             let (mut re, mut im) = (0.0, 0.0);
@@ -399,45 +374,15 @@ impl Survey {
         }
         // A phase beyond ±π at the fastest run would be another branch.
         let widest = (std::f64::consts::PI / fastest).min(0.2);
-        let mut tau = (0..=80)
+        let tau = (0..=80)
             .map(|i| -0.1 * widest + 1.1 * widest * f64::from(i) / 80.0)
             .min_by(|l, r| cost(*l, 0.0).0.total_cmp(&cost(*r, 0.0).0))
             .unwrap_or(guess);
-        let mut tau3 = 0.0;
-        let mut step = [
+        let steps = [
             widest / 80.0,
             0.2 * tau.abs().max(1e-3) / (fastest * fastest),
         ];
-        #[allow(
-            clippy::needless_range_loop,
-            reason = "the axis is a choice of parameter"
-        )]
-        for _ in 0..60 {
-            for axis in 0..2 {
-                let at = |delta: f64| {
-                    if axis == 0 {
-                        cost(tau + delta, tau3).0
-                    } else {
-                        cost(tau, tau3 + delta).0
-                    }
-                };
-                let (low, mid, high) = (at(-step[axis]), at(0.0), at(step[axis]));
-                let bend = low - 2.0 * mid + high;
-                let delta = if bend > 0.0 {
-                    (0.5 * step[axis] * (low - high) / bend).clamp(-step[axis], step[axis])
-                } else {
-                    0.0
-                };
-                if at(delta) <= mid {
-                    if axis == 0 {
-                        tau += delta
-                    } else {
-                        tau3 += delta
-                    }
-                }
-                step[axis] *= 0.85;
-            }
-        }
+        let [tau, tau3] = lowest_by_parabolas([tau, 0.0], steps, &|[tau, tau3]| cost(tau, tau3).0);
         let (left, eccentricity) = cost(tau, tau3);
         // Standard error of the phase at the fastest run, rad.
         let se = (left / points.len() as f64).sqrt() / eccentricity.max(1e-12);
@@ -454,26 +399,59 @@ impl Survey {
     }
 }
 
+/// The lowest place near `at`, one parameter after the other, by parabolas through three points whose steps shrink.
+fn lowest_by_parabolas(
+    mut at: [f64; 2],
+    mut steps: [f64; 2],
+    cost: &dyn Fn([f64; 2]) -> f64,
+) -> [f64; 2] {
+    for _ in 0..60 {
+        for which in 0..2 {
+            let moved = |delta: f64| {
+                let mut place = at;
+                place[which] += delta;
+                place
+            };
+            let step = steps[which];
+            let [low, mid, high] = [-step, 0.0, step].map(|delta| cost(moved(delta)));
+            let bend = low - 2.0 * mid + high;
+            let delta = if bend > 0.0 {
+                (0.5 * step * (low - high) / bend).clamp(-step, step)
+            } else {
+                0.0
+            };
+            let to = moved(delta);
+            if cost(to) <= mid {
+                at = to;
+            }
+            steps[which] *= 0.85;
+        }
+    }
+    at
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model_file::Servo;
 
     #[test]
     fn own_lag_is_the_phase_of_the_chain() {
         let (omega_n, zeta) = (38.0_f64, 0.72_f64);
-        let second = Response::of(&Servo::SecondOrder {
+        let second = Servo::SecondOrder {
             omega_n_rad_s: omega_n,
             zeta,
-        });
-        let lag = Response::of(&Servo::Lag { kv_per_s: 90.0 });
+        }
+        .response();
+        let lag = Servo::Lag { kv_per_s: 90.0 }.response();
         for omega in [0.5, 3.0, 7.0] {
             let exact = (2.0 * zeta * omega / omega_n).atan2(1.0 - (omega / omega_n).powi(2));
             assert!(
-                (second.own_lag().phase(omega) - exact).abs() < 2e-4,
+                (Lag::of(&second).phase(omega) - exact).abs() < 2e-4,
                 "{omega}: {exact}"
             );
             assert!(
-                (lag.own_lag().phase(omega) - (omega / 90.0).atan()).abs() < 1e-6,
+                (Lag::of(&lag).phase(omega) - (omega / 90.0).atan()).abs() < 1e-6,
                 "{omega}"
             );
         }

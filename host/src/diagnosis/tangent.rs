@@ -3,9 +3,9 @@
 //! Fitted beside the chosen columns, these tangents tell how far each shape is from its best (a Gauss–Newton step with
 //! the sizes projected out), and how much of each size hangs on a shape that is itself only estimated: intervals count
 //! them in. A weak prior keeps what the runs cannot tell within a few of its steps.
-use super::column::Column;
+use super::design_column::Column;
 use super::explained::{Explained, refit};
-use super::item::Kind;
+use super::hypothesis::Kind;
 use super::linear::{Solution, solve};
 use super::search::columns_of;
 use super::survey::Prepared;
@@ -47,9 +47,9 @@ const LONGEST_LAG_S: f64 = 5e-3;
 /// χ² below which a move is not worth while.
 const WORTH: f64 = 0.3;
 
-/// Lays the tangents into the ledger, behind the columns that are there, and fits all together: the amounts, or the
+/// Adds the tangents to the Gram matrices, behind the columns that are there, and fits all together: the amounts, or the
 /// `whole` with choices and the lag. Take them out again
-/// with [`Ledger::truncate`](super::ledger::Ledger::truncate).
+/// with [`Gram::truncate`](super::gram::Gram::truncate).
 fn lay(found: &mut Explained, weights: &[f64], whole: bool) -> Option<Tangents> {
     let runs = Arc::clone(&found.runs);
     let travel_m = 2.0
@@ -84,7 +84,7 @@ fn lay(found: &mut Explained, weights: &[f64], whole: bool) -> Option<Tangents> 
             shape[which] += step;
             let moved = Kind::Cause { cause, site, shape };
             let tangent = difference(found, *item, amounts, &moved, &runs);
-            columns.push(found.ledger.push(tangent));
+            columns.push(found.gram.push(tangent));
             shapes.push(Shape {
                 item: *item,
                 which,
@@ -105,12 +105,12 @@ fn lay(found: &mut Explained, weights: &[f64], whole: bool) -> Option<Tangents> 
             let kind = found.items[*item].kind.clone();
             tangent.add(1.0, &difference(found, *item, amounts, &kind, &late));
         }
-        columns.push(found.ledger.push(tangent));
+        columns.push(found.gram.push(tangent));
     }
     if shapes.is_empty() && !lag {
         return None;
     }
-    let mut products = found.ledger.white(weights);
+    let mut products = found.gram.white(weights);
     let own = columns.len() - shapes.len() - usize::from(lag);
     for (&column, shape) in columns[own..].iter().zip(&shapes) {
         *products.at_mut(column, column) += shape.prior.powi(-2);
@@ -146,7 +146,7 @@ fn difference(
         .zip(moved.columns_over(runs));
     for (&amount, (&now, moved)) in amounts.iter().zip(columns) {
         out.add(amount, &moved);
-        out.add(-amount, found.ledger.column(now));
+        out.add(-amount, found.gram.column(now));
     }
     out
 }
@@ -154,9 +154,9 @@ fn difference(
 /// Moves the shapes of the chosen explanations to their best beside each other.
 pub fn polish(found: &mut Explained, weights: &[f64]) {
     for _ in 0..4 {
-        let size = found.ledger.size();
+        let size = found.gram.size();
         let tangents = lay(found, weights, false);
-        found.ledger.truncate(size);
+        found.gram.truncate(size);
         let Some(tangents) = tangents else { return };
         if tangents.solution.gain - found.solution.gain < WORTH || !step(found, weights, &tangents)
         {

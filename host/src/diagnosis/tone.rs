@@ -2,25 +2,17 @@
 //!
 //! Each run has a phase of its own, so power is added, not amplitude; a run counts for at most `CAP`, so
 //! that the sharp harmonics of a few runs cannot pose as a tone that all share.
-use super::column::Column;
+use super::design_column::Column;
 use super::spread::Spread;
 use super::survey::Prepared;
 use super::vector::{axpy, dot, wave_sum};
+use crate::causes::Amplitude;
 use giotto_shared::Actuator;
 use rayon::prelude::*;
 use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// How the amplitude depends on the run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Amplitude {
-    /// The same in each run: a vibration.
-    Constant,
-    /// ∝ f²/R: the height of a chord's arc, an interpolator.
-    Centripetal,
-}
 
 /// A tone shared by the runs.
 #[derive(Clone, Debug)]
@@ -161,107 +153,24 @@ fn refine(
     step_hz: f64,
     residual: &Column,
 ) -> Option<Tone> {
-    let usable: Vec<&Clean<'_>> = clean
-        .iter()
-        .filter(|clean| {
-            start_hz < 0.47 * clean.samples.len() as f64 / clean.turn_s
-                && start_hz * clean.turn_s > FEWEST_WAVES
-        })
-        .collect();
-    let swung = |axis: Option<Actuator>| -> Vec<Vec<f64>> {
-        usable
-            .par_iter()
-            .map(|clean| swing(clean.run, clean.samples, axis))
-            .collect()
-    };
-    let sum_at = |swung: &[Vec<f64>], axis: Option<Actuator>, hz: f64| -> f64 {
-        usable
+    let heard = Heard {
+        runs: clean
             .iter()
-            .zip(swung)
-            .map(|(clean, samples)| {
-                power(samples, clean.turn_s, hz, spread.noise_m2) * loudness(axis)
+            .filter(|clean| {
+                start_hz < 0.47 * clean.samples.len() as f64 / clean.turn_s
+                    && start_hz * clean.turn_s > FEWEST_WAVES
             })
-            .sum()
+            .collect(),
+        noise_m2: spread.noise_m2,
     };
-    // A swing along an axis shows on the circle as two sidebands, one turn below and above.
-    let (axis, start_hz) = std::iter::once(None)
-        .chain(moved(runs).map(Some))
-        .collect::<Vec<_>>()
-        .into_iter()
-        .flat_map(|axis| {
-            let swung = swung(axis);
-            let sums: Vec<(f64, Option<Actuator>, f64)> = (-24..=24)
-                .into_par_iter()
-                .map(|i| start_hz + step_hz * f64::from(i))
-                .map(|hz| (sum_at(&swung, axis, hz), axis, hz))
-                .collect();
-            sums
-        })
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, axis, hz)| (axis, hz))?;
-    let swung = swung(axis);
-    let total = |hz: f64| sum_at(&swung, axis, hz);
-    let mut centre = start_hz;
-    let mut half = step_hz;
-    for _ in 0..12 {
-        let values: Vec<(f64, f64)> = (-3..=3)
-            .into_par_iter()
-            .map(|i| {
-                let hz = centre + half * f64::from(i) / 3.0;
-                (total(hz), hz)
-            })
-            .collect();
-        centre = values.iter().max_by(|a, b| a.0.total_cmp(&b.0))?.1;
-        half *= 0.5;
-    }
-    let h = 0.02 * step_hz;
-    let bend = (total(centre + h) - 2.0 * total(centre) + total(centre - h)) / (h * h);
-    let se_hz = if bend < 0.0 {
-        (2.0 / -bend).sqrt()
-    } else {
-        step_hz
-    };
-    let powers: Vec<(f64, f64, f64)> = usable
-        .iter()
-        .zip(&swung)
-        .map(|(clean, swung)| {
-            let view = &clean.run.view;
-            let power = power(swung, clean.turn_s, centre, spread.noise_m2) * loudness(axis);
-            // χ²₂ with non-centrality n·A²/(2σ²).
-            (
-                power,
-                swung.len() as f64 / (2.0 * spread.noise_m2 * loudness(axis)),
-                view.feed_m_s.powi(2) / view.radius_m,
-            )
-        })
-        .collect();
-    let law = |weight: &dyn Fn(f64) -> f64| -> (f64, f64) {
-        let misfit = |scale: f64| -> f64 {
-            powers
-                .iter()
-                .map(|(power, unit, x)| rice_deviance(*power, unit * (scale * weight(*x)).powi(2)))
-                .sum()
-        };
-        let start = (powers.iter().map(|p| (p.0 - 2.0).max(0.0)).sum::<f64>()
-            / powers
-                .iter()
-                .map(|p| p.1 * weight(p.2).powi(2))
-                .sum::<f64>())
-        .sqrt();
-        let mut best = (misfit(start), start);
-        for i in -40..=40 {
-            let scale = start * 1.05_f64.powi(i);
-            best = if misfit(scale) < best.0 {
-                (misfit(scale), scale)
-            } else {
-                best
-            };
-        }
-        best
-    };
-    let constant = law(&|_| 1.0);
-    let centripetal = law(&|x| x);
-    let amplitude = if constant.0 <= centripetal.0 {
+    let (axis, start_hz) = heard.loudest(runs, start_hz, step_hz)?;
+    let swung = heard.swung(axis);
+    let total = |hz: f64| heard.sum_at(&swung, axis, hz);
+    let frequency_hz = highest(&total, start_hz, step_hz)?;
+    let powers = heard.powers(&swung, axis, frequency_hz);
+    let constant = amplitude_law(&powers, &|_| 1.0);
+    let centripetal = amplitude_law(&powers, &|x| x);
+    let amplitude = if constant <= centripetal {
         Amplitude::Constant
     } else {
         Amplitude::Centripetal
@@ -272,13 +181,13 @@ fn refine(
         .sum::<f64>()
         / powers.len() as f64;
     let mut tone = Tone {
-        frequency_hz: centre,
-        se_hz,
+        frequency_hz,
+        se_hz: width(&total, frequency_hz, step_hz),
         axis,
         amplitude,
         amplitude_m: mean_square.max(0.0).sqrt(),
-        law_evidence: 0.5 * (constant.0 - centripetal.0).abs(),
-        gain: total(centre),
+        law_evidence: 0.5 * (constant - centripetal).abs(),
+        gain: total(frequency_hz),
         energy_m2: Vec::new(),
     };
     // A tone without its low orders takes nothing from the low orders.
@@ -292,6 +201,128 @@ fn refine(
         })
         .collect();
     Some(tone)
+}
+
+/// The runs that are sampled finely and last long enough for a frequency.
+struct Heard<'a> {
+    runs: Vec<&'a Clean<'a>>,
+    noise_m2: f64,
+}
+
+impl Heard<'_> {
+    /// The samples of each run, weighed as a swing along an axis would show.
+    fn swung(&self, axis: Option<Actuator>) -> Vec<Vec<f64>> {
+        self.runs
+            .par_iter()
+            .map(|clean| swing(clean.run, clean.samples, axis))
+            .collect()
+    }
+
+    /// Power of all runs at a frequency.
+    fn sum_at(&self, swung: &[Vec<f64>], axis: Option<Actuator>, hz: f64) -> f64 {
+        self.runs
+            .iter()
+            .zip(swung)
+            .map(|(clean, samples)| {
+                power(samples, clean.turn_s, hz, self.noise_m2) * loudness(axis)
+            })
+            .sum()
+    }
+
+    /// The axis, or none, and the frequency near `start_hz` at which the power is highest. A swing along an axis shows on
+    /// the circle as two sidebands, one turn below and above.
+    fn loudest(
+        &self,
+        runs: &[Prepared],
+        start_hz: f64,
+        step_hz: f64,
+    ) -> Option<(Option<Actuator>, f64)> {
+        std::iter::once(None)
+            .chain(moved(runs).map(Some))
+            .collect::<Vec<_>>()
+            .into_iter()
+            .flat_map(|axis| {
+                let swung = self.swung(axis);
+                let sums: Vec<(f64, Option<Actuator>, f64)> = (-24..=24)
+                    .into_par_iter()
+                    .map(|i| start_hz + step_hz * f64::from(i))
+                    .map(|hz| (self.sum_at(&swung, axis, hz), axis, hz))
+                    .collect();
+                sums
+            })
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, axis, hz)| (axis, hz))
+    }
+
+    /// Of each run its power, what a square metre of amplitude would add to it, and its acceleration f²/R: the power is χ²₂
+    /// with non-centrality n·A²/(2σ²).
+    fn powers(&self, swung: &[Vec<f64>], axis: Option<Actuator>, hz: f64) -> Vec<(f64, f64, f64)> {
+        self.runs
+            .iter()
+            .zip(swung)
+            .map(|(clean, swung)| {
+                let view = &clean.run.view;
+                (
+                    power(swung, clean.turn_s, hz, self.noise_m2) * loudness(axis),
+                    swung.len() as f64 / (2.0 * self.noise_m2 * loudness(axis)),
+                    view.feed_m_s.powi(2) / view.radius_m,
+                )
+            })
+            .collect()
+    }
+}
+
+/// The frequency of the highest power within a step of `start_hz`, by grids that halve.
+fn highest(total: &(dyn Fn(f64) -> f64 + Sync), start_hz: f64, step_hz: f64) -> Option<f64> {
+    let mut centre = start_hz;
+    let mut half = step_hz;
+    for _ in 0..12 {
+        let values: Vec<(f64, f64)> = (-3..=3)
+            .into_par_iter()
+            .map(|i| {
+                let hz = centre + half * f64::from(i) / 3.0;
+                (total(hz), hz)
+            })
+            .collect();
+        centre = values.iter().max_by(|a, b| a.0.total_cmp(&b.0))?.1;
+        half *= 0.5;
+    }
+    Some(centre)
+}
+
+/// Standard error of a frequency by the bend of the power there, Hz.
+fn width(total: &dyn Fn(f64) -> f64, centre: f64, step_hz: f64) -> f64 {
+    let h = 0.02 * step_hz;
+    let bend = (total(centre + h) - 2.0 * total(centre) + total(centre - h)) / (h * h);
+    if bend < 0.0 {
+        (2.0 / -bend).sqrt()
+    } else {
+        step_hz
+    }
+}
+
+/// Deviance of the powers under amplitudes that are `weight` of the acceleration, times the best scale.
+fn amplitude_law(powers: &[(f64, f64, f64)], weight: &dyn Fn(f64) -> f64) -> f64 {
+    let misfit = |scale: f64| -> f64 {
+        powers
+            .iter()
+            .map(|(power, unit, x)| rice_deviance(*power, unit * (scale * weight(*x)).powi(2)))
+            .sum()
+    };
+    let start = (powers.iter().map(|p| (p.0 - 2.0).max(0.0)).sum::<f64>()
+        / powers
+            .iter()
+            .map(|p| p.1 * weight(p.2).powi(2))
+            .sum::<f64>())
+    .sqrt();
+    (-40..=40)
+        .map(|i| misfit(start * 1.05_f64.powi(i)))
+        .fold(
+            misfit(start),
+            |best, value| {
+                if value < best { value } else { best }
+            },
+        )
 }
 
 /// −2·log-likelihood of a χ²₂ power with non-centrality λ, in the Gaussian approximation of its amplitude:
@@ -372,11 +403,50 @@ fn padded(samples: usize) -> usize {
 
 fn spectrum(clean: &Clean<'_>, transform: &Arc<dyn Fft<f64>>, noise_m2: f64) -> Spectrum {
     let (n, length) = (clean.samples.len(), transform.len());
+    let mut power = powers(clean.samples, transform, noise_m2);
+    whiten(&mut power, length as f64 / n as f64);
     Spectrum {
         turn_s: clean.turn_s,
         nyquist_hz: 0.5 * n as f64 / clean.turn_s,
-        power: powers(clean.samples, transform, noise_m2),
+        power,
         per_hz: clean.turn_s * length as f64 / n as f64,
+    }
+}
+
+/// Brings noise that is louder at some frequencies, as noise correlated along the turn is at low ones, down to the level of white
+/// noise: by the median within an octave to either side, which a tone of a wave or two does not move. Nothing is made louder.
+fn whiten(power: &mut [f64], places_a_wave: f64) {
+    /// Median of χ²₂.
+    const MEDIAN: f64 = 1.386;
+    /// Knots an octave, between which the level is drawn as a line.
+    const KNOTS: f64 = 4.0;
+    let lowest = ((FEWEST_WAVES - 1.0) * places_a_wave) as usize;
+    let mut part = Vec::new();
+    let mut level = |centre: f64| -> f64 {
+        let from = ((0.5 * centre) as usize).max(lowest);
+        let to = ((2.0 * centre) as usize + 1).min(power.len());
+        part.clear();
+        part.extend_from_slice(power.get(from..to).unwrap_or(&[]));
+        let middle = part.len() / 2;
+        if part.is_empty() {
+            return 1.0;
+        }
+        (*part.select_nth_unstable_by(middle, f64::total_cmp).1 / MEDIAN).max(1.0)
+    };
+    let step = 2f64.powf(1.0 / KNOTS);
+    let mut knots = Vec::new();
+    let mut at = lowest.max(1) as f64;
+    while at < power.len() as f64 * step {
+        knots.push((at, level(at)));
+        at *= step;
+    }
+    for pair in knots.windows(2) {
+        let [(from, low), (to, high)] = [pair[0], pair[1]];
+        let end = (to as usize).min(power.len());
+        for (place, value) in power.iter_mut().enumerate().take(end).skip(from as usize) {
+            let share = (place as f64 - from) / (to - from);
+            *value /= low + (high - low) * share.clamp(0.0, 1.0);
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 use super::duration::Durations;
 use super::explained::{Explained, energies};
 use super::finding::{Signature, Unexplained};
-use super::item::Kind;
+use super::hypothesis::Kind;
 use super::pattern::{Law, Pattern};
 
 /// Describes the patterns that the search had to take in.

@@ -1,134 +1,172 @@
 //! From the chosen explanations to findings: estimate, interval, probability, share, look-alikes.
+mod estimate;
+mod joined;
+
+use estimate::estimate;
+use joined::join_axes;
+
 use super::duration::Clamp;
 use super::explained::{Explained, energies};
 use super::finding::{Estimate, Finding, Largest};
-use super::item::Kind;
+use super::hypothesis::Kind;
 use super::linear::solve;
 use super::roughness::{self, Teeth};
 use super::search::{columns_of, evidence, select};
 use super::statement;
 use super::status::{Status, TIE};
-use super::tangent;
-use super::tone::{Amplitude, Tone};
-use crate::causes::{Cause, Effect, Fitted, Seat, Site};
+use super::tone::Tone;
+use crate::causes::{Cause, Effect, Evidence, Fitted, Site, shown_by};
+use giotto_shared::model::Element;
 use rayon::prelude::*;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::collections::BTreeMap;
 
 /// No probability is certain: a statement about a machine from one campaign.
 const HIGHEST: f64 = 0.999;
 
+/// What the parts of an explanation take of the misfit.
+struct Shares {
+    /// Energy of everything that is explained, m².
+    total: f64,
+    /// Samples of all runs.
+    samples: f64,
+}
+
+impl Shares {
+    /// Of an energy, %.
+    fn percent(&self, energy: f64) -> f64 {
+        if self.total > 0.0 {
+            100.0 * energy / self.total
+        } else {
+            0.0
+        }
+    }
+
+    /// Root mean square over all samples, µm.
+    fn rms_um(&self, energy: f64) -> f64 {
+        (energy / self.samples).sqrt() * 1e6
+    }
+
+    /// A finding by evidence of its own, with what it takes.
+    fn plain(&self, effect: Effect, probability: f64, energy: f64) -> Finding {
+        let (share, rms) = (self.percent(energy), self.rms_um(energy));
+        plain(effect, probability, share, rms)
+    }
+}
+
 /// Findings, largest share first. `clamp_energy_m2` is what the clamp's slower feed explains.
 pub fn findings(found: &Explained, clamp: Option<(Clamp, f64)>) -> Vec<Finding> {
     let weights = found.all();
-    let samples: f64 = found
-        .runs
-        .iter()
-        .map(|run| run.deviation_m.len() as f64)
-        .sum();
     let (each, _) = energies(found, &weights);
     let tone_energies: Vec<f64> = found.tones.iter().map(Tone::whole_energy_m2).collect();
     let tone_energy: f64 = tone_energies.iter().sum();
-    let teeth_energy: Vec<f64> = found
+    let teeth_energies: Vec<f64> = found
         .teeth
         .iter()
         .map(|teeth| roughness::energy_m2(teeth, &found.runs))
         .collect();
-    let total = each.iter().sum::<f64>()
-        + tone_energy
-        + teeth_energy.iter().sum::<f64>()
-        + clamp.map_or(0.0, |(_, energy)| energy);
-    let share = |energy: f64| {
-        if total > 0.0 {
-            100.0 * energy / total
-        } else {
-            0.0
-        }
-    };
-    let rms = |energy: f64| (energy / samples).sqrt() * 1e6;
-    let stated = |(at, &item): (usize, &usize)| {
-        let Kind::Cause { cause, site, .. } = &found.items[item].kind else {
-            return None;
-        };
-        if found.tied.contains(&item) {
-            return None;
-        }
-        let words = cause.model().words();
-        let (value, half) = estimate(found, item);
-        let ci95 = [value - half, value + half];
-        // Beyond what a machine can have, it is something else.
-        let effect = effect_of(found, item, value, ci95)?;
-        let params = named(&effect);
-        Some(Finding {
-            cause: *cause,
-            axis: site.axis(),
-            actuators: site.actuators(),
-            probability: probability(found, &weights, at),
-            status: Status::default(),
-            effect_um: statement::largest(found, item),
-            remedy: statement::remedy(*cause, &site.actuators(), value),
-            estimate: Estimate {
-                value,
-                ci95,
-                unit: words.unit,
-            },
-            share_percent: share(each[at]),
-            rms_um: rms(each[at]),
-            indistinguishable_from: look_alikes(found, &weights, at),
-            compensable: compensable(&effect),
-            next_measurement: words.next.to_string(),
-            note: (*cause == Cause::HigherOrderDynamics)
-                .then(|| dynamics_note(found, &weights, at)),
-            params,
-            effects: vec![effect],
-        })
+    let shares = Shares {
+        total: each.iter().sum::<f64>()
+            + tone_energy
+            + teeth_energies.iter().sum::<f64>()
+            + clamp.map_or(0.0, |(_, energy)| energy),
+        samples: found
+            .runs
+            .iter()
+            .map(|run| run.deviation_m.len() as f64)
+            .sum(),
     };
     let out = found
         .chosen
         .par_iter()
         .enumerate()
-        .filter_map(stated)
+        .filter_map(|(at, _)| of_signature(found, &weights, at, each[at], &shares))
         .collect();
-    let out = without_bent(out, unexplained_energy(found, &each), found);
+    let (pieces, unexplained) = unexplained_energy(found, &each);
+    let out = without_bent(out, (pieces, unexplained), found);
     let mut out = join_axes(out);
-    if let Some((clamp, energy)) = clamp {
-        let value = clamp.limit_m_s2 * 1e3;
-        let half = 2.0 * clamp.se_m_s2 * 1e3;
-        let ci95 = [value - half, value + half];
-        let effect = Effect::new(Cause::FeedClamp, Site::Machine, value, ci95, []);
-        let finding = effect
-            .ok()
-            .map(|effect| plain(effect, HIGHEST, share(energy), rms(energy)));
-        out.extend(finding.map(|finding| Finding {
-            effect_um: statement::of_slower_feed(found),
-            ..finding
+    out.extend(clamp.and_then(|(clamp, energy)| of_clamp(found, clamp, energy, &shares)));
+    let hidden_by_pieces = pieces >= PIECES && tone_energy < 9.0 * unexplained;
+    if !hidden_by_pieces {
+        let tones = found.tones.iter().zip(tone_energies);
+        out.extend(tones.filter_map(|(tone, energy)| {
+            let finding = tone_finding(tone, shares.percent(energy), shares.rms_um(energy))?;
+            Some(Finding {
+                effect_um: statement::of_tone(found, tone),
+                ..finding
+            })
         }));
     }
-    let (pieces, energy) = unexplained_energy(found, &each);
-    let hidden_by_pieces = pieces >= PIECES && tone_energy < 9.0 * energy;
-    for (tone, energy) in found
-        .tones
-        .iter()
-        .zip(tone_energies)
-        .filter(|_| !hidden_by_pieces)
-    {
-        let finding = tone_finding(tone, share(energy), rms(energy));
-        out.extend(finding.map(|finding| Finding {
-            effect_um: statement::of_tone(found, tone),
-            ..finding
-        }));
-    }
-    for (teeth, energy) in found.teeth.iter().zip(teeth_energy) {
+    let teeth = found.teeth.iter().zip(teeth_energies);
+    out.extend(teeth.filter_map(|(teeth, energy)| {
         let odds = 0.5 * teeth.significance.powi(2) - 14.0;
-        let effect = teeth_effect(teeth);
-        let finding = effect.map(|effect| plain(effect, sigmoid(odds), share(energy), rms(energy)));
-        out.extend(finding.map(|finding| Finding {
+        Some(Finding {
             effect_um: statement::of_teeth(found, teeth),
-            ..finding
-        }));
-    }
+            ..shares.plain(teeth_effect(teeth)?, sigmoid(odds), energy)
+        })
+    }));
     out.sort_by(|a, b| b.share_percent.total_cmp(&a.share_percent));
     out
+}
+
+/// A chosen explanation that is a cause with one name.
+fn of_signature(
+    found: &Explained,
+    weights: &[f64],
+    at: usize,
+    energy: f64,
+    shares: &Shares,
+) -> Option<Finding> {
+    let item = found.chosen[at];
+    let Kind::Cause { cause, site, .. } = &found.items[item].kind else {
+        return None;
+    };
+    if found.tied.contains(&item) {
+        return None;
+    }
+    let words = cause.model().words();
+    let (value, half) = estimate(found, item);
+    let ci95 = [value - half, value + half];
+    // Beyond what a machine can have, it is something else.
+    let effect = effect_of(found, item, value, ci95)?;
+    let params = named(&effect);
+    Some(Finding {
+        cause: *cause,
+        axis: site.axis(),
+        actuators: site.actuators(),
+        probability: probability(found, weights, at),
+        status: Status::default(),
+        effect_um: statement::largest(found, item),
+        remedy: statement::remedy(*cause, &site.actuators(), value),
+        estimate: Estimate {
+            value,
+            ci95,
+            unit: words.unit,
+        },
+        share_percent: shares.percent(energy),
+        rms_um: shares.rms_um(energy),
+        indistinguishable_from: look_alikes(found, weights, at),
+        compensable: effect.cause().model().is_compensable(&effect),
+        next_measurement: words.next.to_string(),
+        note: cause
+            .model()
+            .is_response()
+            .then(|| dynamics_note(found, weights, at)),
+        params,
+        effects: vec![effect],
+    })
+}
+
+/// A clamp on the feed, which the clock shows.
+fn of_clamp(found: &Explained, clamp: Clamp, energy: f64, shares: &Shares) -> Option<Finding> {
+    let value = clamp.limit_m_s2 * 1e3;
+    let half = 2.0 * clamp.se_m_s2 * 1e3;
+    let ci95 = [value - half, value + half];
+    let cause = shown_by(Evidence::Duration)?.cause();
+    let effect = Effect::new(cause, Site::Machine, value, ci95, []).ok()?;
+    Some(Finding {
+        effect_um: statement::of_slower_feed(found),
+        ..shares.plain(effect, HIGHEST, energy)
+    })
 }
 
 /// Number of patterns and their energy, m².
@@ -212,7 +250,7 @@ fn plain(effect: Effect, probability: f64, share_percent: f64, rms_um: f64) -> F
             .iter()
             .map(|s| (*s).to_string())
             .collect(),
-        compensable: compensable(&effect),
+        compensable: effect.cause().model().is_compensable(&effect),
         next_measurement: words.next.to_string(),
         note: None,
         params: named(&effect),
@@ -230,7 +268,8 @@ pub fn teeth_effect(teeth: &Teeth) -> Option<Effect> {
     let (value, half) = (teeth.height_m * 1e6, 2.0 * teeth.se_m * 1e6);
     let ci95 = [value - half, value + half];
     let below = [("below_mm_s", teeth.below_m_s * 1e3)];
-    Effect::new(Cause::StickSlip, Site::One(teeth.axis), value, ci95, below).ok()
+    let cause = shown_by(Evidence::Roughness)?.cause();
+    Effect::new(cause, Site::One(teeth.axis), value, ci95, below).ok()
 }
 
 fn tone_finding(tone: &Tone, share: f64, rms: f64) -> Option<Finding> {
@@ -241,112 +280,32 @@ fn tone_finding(tone: &Tone, share: f64, rms: f64) -> Option<Finding> {
     let law = sigmoid(tone.law_evidence.min(50.0));
     // The frequency is sharper than the model of it: a part in 1e5 for the clock of the instrument.
     let se_hz = tone.se_hz.hypot(1e-5 * tone.frequency_hz);
-    let on_axis = tone.axis.map_or(Site::Machine, Site::One);
-    let (cause, site, value, half) = match tone.amplitude {
-        Amplitude::Constant => (Cause::Vibration, on_axis, tone.frequency_hz, 2.0 * se_hz),
-        Amplitude::Centripetal => {
-            let period = 1.0 / tone.frequency_hz;
-            let half = 2.0 * se_hz * period * period;
-            (Cause::InterpolationChord, Site::Machine, period, half)
-        }
-    };
-    let other = match tone.amplitude {
-        Amplitude::Constant => Cause::InterpolationChord,
-        Amplitude::Centripetal => Cause::Vibration,
-    };
-    let effect = Effect::new(cause, site, value, [value - half, value + half], params).ok()?;
+    let model = shown_by(Evidence::Tone(tone.amplitude))?;
+    let site = tone
+        .axis
+        .map(Site::One)
+        .filter(|site| model.seat().takes(*site))
+        .unwrap_or(Site::Machine);
+    let [value, half] = model.of_frequency(tone.frequency_hz, se_hz);
+    let ci95 = [value - half, value + half];
+    let effect = Effect::new(model.cause(), site, value, ci95, params).ok()?;
     let mut finding = plain(effect, law, share, rms);
     if tone.law_evidence < 3.0 {
-        finding.indistinguishable_from.push(other.id().to_string());
+        let other = shown_by(Evidence::Tone(tone.amplitude.other()));
+        let name = other.map(|other| other.cause().id().to_string());
+        finding.indistinguishable_from.extend(name);
     }
     Some(finding)
-}
-
-/// Through a term of the table, or through its κ4.
-fn compensable(effect: &Effect) -> bool {
-    effect.cause() == Cause::HigherOrderDynamics || effect.cause().model().term(effect).is_some()
 }
 
 fn sigmoid(log_odds: f64) -> f64 {
     (1.0 / (1.0 + (-log_odds).exp())).min(HIGHEST)
 }
 
-/// Ratio of variances, by the runs and by the model, above which the former is believed.
-const ROBUST: f64 = 1.5;
-
-/// Value and half-width of its 95 % interval, in the contract's unit.
-fn estimate(found: &Explained, item: usize) -> (f64, f64) {
-    let columns = columns_of(&found.nuisance, &found.items, &found.chosen);
-    let own = &found.items[item].columns;
-    let at: Vec<usize> = own
-        .iter()
-        .filter_map(|c| columns.iter().position(|other| other == c))
-        .collect();
-    let dof = (found.runs.len().saturating_sub(columns.len())).max(1) as f64;
-    let t = StudentsT::new(0.0, 1.0, dof).map_or(2.0, |t| t.inverse_cdf(0.975));
-    // Nuisance and chosen come first with the tangents, too.
-    let (covariance, ..) = tangent::covariance(found);
-    let robust = robust_variances(found);
-    let value: Vec<f64> = at.iter().map(|&i| found.solution.coefficients[i]).collect();
-    // The scatter of the runs' pulls is itself uncertain by a quarter or so: it counts where it says clearly more.
-    let variance = |i: usize| {
-        let robust = robust.get(i).copied().unwrap_or(0.0);
-        if robust > ROBUST * covariance[(i, i)] {
-            robust
-        } else {
-            covariance[(i, i)]
-        }
-    };
-    let doubt = match &found.items[item].kind {
-        Kind::Cause { cause, .. } => cause.model().relative_doubt(),
-        Kind::Pattern(_) => 0.0,
-    };
-    let half = |value: f64, se: f64| (t * se).hypot(1.96 * doubt * value);
-    match (value.as_slice(), at.as_slice()) {
-        ([only], [i]) => (*only, half(*only, variance(*i).sqrt())),
-        ([a, b], [i, j]) => {
-            let size = a.hypot(*b).max(f64::MIN_POSITIVE);
-            let se = ((a / size).powi(2) * variance(*i) + (b / size).powi(2) * variance(*j)).sqrt();
-            (size, half(size, se))
-        }
-        _ => (f64::NAN, f64::NAN),
-    }
-}
-
-/// Variances of the coefficients by the scatter of the runs' pulls (sandwich, with the run as the cluster).
-fn robust_variances(found: &Explained) -> Vec<f64> {
-    let (bread, columns, coefficients) = tangent::covariance(found);
-    let n = columns.len();
-    let mut meat = nalgebra::DMatrix::<f64>::zeros(n, n);
-    for run in 0..found.runs.len() {
-        let white = found.ledger.white_of(run);
-        let pull: Vec<f64> = columns
-            .iter()
-            .map(|&a| {
-                let fitted: f64 = columns
-                    .iter()
-                    .zip(&coefficients)
-                    .map(|(&b, x)| white.at(a, b) * x)
-                    .sum();
-                white.at(a, 0) - fitted
-            })
-            .collect();
-        for i in 0..n {
-            for j in 0..n {
-                meat[(i, j)] += pull[i] * pull[j];
-            }
-        }
-    }
-    let runs = found.runs.len() as f64;
-    let small = runs / (runs - n as f64).max(1.0);
-    let sandwich = bread * meat * bread * small;
-    (0..n).map(|i| sandwich[(i, i)]).collect()
-}
-
 /// Partial F of the fourth-order term beside all others (variances as estimated between runs), and what kind of
 /// chain has such a response.
 fn dynamics_note(found: &Explained, weights: &[f64], at: usize) -> String {
-    let products = found.ledger.white(weights);
+    let products = found.gram.white(weights);
     let gain = |set: &[usize]| {
         solve(&products, &columns_of(&found.nuisance, &found.items, set))
             .map_or(0.0, |solution| solution.gain)
@@ -363,18 +322,15 @@ fn dynamics_note(found: &Explained, weights: &[f64], at: usize) -> String {
         .runs
         .len()
         .saturating_sub(columns_of(&found.nuisance, &found.items, &found.chosen).len());
-    let (a, b) = (found.response.a_s2, found.response.b_s4);
-    // κ4 = 24β2 − 3κ2² with β2 = 3κ2²/8 − b/2.
-    let ratio = (6.0 * a * a - 12.0 * b) / (a * a);
-    let class = if b > 0.0 {
-        let omega_n2 = b.powf(-0.5);
-        let zeta = (0.5 + 0.25 * a * omega_n2).max(0.0).sqrt();
-        format!(
-            "a second-order response with ωn = {:.1} rad/s, ζ = {zeta:.2}",
-            omega_n2.sqrt()
-        )
-    } else {
-        "a lag with feed-forward, or friction".to_string()
+    let ratio = found.response.ratio();
+    let class = match found.response.element() {
+        Some(Element::SecondOrder {
+            omega_n_rad_s,
+            zeta,
+        }) => {
+            format!("a second-order response with ωn = {omega_n_rad_s:.1} rad/s, ζ = {zeta:.2}")
+        }
+        _ => "a lag with feed-forward, or friction".to_string(),
     };
     format!("partial F = {partial_f:.1} (1, {dof}); κ4/κ2² = {ratio:.0}: {class}")
 }
@@ -382,7 +338,7 @@ fn dynamics_note(found: &Explained, weights: &[f64], at: usize) -> String {
 /// Probability of a chosen explanation: the best set with it against the best set that does without its cause. Both
 /// may take in what is too small to be stated.
 fn probability(found: &Explained, weights: &[f64], at: usize) -> f64 {
-    let products = found.ledger.white(weights);
+    let products = found.gram.white(weights);
     let best = |start: &[usize], barred: &[usize]| {
         let set = select(&products, &found.nuisance, &found.items, start, barred);
         evidence(&products, &found.nuisance, &found.items, &set)
@@ -410,7 +366,7 @@ fn probability(found: &Explained, weights: &[f64], at: usize) -> f64 {
 
 /// Chosen causes in whose place another cause does as well to the last digit, and its name: even odds are no finding.
 pub fn ties(found: &Explained) -> Vec<(usize, Cause)> {
-    let products = found.ledger.white(&found.all());
+    let products = found.gram.white(&found.all());
     let worth = |set: &[usize]| evidence(&products, &found.nuisance, &found.items, set);
     let Some(best) = worth(&found.chosen) else {
         return Vec::new();
@@ -442,7 +398,7 @@ const EVEN: f64 = 0.4;
 
 /// Other causes that would explain these data nearly as well in its place (evidence within 2·ln 20).
 fn look_alikes(found: &Explained, weights: &[f64], at: usize) -> Vec<String> {
-    let products = found.ledger.white(weights);
+    let products = found.gram.white(weights);
     let best = evidence(&products, &found.nuisance, &found.items, &found.chosen).unwrap_or(0.0);
     let own = found.chosen[at];
     let Kind::Cause { cause, .. } = &found.items[own].kind else {
@@ -506,51 +462,6 @@ pub fn effect_with(
         .into_iter()
         .map(|(parameter, value)| (parameter.name, value));
     Effect::new(*cause, *site, value, ci95, stated).ok()
-}
-
-/// One finding where both axes show the same cause of the same size.
-fn join_axes(findings: Vec<Finding>) -> Vec<Finding> {
-    let mut out: Vec<Finding> = Vec::new();
-    for finding in findings {
-        let twin = out.iter_mut().find(|other| {
-            let one_of_several = other.axis.is_some() || other.actuators.len() > 1;
-            // Where circles tell the slides apart, each keeps its own.
-            let apart = finding.cause.model().seat() == Seat::MachineOrOne;
-            !apart && other.cause == finding.cause && one_of_several && finding.axis.is_some()
-        });
-        match twin {
-            Some(twin) if alike(twin, &finding) => {
-                let halves =
-                    [&twin.estimate, &finding.estimate].map(|e| 0.5 * (e.ci95[1] - e.ci95[0]));
-                let value = 0.5 * (twin.estimate.value + finding.estimate.value);
-                let half = 0.5 * halves[0].hypot(halves[1]);
-                twin.axis = None;
-                for actuator in finding.actuators {
-                    if !twin.actuators.contains(&actuator) {
-                        twin.actuators.push(actuator);
-                    }
-                }
-                if finding.effect_um.max > twin.effect_um.max {
-                    twin.effect_um = finding.effect_um;
-                }
-                twin.remedy = statement::remedy(twin.cause, &twin.actuators, value);
-                twin.estimate.value = value;
-                twin.estimate.ci95 = [value - half, value + half];
-                twin.share_percent += finding.share_percent;
-                twin.rms_um = twin.rms_um.hypot(finding.rms_um);
-                twin.probability = twin.probability.max(finding.probability);
-                twin.effects.extend(finding.effects);
-            }
-            _ => out.push(finding),
-        }
-    }
-    out
-}
-
-fn alike(a: &Finding, b: &Finding) -> bool {
-    let width = |f: &Finding| f.estimate.ci95[1] - f.estimate.ci95[0];
-    let off = (a.estimate.value - b.estimate.value).abs();
-    off < width(a) + width(b) || off < 0.1 * a.estimate.value.abs()
 }
 
 #[cfg(test)]

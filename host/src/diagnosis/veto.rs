@@ -1,35 +1,55 @@
 //! The veto of the runs left out: a cause without which they are foretold better has no place in the model.
 //!
-//! Each radius is left out once, then each speed; the set is fitted on the runs that stay, shapes as they are. All of it
-//! are small sums of the ledger's products, so that every cause can be tried without.
+//! Each radius is left out once, then each speed (of two speeds each in one direction: what one speed says of another is
+//! nothing, so that every law of the speed would fail for want of runs). The set is fitted on the runs that stay, shapes as
+//! they are. All of it are small sums of Gram matrices, so that every cause can be tried without.
 use super::explained::{Explained, refit};
 use super::linear::{Factor, solve};
 use super::search::columns_of;
 use super::tangent;
 
+/// Radius (m), feed (m/s) and sense of travel (±1) of a run.
+type Circle = [f64; 3];
+
 /// Runs that are left out together: those of each radius, then those of each speed; nothing where all are alike.
-pub fn folds(radius_and_feed: &[[f64; 2]]) -> [Vec<Vec<usize>>; 2] {
-    [0, 1].map(|which| {
-        let mut values: Vec<f64> = radius_and_feed.iter().map(|run| run[which]).collect();
+pub fn folds(circles: &[Circle]) -> [Vec<Vec<usize>>; 2] {
+    let values = |which: usize| {
+        let mut values: Vec<f64> = circles.iter().map(|run| run[which]).collect();
         values.sort_by(f64::total_cmp);
         values.dedup_by(|a, b| (*a - *b).abs() < 1e-9 * b.abs());
-        if values.len() < 2 {
-            return Vec::new();
+        values
+    };
+    let with = |which: usize, value: f64| {
+        let same = move |i: &usize| (circles[*i][which] - value).abs() < 1e-9 * value.abs();
+        (0..circles.len()).filter(same)
+    };
+    let each = |which: usize| -> Vec<Vec<usize>> {
+        let of = |value: f64| with(which, value).collect();
+        match values(which) {
+            alone if alone.len() < 2 => Vec::new(),
+            values => values.into_iter().map(of).collect(),
         }
-        let of = |value: f64| {
-            let same = |i: &usize| (radius_and_feed[*i][which] - value).abs() < 1e-9 * value.abs();
-            (0..radius_and_feed.len()).filter(same).collect()
-        };
-        values.into_iter().map(of).collect()
-    })
+    };
+    let (feeds, ways) = (values(1), values(2));
+    let by_feed = match (feeds.len(), ways.len()) {
+        (2, 2) => feeds
+            .iter()
+            .flat_map(|feed| ways.iter().map(|way| (*feed, *way)))
+            .map(|(feed, way)| with(1, feed).filter(|&i| circles[i][2] == way).collect())
+            .filter(|runs: &Vec<usize>| !runs.is_empty())
+            .collect(),
+        (2, _) => Vec::new(),
+        _ => each(1),
+    };
+    [each(0), by_feed]
 }
 
 /// The same of an explained campaign.
 pub fn folds_of(found: &Explained) -> Vec<Vec<usize>> {
-    let runs: Vec<[f64; 2]> = found
+    let runs: Vec<Circle> = found
         .runs
         .iter()
-        .map(|run| [run.view.radius_m, run.programmed_m_s])
+        .map(|run| [run.view.radius_m, run.programmed_m_s, run.view.sign])
         .collect();
     folds(&runs).concat()
 }
@@ -38,7 +58,7 @@ pub fn folds_of(found: &Explained) -> Vec<Vec<usize>> {
 /// model's own parameters among them as far as they are determined beside the members. With one speed left, a static
 /// error of the size cannot be told from the servo, which then stays as all runs have it.
 pub fn determined(found: &Explained, weights: &[f64], set: &[usize]) -> (Vec<usize>, Vec<usize>) {
-    let products = found.ledger.white(weights);
+    let products = found.gram.white(weights);
     let whole = columns_of(&found.nuisance, &found.items, set);
     if Factor::new(&products, &whole).is_some() {
         return (set.to_vec(), whole);
@@ -70,11 +90,11 @@ fn failed_m2(found: &Explained, folds: &[Vec<usize>], set: &[usize]) -> f64 {
         let mut weights = found.all();
         out.iter().for_each(|&run| weights[run] = 0.0);
         let (_, columns) = determined(found, &weights, set);
-        let coefficients = solve(&found.ledger.white(&weights), &columns)
+        let coefficients = solve(&found.gram.white(&weights), &columns)
             .map_or_else(Vec::new, |solution| solution.coefficients);
         let mut only = vec![0.0; found.runs.len()];
         out.iter().for_each(|&run| only[run] = 1.0);
-        let plain = found.ledger.plain(&only);
+        let plain = found.gram.plain(&only);
         let mut left = plain.at(0, 0);
         for (&a, x) in columns.iter().zip(&coefficients) {
             left -= 2.0 * x * plain.at(a, 0);
@@ -134,15 +154,27 @@ mod tests {
 
     #[test]
     fn runs_go_out_by_radius_and_by_feed() {
-        let runs = [[0.1, 0.2], [0.1, 0.4], [0.3, 0.2]];
+        let runs = [[0.1, 0.2, 1.0], [0.1, 0.4, 1.0], [0.3, 0.6, 1.0]];
         assert_eq!(
             folds(&runs),
-            [vec![vec![0, 1], vec![2]], vec![vec![0, 2], vec![1]]]
+            [vec![vec![0, 1], vec![2]], vec![vec![0], vec![1], vec![2]]]
         );
         assert_eq!(
             folds(&runs[..2])[0],
             Vec::<Vec<usize>>::new(),
             "one radius cannot go out"
         );
+    }
+
+    #[test]
+    fn of_two_speeds_each_goes_out_in_one_direction() {
+        let runs = [
+            [0.1, 0.2, 1.0],
+            [0.1, 0.4, 1.0],
+            [0.1, 0.2, -1.0],
+            [0.1, 0.4, -1.0],
+        ];
+        assert_eq!(folds(&runs)[1], [vec![2], vec![0], vec![3], vec![1]]);
+        assert_eq!(folds(&runs[..2])[1], Vec::<Vec<usize>>::new());
     }
 }

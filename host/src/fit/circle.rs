@@ -1,5 +1,5 @@
 //! The geometric circle fit on all cores.
-use super::lanes;
+use super::simd_sums;
 use giotto_shared::circle::{self, CircleError, CircleFit, Merge, Part, Points, Walk, Xy};
 use rayon::prelude::*;
 
@@ -20,12 +20,12 @@ impl Points for Parallel<'_> {
         let (x, y) = (self.0.x(), self.0.y());
         let chunk = BLOCKS_A_TASK * walk.stride();
         if x.len() <= chunk {
-            return lanes::sum(part, walk, x, y);
+            return simd_sums::sum(part, walk, x, y);
         }
         let parts: Vec<P::Sum> = x
             .par_chunks(chunk)
             .zip(y.par_chunks(chunk))
-            .map(|(x, y)| lanes::sum(part, walk, x, y))
+            .map(|(x, y)| simd_sums::sum(part, walk, x, y))
             .collect();
         let mut total = P::Sum::default();
         for part in &parts {
@@ -39,6 +39,19 @@ impl Points for Parallel<'_> {
 ///
 /// # Errors
 /// As [`circle::fit`]; also [`CircleError::Lengths`].
+///
+/// ```
+/// use giotto::fit::fit_circle;
+///
+/// let (x, y): (Vec<f64>, Vec<f64>) = (0..1000)
+///     .map(|i| f64::from(i) * 0.1)
+///     .map(|angle| (0.3 + 0.1 * angle.cos(), -0.2 + 0.1 * angle.sin()))
+///     .unzip();
+/// let fit = fit_circle(&x, &y)?;
+/// assert!((fit.circle.radius - 0.1).abs() < 1e-12);
+/// assert!((fit.circle.centre[0] - 0.3).abs() < 1e-12);
+/// # Ok::<(), giotto_shared::circle::CircleError>(())
+/// ```
 pub fn fit_circle(x: &[f64], y: &[f64]) -> Result<CircleFit, CircleError> {
     circle::fit(&Parallel(Xy::new(x, y)?))
 }

@@ -8,7 +8,7 @@
 //! | `stepwise` | [`stepwise`](stepwise()): enter and remove by partial F (Eq. 4–11, 17–19) |
 //! | `quantile` | critical values of F and t |
 //! | `circle` | the geometric circle fit on all cores |
-//! | `lanes` | sums over points with the vectors that this processor has |
+//! | `simd_sums` | sums over points with the vectors that this processor has |
 //! | `radius` | [`RadiusFit`]: β1, β2 with intervals (Eq. 15–16, 20–21), offsets, prediction of radii not used |
 //! | `heldout` | how well circles that were not fitted are predicted |
 //!
@@ -17,11 +17,11 @@
 mod by_radius;
 mod circle;
 mod heldout;
-pub(crate) mod lanes;
 mod least_squares;
 mod quantile;
 mod radius;
 mod reduced;
+pub(crate) mod simd_sums;
 mod stepwise;
 #[cfg(test)]
 #[allow(

@@ -6,6 +6,16 @@ use statrs::distribution::{Continuous, ContinuousCDF, FisherSnedecor, Normal, St
 ///
 /// # Errors
 /// [`FitError::Quantile`] for `alpha` outside (0, 1) or no degrees of freedom.
+///
+/// ```
+/// use giotto::fit::{critical_f, critical_t, FitError};
+///
+/// // The bar of the paper's partial F: F_{0.05; 1; 24} = 4.26, the square of t.
+/// assert!((critical_f(0.05, 1, 24)? - 4.26).abs() < 0.005);
+/// assert!((critical_t(0.05, 24)?.powi(2) - critical_f(0.05, 1, 24)?).abs() < 1e-12);
+/// assert!(critical_f(0.05, 0, 24).is_err());
+/// # Ok::<(), FitError>(())
+/// ```
 pub fn critical_f(alpha: f64, numerator: usize, denominator: usize) -> Result<f64, FitError> {
     let error = FitError::Quantile {
         alpha,

@@ -108,6 +108,31 @@ impl Point {
 }
 
 /// The fitted radius model.
+///
+/// ```
+/// use giotto::fit::{FitError, Observation, Options, RadiusFit};
+///
+/// // Sizes as the paper's robot would have them, with half a micrometre that alternates for scatter.
+/// let mut runs = Vec::new();
+/// for radius_m in [0.1, 0.15, 0.3] {
+///     for (i, feed_m_s) in [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7].into_iter().enumerate() {
+///         let (x1, x2) = (feed_m_s * feed_m_s / radius_m, feed_m_s.powi(4) / radius_m.powi(3));
+///         let scatter_m = if i % 2 == 0 { 0.5e-6 } else { -0.5e-6 };
+///         runs.push(Observation {
+///             radius_m,
+///             feed_m_s,
+///             radius_error_m: -23.29e-6 * x1 - 0.23e-6 * x2 + scatter_m,
+///             out_of_roundness_m: None,
+///         });
+///     }
+/// }
+/// // Trained on one radius, it predicts the other two.
+/// let fit = RadiusFit::new(&runs, Options { train_radius_m: Some(0.1), ..Options::default() })?;
+/// assert!((fit.model.beta1_s2 + 23.29e-6).abs() < 0.5e-6);
+/// assert!(fit.ci95[1][0] < -0.23e-6 && -0.23e-6 < fit.ci95[1][1]);
+/// assert!(fit.heldout.is_some_and(|heldout| heldout.rms_m < 1e-6));
+/// # Ok::<(), FitError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct RadiusFit {
     /// How it was fitted.
@@ -311,6 +336,44 @@ fn not_finite<'a>(observations: impl Iterator<Item = &'a Observation> + Clone) -
     })
 }
 
+/// Why nothing is left to be fitted.
+fn nothing_to_fit(groups: &[OfRadius<'_>], options: &Options) -> FitError {
+    match options.train_radius_m {
+        Some(wanted) => FitError::NoSuchRadius {
+            wanted_mm: wanted * 1e3,
+            present_mm: groups
+                .iter()
+                .map(|g| (g.radius_m * 1e9).round() / 1e6)
+                .collect(),
+        },
+        None => FitError::TooFew {
+            observations: 0,
+            parameters: 3,
+        },
+    }
+}
+
+/// How well the other radii predict one; `None` where they alone cannot determine the model.
+fn of_the_others(
+    group: &OfRadius<'_>,
+    own: &Reduction,
+    train: &[&Reduction],
+    options: &Options,
+) -> Result<Option<Sums>, FitError> {
+    let others: Vec<&Reduction> = train
+        .iter()
+        .copied()
+        .filter(|radius| !std::ptr::eq(*radius, own))
+        .collect();
+    match core_of(&others, options) {
+        Ok(fold) => Ok(Some(
+            Beside::not_fitted(group, &fold.model, options.offset).score(group),
+        )),
+        Err(FitError::TooFew { .. } | FitError::Collinear { .. }) => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
 impl RadiusFit {
     /// Fits the model to `observations`.
     ///
@@ -336,19 +399,7 @@ impl RadiusFit {
         let reductions: Vec<Option<Reduction>> = groups.iter().map(reduction).collect();
         let train: Vec<&Reduction> = reductions.iter().flatten().collect();
         if train.is_empty() {
-            return Err(match options.train_radius_m {
-                Some(wanted) => FitError::NoSuchRadius {
-                    wanted_mm: wanted * 1e3,
-                    present_mm: groups
-                        .iter()
-                        .map(|g| (g.radius_m * 1e9).round() / 1e6)
-                        .collect(),
-                },
-                None => FitError::TooFew {
-                    observations: 0,
-                    parameters: 3,
-                },
-            });
+            return Err(nothing_to_fit(&groups, &options));
         }
         if train.iter().any(|radius| !radius.is_finite())
             && let Some(error) = not_finite(observations.iter().filter(|o| fitted(o)))
@@ -370,19 +421,7 @@ impl RadiusFit {
             let predicted = match own {
                 None => Some(beside.score(group)),
                 Some(own) if options.train_radius_m.is_none() && groups.len() > 1 => {
-                    let others: Vec<&Reduction> = train
-                        .iter()
-                        .copied()
-                        .filter(|radius| !std::ptr::eq(*radius, own))
-                        .collect();
-                    // What the other radii alone cannot determine is not predicted.
-                    match core_of(&others, &options) {
-                        Ok(fold) => Some(
-                            Beside::not_fitted(group, &fold.model, options.offset).score(group),
-                        ),
-                        Err(FitError::TooFew { .. } | FitError::Collinear { .. }) => None,
-                        Err(error) => return Err(error),
-                    }
+                    of_the_others(group, own, &train, &options)?
                 }
                 Some(_) => None,
             };

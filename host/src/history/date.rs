@@ -2,6 +2,15 @@
 use std::fmt;
 
 /// A day.
+///
+/// ```
+/// use giotto::history::Date;
+///
+/// // The day of a measurement is found in the name of its folder.
+/// let day = Date::find("mill-2026-05-14-after").unwrap();
+/// assert_eq!(day.civil(), (2026, 5, 14));
+/// assert_eq!(Date::new(2026, 2, 29), None);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Date {
     /// Days since 1970-01-01.

@@ -6,7 +6,6 @@ use super::question::Question;
 use crate::campaign::Campaign;
 use crate::causes::{Cause, RunView};
 use crate::diagnosis::Diagnosis;
-use crate::diagnosis::survey::Response;
 use nalgebra::DMatrix;
 use serde::Serialize;
 
@@ -166,7 +165,7 @@ fn problem(
     question: &Question,
     circles: &[Circle],
 ) -> Problem {
-    let response = Response::of(&diagnosis.model.servo);
+    let response = diagnosis.model.servo.response();
     let seen: Vec<Circle> = campaign
         .runs
         .iter()

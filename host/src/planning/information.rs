@@ -3,7 +3,7 @@
 use super::grid::Circle;
 use crate::causes::{Cause, RunView, Site};
 use crate::diagnosis::Diagnosis;
-use crate::diagnosis::basis::{Basis, COLUMNS, ORDERS};
+use crate::diagnosis::low_orders::{Basis, COLUMNS, ORDERS};
 use crate::diagnosis::spread::Spread;
 use crate::diagnosis::survey::Response;
 use crate::diagnosis::vector::dot;

@@ -1,8 +1,8 @@
 //! One axis in time: the linear chain, then what remembers the last reversal (backlash, friction).
 use super::chain::{Chain, Discrete};
 use super::command::{Knots, hermite};
+use super::hysteresis::{Hysteresis, turning_point};
 use super::machine::{AccDec, Machine};
-use super::memory::{Memory, turning_point};
 
 /// Steps of one length.
 #[derive(Clone, Copy, Debug)]
@@ -26,13 +26,13 @@ pub(super) struct AxisPoint {
 }
 
 impl AxisPoint {
-    pub(super) fn new([drive_m, velocity_m_s]: [f64; 2], memory: Option<&Memory>) -> Self {
-        let error_m = memory.map_or(0.0, |m| m.error_m(drive_m, velocity_m_s));
+    pub(super) fn new([drive_m, velocity_m_s]: [f64; 2], hysteresis: Option<&Hysteresis>) -> Self {
+        let error_m = hysteresis.map_or(0.0, |m| m.error_m(drive_m, velocity_m_s));
         Self {
             drive_m,
             velocity_m_s,
             error_m,
-            sign: memory.map_or(0.0, |m| m.sign),
+            sign: hysteresis.map_or(0.0, |m| m.sign),
         }
     }
 }
@@ -74,7 +74,7 @@ fn motion_of<const S: usize>(
     let h = grid.step_s;
     let start = input(grid.start_s, grid.start_s + 0.5 * h);
     let mut stepper = chain.at_rest::<S>(start[0]);
-    let mut memory = Memory::new(machine, axis, start, h);
+    let mut hysteresis = Hysteresis::new(machine, axis, start, h);
     let mut points = Vec::with_capacity(times.size_hint().0);
     for k in 0..grid.steps {
         let t0 = grid.start_s + h * k as f64;
@@ -86,19 +86,19 @@ fn motion_of<const S: usize>(
         let [p1, v1] = stepper.look(end);
         let y = [p0, v0, p1, v1];
 
-        let mut turn = memory.as_ref().and_then(|_| turning_point(y, h));
+        let mut turn = hysteresis.as_ref().and_then(|_| turning_point(y, h));
         let mut behind = 0.0;
         let last = k + 1 == grid.steps;
         while let Some(t) = times.next_if(|t| *t < t0 + h || last) {
             let s = ((t - t0) / h).clamp(0.0, 1.0);
-            if let Some(memory) = &mut memory {
-                memory.follow(y, [behind, s], &mut turn);
+            if let Some(hysteresis) = &mut hysteresis {
+                hysteresis.follow(y, [behind, s], &mut turn);
                 behind = s;
             }
-            points.push(AxisPoint::new(hermite(y, h, s), memory.as_ref()));
+            points.push(AxisPoint::new(hermite(y, h, s), hysteresis.as_ref()));
         }
-        if let Some(memory) = &mut memory {
-            memory.follow(y, [behind, 1.0], &mut turn);
+        if let Some(hysteresis) = &mut hysteresis {
+            hysteresis.follow(y, [behind, 1.0], &mut turn);
         }
     }
     points

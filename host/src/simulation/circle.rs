@@ -3,9 +3,9 @@ use super::axis::{self, AxisPoint, Grid};
 use super::chain::{Chain, Discrete};
 use super::command::Knots;
 use super::geometry::{self, Place};
+use super::hysteresis::Hysteresis;
 use super::machine::{AccDec, Machine};
-use super::memory::Memory;
-use super::orbit::{self, PIECE, Round};
+use super::steady_circle::{self, PIECE, Round};
 use super::wave::Turns;
 use crate::campaign::{Run, Samples};
 use giotto_shared::{Direction, Frame};
@@ -140,6 +140,19 @@ impl Trace {
 /// The first sample is taken when the *command* passes the start angle, so the tool is behind it by the lag
 /// and whatever the machine does in place appears turned by it, as in a real recording. Radius, feed and
 /// the machine must be positive and finite ([`Machine::check`]); what is not comes back as NaN.
+///
+/// ```
+/// use giotto::campaign::Direction;
+/// use giotto::simulation::machine::PositionLoop;
+/// use giotto::simulation::{CircleTest, Machine, circle};
+///
+/// let lag = PositionLoop { kv_per_s: 50.0, feed_forward: 0.0 };
+/// let machine = Machine { servo: [lag; 3], ..Machine::default() };
+/// let trace = circle(&machine, &CircleTest::new(0.1, 0.5, Direction::Ccw));
+/// // R/√(1 + (ω/kv)²) − R with ω = 5 rad/s.
+/// let expected_m = 0.1 * (1.0 / 1.01_f64.sqrt() - 1.0);
+/// assert!((trace.mean_deviation_m() - expected_m).abs() < 1e-9);
+/// ```
 pub fn circle(machine: &Machine, test: &CircleTest) -> Trace {
     let feed = match machine.centripetal_limit_m_s2 {
         Some(limit) => test.feed_m_s.min((limit * test.radius_m).sqrt()),
@@ -237,7 +250,7 @@ impl Lap<'_> {
                     known.push(Discrete::new(chain, step_s));
                     known.len() - 1
                 });
-                orbit::axis(round, axis, shares, &known[at])
+                steady_circle::axis(round, axis, shares, &known[at])
             })
         });
         let piece = samples.min((PIECE / every).max(1));
@@ -284,7 +297,7 @@ impl Lap<'_> {
     /// Steps from rest, until nothing is left of the start and what remembers reversals has seen one, then the lap.
     fn grid(&self, axis: usize, step_s: f64) -> Grid {
         let machine = self.machine;
-        let reversal_s = if Memory::needed(machine, axis) {
+        let reversal_s = if Hysteresis::needed(machine, axis) {
             ONE_REVERSAL_TURNS * self.turn_s
         } else {
             0.0

@@ -1,6 +1,7 @@
 //! Changes to the chain that a diagnosis asks for: a response of higher order, axes that differ.
-use super::machine::{Machine, PositionLoop, SecondOrder};
+use super::machine::{Machine, PositionLoop};
 use giotto_shared::Plane;
+use giotto_shared::model::{Element, Response};
 
 impl Machine {
     /// Gives a chain of one lag per axis the fourth-order coefficient β2 (s⁴) beyond the lag's own 3κ2²/8, with
@@ -8,25 +9,20 @@ impl Machine {
     /// of the loop; positive: feed-forward in the loop. A chain without a finite lag gets mechanics of its κ2 = 0.
     pub fn add_beta2(&mut self, beta2_s4: f64) {
         for axis in 0..3 {
-            let a = self.servo[axis].kv_per_s.powi(-2);
-            let b = -2.0 * beta2_s4;
-            if b > 0.0 {
-                let omega_n2 = b.powf(-0.5);
-                // a = (4ζ² − 2)/ωn²
-                let zeta = (0.5 + 0.25 * a * omega_n2).max(1e-4).sqrt();
-                self.mechanics[axis] = Some(SecondOrder {
-                    omega_n_rad_s: omega_n2.sqrt(),
-                    zeta,
-                });
-                self.servo[axis] = PositionLoop::default();
-            } else if b < 0.0 && a > 0.0 {
-                // (1 + ω²/k²)/(1 + c²ω²) = 1 + aω² + bω⁴ + …, c = feed-forward time
-                let c2 = -b / a;
-                let lag2 = a + c2;
-                self.servo[axis] = PositionLoop {
-                    kv_per_s: lag2.powf(-0.5),
-                    feed_forward: (c2 / lag2).sqrt(),
-                };
+            let lag = Element::Lag {
+                kv_per_s: self.servo[axis].kv_per_s,
+            };
+            let wanted = Response {
+                b_s4: -2.0 * beta2_s4,
+                ..Response::of(&lag).unwrap_or_default()
+            };
+            match wanted.element() {
+                Some(mechanics @ Element::SecondOrder { .. }) => {
+                    self.set_axis(axis, mechanics);
+                    self.servo[axis] = PositionLoop::default();
+                }
+                Some(servo @ Element::FeedForwardLag { .. }) => self.set_axis(axis, servo),
+                _ => {}
             }
         }
     }
@@ -62,21 +58,23 @@ impl Machine {
         let shares = [0.5 * delta_kappa2_s2, -0.5 * delta_kappa2_s2];
         let axes = plane.axes().map(|axis| axis.index());
         for (at, (axis, share)) in axes.into_iter().zip(shares).enumerate() {
-            let lag = 1.0 / self.servo[axis].kv_per_s;
-            let square = lag * lag + share;
-            if let (true, Some(mechanics)) =
-                (square <= 0.0 || lag == 0.0, &mut self.mechanics[axis])
-            {
-                // κ2 = (4ζ² − 2)/ωn², delay 2ζ/ωn
-                let omega_n = mechanics.omega_n_rad_s;
-                let zeta = (mechanics.zeta.powi(2) + 0.25 * share * omega_n * omega_n)
-                    .max(1e-4)
-                    .sqrt();
-                delay[at] = 2.0 * (zeta - mechanics.zeta) / omega_n;
-                mechanics.zeta = zeta;
-            } else if square > 0.0 {
-                self.servo[axis].kv_per_s = square.powf(-0.5);
-                delay[at] = square.sqrt() - lag;
+            let lag = Element::Lag {
+                kv_per_s: self.servo[axis].kv_per_s,
+            };
+            let by_loop = lag.with_more_kappa2(share);
+            let changed = match (by_loop, self.mechanics[axis]) {
+                (Some(changed), _) if lag.delay_s() > 0.0 => Some(changed),
+                (_, Some(mechanics)) => mechanics.element().with_more_kappa2(share),
+                (by_loop, None) => by_loop,
+            };
+            if let Some((element, later_s)) = changed {
+                if let Element::Lag { kv_per_s } = element {
+                    // The feed-forward of the loop stays.
+                    self.servo[axis].kv_per_s = kv_per_s;
+                } else {
+                    self.set_axis(axis, element);
+                }
+                delay[at] = later_s;
             }
         }
         self.split_dead_time(plane, delay[1] - delay[0]);

@@ -1,24 +1,13 @@
 //! A machine from a model file: elements whose cumulants are those of the fitted radius law.
 use super::machine::{Machine, MachineError, PositionLoop, SecondOrder};
 use crate::model_file::{ModelFile, Servo};
-
-/// Above this κ4/κ2² the feed-forward lag that has it (a² = ½ at 18) is too slow to be a likely machine.
-const FEED_FORWARD_MAX_RATIO: f64 = 18.0;
-/// Below this, κ4/κ2² is 6 within the rounding of a file: one plain lag.
-const LAG_RATIO_TOLERANCE: f64 = 1e-9;
+use giotto_shared::model::{Cumulants, Element};
 
 impl Machine {
     /// The machine of a model: its servo law, and its effects as their causes put them in.
     ///
-    /// `Lag` and `SecondOrder` are taken as they are. `Beta` becomes the simplest stable chain with the same
-    /// κ2 = −2β1 and κ4 = 24β2 − 3κ2²:
-    ///
-    /// | κ | chain |
-    /// |---|---|
-    /// | both 0 | ideal |
-    /// | κ4 < 6κ2² (and < 3κ2² if κ2 < 0) | second order, ωn⁴ = 12/(6κ2² − κ4), 1 − 2ζ² = −κ2ωn²/2 |
-    /// | κ2 > 0, 6 ≤ κ4/κ2² ≤ 18 | lag with feed-forward, a² = (κ4/κ2² − 6)/(κ4/κ2² + 6), kv² = (1 − a²)/κ2 |
-    /// | else | lag 1/kv² = p and a second-order element with what remains, p = (κ2 + √(2κ4 − 2κ2²))/3 |
+    /// `Lag` and `SecondOrder` are taken as they are, `Beta` becomes [`Cumulants::chain`]: the simplest stable chain with its
+    /// κ2 and κ4.
     ///
     /// The chain agrees with Eq. 15 through ω⁴ and departs from it by terms of ω⁶: for the paper's β by
     /// 0.3 µm of 120 µm at R = 100 mm, 700 mm/s (ω = 7 rad/s).
@@ -39,8 +28,8 @@ impl Machine {
 
     /// Gives every axis so much delay behind the command, s: what their chain does not have of it is dead time.
     pub fn set_delay(&mut self, delay_s: f64) {
-        let mechanics = self.mechanics[0].map_or(0.0, |m| 2.0 * m.zeta / m.omega_n_rad_s);
-        let own_s = mechanics + (1.0 - self.servo[0].feed_forward) / self.servo[0].kv_per_s;
+        let mechanics = self.mechanics[0].map_or(0.0, |m| m.element().delay_s());
+        let own_s = mechanics + self.servo[0].element().delay_s();
         self.dead_time_s = [(delay_s - own_s).max(0.0); 3];
     }
 
@@ -50,86 +39,89 @@ impl Machine {
     /// As [`Self::from_model`].
     pub fn from_servo(servo: &Servo) -> Result<Self, MachineError> {
         let mut machine = Self::default();
-        match *servo {
-            Servo::Lag { kv_per_s } => {
-                machine.servo = [PositionLoop {
-                    kv_per_s,
-                    feed_forward: 0.0,
-                }; 3]
-            }
-            Servo::SecondOrder {
-                omega_n_rad_s,
-                zeta,
-            } => {
-                machine.mechanics = [Some(SecondOrder {
-                    omega_n_rad_s,
-                    zeta,
-                }); 3];
-            }
-            Servo::Beta {
-                beta1_s2, beta2_s4, ..
-            } => {
-                for (name, value) in [("beta1_s2", beta1_s2), ("beta2_s4", beta2_s4)] {
-                    if !value.is_finite() {
-                        return Err(MachineError {
-                            name,
-                            value,
-                            allowed: "finite numbers",
-                        });
-                    }
+        if let Some(element) = servo.element() {
+            machine.set_servo(element);
+        } else {
+            let beta = servo.beta();
+            for (name, value) in [("beta1_s2", beta.beta1_s2), ("beta2_s4", beta.beta2_s4)] {
+                if !value.is_finite() {
+                    return Err(MachineError {
+                        name,
+                        value,
+                        allowed: "finite numbers",
+                    });
                 }
-                machine.set_beta(beta1_s2, beta2_s4);
             }
+            machine.set_chain(Cumulants::from(beta).chain().into_iter().flatten());
         }
         machine.check()?;
         Ok(machine)
     }
 
-    fn set_beta(&mut self, beta1: f64, beta2: f64) {
-        let k2 = -2.0 * beta1;
-        let k4 = 24.0 * beta2 - 3.0 * k2 * k2;
-        if k2 == 0.0 && k4 == 0.0 {
-            return;
+    /// Gives every axis a chain of elements, at most one of each kind.
+    fn set_chain(&mut self, chain: impl IntoIterator<Item = Element<f64>>) {
+        for element in chain {
+            self.set_servo(element);
         }
-        let ratio = k4 / (k2 * k2);
-        let second_order = if k2 < 0.0 {
-            k4 < 3.0 * k2 * k2
-        } else {
-            k4 < 6.0 * k2 * k2
-        };
-        if k2 > 0.0 && (ratio - 6.0).abs() < LAG_RATIO_TOLERANCE {
-            self.servo = [PositionLoop {
-                kv_per_s: k2.powf(-0.5),
-                feed_forward: 0.0,
-            }; 3];
-        } else if second_order {
-            self.mechanics = [Some(second_order_of(k2, k4)); 3];
-        } else if k2 > 0.0 && ratio <= FEED_FORWARD_MAX_RATIO {
-            let a2 = (ratio - 6.0) / (ratio + 6.0);
-            self.servo = [PositionLoop {
-                kv_per_s: ((1.0 - a2) / k2).sqrt(),
-                feed_forward: a2.sqrt(),
-            }; 3];
-        } else {
-            // With p from 3(κ2 − p)² + 6p² = 2κ4 the rest has ζ² > 0 with room to spare.
-            let p = (k2 + (2.0 * k4 - 2.0 * k2 * k2).sqrt()) / 3.0;
-            self.servo = [PositionLoop {
-                kv_per_s: p.powf(-0.5),
-                feed_forward: 0.0,
-            }; 3];
-            self.mechanics = [Some(second_order_of(k2 - p, k4 - 6.0 * p * p)); 3];
+    }
+
+    /// Gives every axis this element: a lag, with feed-forward or without, as the position loop, a second-order element as
+    /// the mechanics. Elements that belong to the command are left out: no model holds them.
+    pub fn set_servo(&mut self, element: Element<f64>) {
+        for axis in 0..3 {
+            self.set_axis(axis, element);
+        }
+    }
+
+    /// The same of one axis (0 X, 1 Y, 2 Z).
+    pub(super) fn set_axis(&mut self, axis: usize, element: Element<f64>) {
+        match element {
+            Element::Lag { kv_per_s } => {
+                self.servo[axis] = PositionLoop {
+                    kv_per_s,
+                    feed_forward: 0.0,
+                }
+            }
+            Element::FeedForwardLag {
+                kv_per_s,
+                feed_forward,
+            } => {
+                self.servo[axis] = PositionLoop {
+                    kv_per_s,
+                    feed_forward,
+                }
+            }
+            Element::SecondOrder {
+                omega_n_rad_s,
+                zeta,
+            } => {
+                self.mechanics[axis] = Some(SecondOrder {
+                    omega_n_rad_s,
+                    zeta,
+                })
+            }
+            _ => {}
         }
     }
 }
 
-/// Second-order element of given cumulants; real for κ4 < 6κ2² (κ2 ≥ 0) and κ4 < 3κ2² (κ2 < 0).
-fn second_order_of(k2: f64, k4: f64) -> SecondOrder {
-    let omega_n_squared = (12.0 / (6.0 * k2 * k2 - k4)).sqrt();
-    // 1 − 2ζ² = −κ2ωn²/2
-    let zeta = (0.5 * (1.0 + 0.5 * k2 * omega_n_squared)).sqrt();
-    SecondOrder {
-        omega_n_rad_s: omega_n_squared.sqrt(),
-        zeta,
+impl PositionLoop {
+    /// The loop as an element.
+    pub fn element(&self) -> Element<f64> {
+        Element::FeedForwardLag {
+            kv_per_s: self.kv_per_s,
+            feed_forward: self.feed_forward,
+        }
+    }
+}
+
+impl SecondOrder {
+    /// The mechanics as an element.
+    pub fn element(&self) -> Element<f64> {
+        Element::SecondOrder {
+            omega_n_rad_s: self.omega_n_rad_s,
+            zeta: self.zeta,
+        }
     }
 }
 

@@ -110,6 +110,24 @@ pub struct AxisSpec {
     pub cyclic_phase_deg: Option<f64>,
 }
 
+/// Friction of an axis, by what its own table or that of all axes says; `None` where neither names any.
+fn friction(get: &impl Fn(fn(&AxisSpec) -> Option<f64>) -> Option<f64>) -> Option<Friction> {
+    let (peak, stick) = (get(|a| a.friction_peak_um), get(|a| a.stick_slip_um));
+    if peak.is_none() && stick.is_none() {
+        return None;
+    }
+    let standard = Friction::default();
+    Some(Friction {
+        peak_m: peak.unwrap_or(0.0) * 1e-6,
+        decay_s: get(|a| a.friction_decay_s).unwrap_or(standard.decay_s),
+        rise_s: get(|a| a.friction_rise_s).unwrap_or(standard.rise_s),
+        presliding_m: get(|a| a.friction_presliding_um).map_or(standard.presliding_m, |v| v * 1e-6),
+        stick_slip_m: stick.unwrap_or(0.0) * 1e-6,
+        stick_travel_m: get(|a| a.stick_travel_um).map_or(standard.stick_travel_m, |v| v * 1e-6),
+        stick_speed_m_s: get(|a| a.stick_speed_mm_s).map_or(standard.stick_speed_m_s, |v| v * 1e-3),
+    })
+}
+
 impl MachineSpec {
     /// The machine.
     ///
@@ -172,22 +190,7 @@ impl MachineSpec {
             machine.scale[axis] = get(|a| a.scale_um_per_m).unwrap_or(0.0) * 1e-6;
             let bows = across(axis, own.straightness_across)?;
             machine.straightness_per_m[axis][bows] = get(|a| a.straightness_per_m).unwrap_or(0.0);
-            let (peak, stick) = (get(|a| a.friction_peak_um), get(|a| a.stick_slip_um));
-            if peak.is_some() || stick.is_some() {
-                let standard = Friction::default();
-                machine.friction[axis] = Some(Friction {
-                    peak_m: peak.unwrap_or(0.0) * 1e-6,
-                    decay_s: get(|a| a.friction_decay_s).unwrap_or(standard.decay_s),
-                    rise_s: get(|a| a.friction_rise_s).unwrap_or(standard.rise_s),
-                    presliding_m: get(|a| a.friction_presliding_um)
-                        .map_or(standard.presliding_m, |v| v * 1e-6),
-                    stick_slip_m: stick.unwrap_or(0.0) * 1e-6,
-                    stick_travel_m: get(|a| a.stick_travel_um)
-                        .map_or(standard.stick_travel_m, |v| v * 1e-6),
-                    stick_speed_m_s: get(|a| a.stick_speed_mm_s)
-                        .map_or(standard.stick_speed_m_s, |v| v * 1e-3),
-                });
-            }
+            machine.friction[axis] = friction(&get);
             if let Some(amplitude) = get(|a| a.cyclic_um) {
                 let Some(pitch) = get(|a| a.cyclic_pitch_mm) else {
                     return Err(missing("cyclic_pitch_mm", "a number beside cyclic_um"));

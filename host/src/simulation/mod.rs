@@ -20,13 +20,13 @@ mod drive;
 mod extend;
 mod from_model;
 mod geometry;
+mod hysteresis;
 mod instrument;
 pub mod machine;
 mod machine_spec;
-mod memory;
-mod orbit;
 mod plan;
 pub mod plan_file;
+mod steady_circle;
 mod wave;
 
 pub use circle::{CircleTest, MAX_RATE_HZ, SAMPLES_PER_TURN, Trace, ballbar_samples, circle};

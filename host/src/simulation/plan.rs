@@ -48,6 +48,20 @@ fn draws(seed: u64, stream: u64) -> ChaCha8Rng {
 }
 
 /// Runs a plan. The same plan and seed give the same campaign, whatever the number of threads.
+///
+/// ```
+/// use giotto::simulation::{Plan, campaign};
+/// # use std::path::Path;
+/// let plan = Plan::parse(
+///     "[instrument]\nnoise_um = 1.0\n[grid]\nradii_mm = [100.0]\nfeeds_mm_s = [50.0]\nrepeats = 3",
+///     Path::new("plan.toml"),
+/// )?;
+/// // Both directions, three times; one seed is one campaign.
+/// assert_eq!(campaign(&plan, 1).runs.len(), 6);
+/// assert_eq!(campaign(&plan, 1), campaign(&plan, 1));
+/// assert_ne!(campaign(&plan, 1), campaign(&plan, 2));
+/// # Ok::<(), giotto::toml_file::TomlFileError>(())
+/// ```
 pub fn campaign(plan: &Plan, seed: u64) -> Campaign {
     let mut tests = plan.tests.clone();
     if plan.shuffle {

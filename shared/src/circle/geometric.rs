@@ -235,6 +235,25 @@ impl Surface {
             [variance * cross[0], variance * cross[1], variance * radius],
         ])
     }
+
+    /// The fit that ends here, of this `[radius, rss]`.
+    fn report(
+        &self,
+        centre: [f64; 2],
+        [radius, rss]: [f64; 2],
+        passes: usize,
+        stopped: Stop,
+    ) -> CircleFit {
+        CircleFit {
+            circle: Circle { centre, radius },
+            covariance: self.covariance(rss),
+            rss,
+            rms: Float::sqrt(rss / self.n()),
+            points: self.count,
+            passes,
+            stopped,
+        }
+    }
 }
 
 /// Refines a circle to the least-squares one. `moments` are those of `points`, or of a fair sample of them: they give the
@@ -276,21 +295,10 @@ pub(super) fn refine_walk(
     let mut centre = [start.centre[0] - origin[0], start.centre[1] - origin[1]];
     let mut here = surface(centre, start.radius);
     let (mut passes, mut shift) = (1, 0.0);
-    let report =
-        |centre: [f64; 2], at: &Surface, radius: f64, rss: f64, passes: usize, stopped: Stop| {
-            CircleFit {
-                circle: Circle {
-                    centre: [origin[0] + centre[0], origin[1] + centre[1]],
-                    radius,
-                },
-                covariance: at.covariance(rss),
-                rss,
-                rms: Float::sqrt(rss / at.n()),
-                points: at.count,
-                passes,
-                stopped,
-            }
-        };
+    let report = |centre: [f64; 2], at: &Surface, size: [f64; 2], passes, stopped| {
+        let centre = [origin[0] + centre[0], origin[1] + centre[1]];
+        at.report(centre, size, passes, stopped)
+    };
     loop {
         if !here.rss.is_finite() || !here.radius.is_finite() {
             return Err(CircleError::NonFinite);
@@ -310,17 +318,11 @@ pub(super) fn refine_walk(
             let radius =
                 here.radius - (here.mean_normal[0] * step[0] + here.mean_normal[1] * step[1]);
             let rss = (here.rss + here.gradient[0] * step[0] + here.gradient[1] * step[1]).max(0.0);
-            return Ok(report(to, &here, radius, rss, passes, Stop::Converged));
+            return Ok(report(to, &here, [radius, rss], passes, Stop::Converged));
         }
         if passes >= MAX_PASSES {
-            return Ok(report(
-                centre,
-                &here,
-                here.radius,
-                here.rss,
-                passes,
-                Stop::PassLimit,
-            ));
+            let size = [here.radius, here.rss];
+            return Ok(report(centre, &here, size, passes, Stop::PassLimit));
         }
         let there = surface(to, here.radius);
         passes += 1;
@@ -329,14 +331,8 @@ pub(super) fn refine_walk(
             shift = if shift < 1e-6 { 0.0 } else { shift * 0.1 };
         } else if length <= 1e-7 * here.radius || shift > 1e12 {
             // Rounding of the sums, not shape, decides which is lower.
-            return Ok(report(
-                centre,
-                &here,
-                here.radius,
-                here.rss,
-                passes,
-                Stop::NoImprovement,
-            ));
+            let size = [here.radius, here.rss];
+            return Ok(report(centre, &here, size, passes, Stop::NoImprovement));
         } else {
             shift = (shift * 10.0).max(1e-4);
         }

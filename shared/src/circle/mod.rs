@@ -93,6 +93,19 @@ const MANY: usize = 6 * FEW;
 ///
 /// # Errors
 /// [`CircleError`] for fewer than three points, coincident or collinear points, or a coordinate that is not finite.
+///
+/// ```
+/// use giotto_shared::circle::{fit, CircleError};
+///
+/// // Four points of the circle of radius 5 about (1, 2).
+/// let fitted = fit([[6.0, 2.0], [1.0, 7.0], [-4.0, 2.0], [4.0, 6.0]].as_slice())?;
+/// assert!((fitted.circle.radius - 5.0).abs() < 1e-12);
+/// assert!((fitted.circle.centre[1] - 2.0).abs() < 1e-12);
+/// // Points on a line have no circle, and the error says so.
+/// let line = fit([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]].as_slice());
+/// assert_eq!(line, Err(CircleError::Collinear));
+/// # Ok::<(), CircleError>(())
+/// ```
 pub fn fit(points: &(impl Points + ?Sized)) -> Result<CircleFit, CircleError> {
     if points.count() >= MANY {
         let few = Walk::some(RUN, points.count() / (FEW / RUN));

@@ -8,6 +8,19 @@ use super::lanes::{Lanes, Terms, sums};
 use super::points::{Merge, Part, Points, Walk};
 
 /// Count, mean and centred moment sums of a point set. One pass, mergeable.
+///
+/// ```
+/// use giotto_shared::circle::{hyper, CircleError, Merge, Moments};
+///
+/// // Two halves of a recording, gathered apart and merged, give the circle of the whole.
+/// let first = [[6.0, 2.0], [1.0, 7.0]];
+/// let second = [[-4.0, 2.0], [4.0, 6.0]];
+/// let mut moments = Moments::of(first.as_slice());
+/// moments.merge(&Moments::of(second.as_slice()));
+/// assert_eq!(moments.count, 4);
+/// assert!((hyper(&moments)?.radius - 5.0).abs() < 1e-9);
+/// # Ok::<(), CircleError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Moments {
     /// Number of points.

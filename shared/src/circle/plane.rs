@@ -4,6 +4,17 @@ use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use num_traits::Float;
 
 /// Least-squares (orthogonal) plane through 3-D points, with axes in it for projection.
+///
+/// ```
+/// use giotto_shared::circle::{CircleError, Plane};
+///
+/// // Points of a table that rises by 1 mm over 1 m along x.
+/// let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 1e-3], [1.0, 1.0, 1e-3], [0.0, 1.0, 0.0]];
+/// let plane = Plane::fit(points.into_iter())?;
+/// assert!((plane.tilt_rad - 1e-3).abs() < 1e-8);
+/// assert!(plane.flatness < 1e-12);
+/// # Ok::<(), CircleError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
     /// Mean of the points, m; lies in the plane.

@@ -4,6 +4,14 @@ use crc::{CRC_32_ISO_HDLC, Crc, Digest};
 const ALGORITHM: &Crc<u32> = &Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// A CRC being taken.
+///
+/// ```
+/// use giotto_shared::encoding::{crc32, Crc32};
+///
+/// // The check value of the catalogue, whole and in parts.
+/// assert_eq!(crc32(b"123456789"), 0xcbf4_3926);
+/// assert_eq!(Crc32::new().with(b"1234").with(b"56789").value(), 0xcbf4_3926);
+/// ```
 #[derive(Clone)]
 #[allow(missing_debug_implementations, reason = "the crate's digest has none")]
 pub struct Crc32(Digest<'static, u32>);

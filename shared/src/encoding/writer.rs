@@ -24,6 +24,17 @@ impl ser::Error for Unsupported {
 type Done = Result<(), Unsupported>;
 
 /// Writes a value to the start of `bytes`; its length, or `None` if it does not fit.
+///
+/// ```
+/// use giotto_shared::encoding::{put, take};
+///
+/// let mut bytes = [0; 8];
+/// let length = put(&(300_u16, true), &mut bytes).unwrap();
+/// // 300 takes two bytes of seven bits each.
+/// assert_eq!(bytes[..length], [0xac, 0x02, 1]);
+/// let (value, rest) = take::<(u16, bool)>(&bytes[..length]).unwrap();
+/// assert_eq!((value, rest.len()), ((300, true), 0));
+/// ```
 pub fn put<T: Serialize + ?Sized>(value: &T, bytes: &mut [u8]) -> Option<usize> {
     let mut writer = Writer::new(bytes);
     value.serialize(&mut writer).ok()?;

@@ -30,7 +30,7 @@ pub struct Spike<T> {
 /// All profile terms of a zone, terms of one kind merged: the *error* of the machine along X, Y and Z is
 ///
 /// `position`·q + `velocity`·q̇ + `acceleration`·q̈ (q from the reference point)
-/// − ½ Σₖ `play`[k]·sgn(q̇ₖ) + Σₖ `bow`[k]·uₖ² (u from the centre of the arc), with spikes and periodic errors.
+/// − ½ Σₖ `play[k]`·sgn(q̇ₖ) + Σₖ `bow[k]`·uₖ² (u from the centre of the arc), with spikes and periodic errors.
 ///
 /// The controller applies its opposite at the programmed position. What that leaves is of second order: the change of
 /// the error over a distance as long as the error itself.

@@ -52,6 +52,17 @@ const CHORD: f64 = -0.6;
 const FEED_FORWARD_FROM: f64 = 6.5;
 
 /// The classes that an interval of ρ allows.
+///
+/// ```
+/// use giotto_shared::model::{Class, Classes};
+///
+/// // An interval of κ4/κ2² about 6 is a single lag and nothing else.
+/// let classes = Classes::of_interval(5.6, 6.3);
+/// assert!(classes.contains(Class::SingleLag));
+/// assert_eq!(classes.iter().count(), 1);
+/// // An interval that is as wide as the table tells nothing.
+/// assert!(Classes::of_interval(-100.0, 100.0).is_any());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Classes([bool; Class::ALL.len()]);
 

@@ -1,8 +1,19 @@
 //! Elements of a servo chain: what each does to a circle.
-use super::{Cumulants, number};
+use super::{Cumulants, LEAST_DAMPING_SQUARED, number};
 use num_traits::Float;
 
 /// One linear element, the same on both axes. A dead time is not among them: it turns the circle and leaves its radius.
+///
+/// ```
+/// use giotto_shared::model::Element;
+///
+/// // At ω = kv a lag draws circles of 1/√2 of their radius.
+/// let lag = Element::Lag { kv_per_s: 50.0_f64 };
+/// assert!((lag.gain(50.0) - 0.5_f64.sqrt()).abs() < 1e-15);
+/// // Without damping a second-order element makes small circles larger.
+/// let ringing = Element::SecondOrder { omega_n_rad_s: 100.0, zeta: 0.1_f64 };
+/// assert!(ringing.gain(50.0) > 1.3);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Element<T> {
@@ -134,9 +145,81 @@ impl<T: Float> Element<T> {
     }
 }
 
+impl<T: Float> Element<T> {
+    /// Delay at low rates, s: the first cumulant.
+    pub fn delay_s(&self) -> T {
+        let half = number::<T>(0.5);
+        match *self {
+            Self::Lag { kv_per_s } => kv_per_s.recip(),
+            Self::ExponentialFilter { time_constant_s } => time_constant_s,
+            Self::FeedForwardLag {
+                kv_per_s,
+                feed_forward,
+            } => (T::one() - feed_forward) / kv_per_s,
+            Self::MovingAverage { window_s } => half * window_s,
+            Self::SecondOrder {
+                omega_n_rad_s,
+                zeta,
+            } => number::<T>(2.0) * zeta / omega_n_rad_s,
+            // The chord to the next set-point is known when that is reached.
+            Self::Chord { interval_s } => interval_s,
+        }
+    }
+
+    /// A lag or a second-order element whose κ2 is larger by `more_s2`, with how much longer its delay is, s: of a lag
+    /// the time constant changes, of a second-order element the damping (κ2 = (4ζ² − 2)/ωn²). `None` for other elements and where
+    /// no lag is left.
+    pub fn with_more_kappa2(&self, more_s2: T) -> Option<(Self, T)> {
+        let n = number::<T>;
+        match *self {
+            Self::Lag { kv_per_s } => {
+                let lag = kv_per_s.recip();
+                let square = lag * lag + more_s2;
+                let element = Self::Lag {
+                    kv_per_s: square.powf(n(-0.5)),
+                };
+                (square > T::zero()).then(|| (element, square.sqrt() - lag))
+            }
+            Self::SecondOrder {
+                omega_n_rad_s: omega_n,
+                zeta: before,
+            } => {
+                let square = before * before + n(0.25) * more_s2 * omega_n * omega_n;
+                let zeta = square.max(n(LEAST_DAMPING_SQUARED)).sqrt();
+                let element = Self::SecondOrder {
+                    omega_n_rad_s: omega_n,
+                    zeta,
+                };
+                Some((element, n(2.0) * (zeta - before) / omega_n))
+            }
+            _ => None,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn more_kappa2_is_that_much_more() {
+        for element in [
+            Element::Lag { kv_per_s: 50.0 },
+            Element::SecondOrder {
+                omega_n_rad_s: 60.0,
+                zeta: 0.8_f64,
+            },
+        ] {
+            for more in [3e-5, -3e-5] {
+                let (other, later) = element.with_more_kappa2(more).unwrap();
+                let gained = other.cumulants().kappa2_s2 - element.cumulants().kappa2_s2;
+                assert!((gained / more - 1.0).abs() < 1e-9, "{gained}");
+                assert!((other.delay_s() - element.delay_s() - later).abs() < 1e-15);
+            }
+        }
+        let lag = Element::Lag { kv_per_s: 50.0_f64 };
+        assert_eq!(lag.with_more_kappa2(-5e-4), None);
+    }
 
     const ELEMENTS: [Element<f64>; 6] = [
         Element::Lag { kv_per_s: 50.0 },

@@ -49,6 +49,18 @@ impl<T: Float> RadiusModel<T> {
     ///
     /// # Errors
     /// [`InverseError`]; out of reach where the gain 1 + β1ω² + β2ω⁴ is not positive.
+    ///
+    /// ```
+    /// use giotto_shared::model::{InverseError, RadiusModel};
+    ///
+    /// // What to program so that a machine that shrinks circles draws 100 mm at 0.7 m/s.
+    /// let machine = RadiusModel { beta1_s2: -23.29e-6, beta2_s4: 0.0 };
+    /// let programmed = machine.inverse_keeping_omega(0.1, 0.7)?;
+    /// let drawn = programmed.radius_m + machine.radius_error_m(programmed.radius_m, programmed.feed_m_s);
+    /// assert!(programmed.radius_m > 0.1);
+    /// assert!((drawn - 0.1_f64).abs() < 1e-15);
+    /// # Ok::<(), InverseError>(())
+    /// ```
     pub fn inverse_keeping_omega(
         &self,
         radius_m: T,

@@ -3,30 +3,44 @@
 //! On a circle at constant rate ω = f/R a linear chain, the same on both axes, only scales: Rm = R·|G(jω)|, and
 //! ln|G(jω)| = −κ2 ω²/2 + κ4 ω⁴/24 − …, κ the cumulants of its impulse response, which add over a cascade.
 //!
+//! Every conversion between elements, cumulants, β and responses is in this folder and nowhere else.
+//!
 //! | file | holds |
 //! |---|---|
 //! | here | [`RadiusModel`] (β of Eq. 15), [`Cumulants`], each from the other; prediction |
 //! | `element` | [`Element`]: lag, filter, feed-forward, moving average, second order, chords; exact gain and cumulants |
 //! | `inverse` | what to program so that the wanted circle comes out |
+//! | `response` | [`Response`]: 1 + aω² + bω⁴, the form that a lag and a second order share; to elements and back |
 //! | `class` | which elements a ratio κ4/κ2² allows |
 //! | `equivalent` | the second-order or feed-forward element with given cumulants |
-//! | `third` | the third cumulant that a lag and an average with given cumulants have |
+//! | `third_cumulant` | the third cumulant that a lag and an average with given cumulants have |
 mod class;
 mod element;
 mod equivalent;
 mod inverse;
-mod third;
+mod response;
+mod third_cumulant;
 
 pub use class::{Class, Classes};
 pub use element::Element;
 pub use equivalent::Equivalent;
 pub use inverse::{InverseError, Programmed};
+pub use response::Response;
 
 use core::ops::{Add, AddAssign, Neg};
 use num_traits::Float;
 use serde::{Deserialize, Serialize};
 
 /// Coefficients of the paper's empirical model, Eq. 15: ΔR = β1 f²/R + β2 f⁴/R³ (SI: m, m/s).
+///
+/// ```
+/// use giotto_shared::model::RadiusModel;
+///
+/// // The paper's robot on a circle of 100 mm at 0.7 m/s: 169 µm too small.
+/// let robot = RadiusModel { beta1_s2: -23.29e-6, beta2_s4: -0.23e-6 };
+/// let error_m = robot.radius_error_m(0.1, 0.7);
+/// assert!((error_m + 169.3e-6_f64).abs() < 0.1e-6);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Default, Serialize, Deserialize)]
 pub struct RadiusModel<T> {
     /// β1, s².
@@ -37,6 +51,24 @@ pub struct RadiusModel<T> {
 
 /// Second and fourth cumulant of the impulse response of the axis-matched chain; they add over a cascade.
 /// ln(1 + ΔR/R) = −κ2 ω²/2 + κ4 ω⁴/24.
+///
+/// ```
+/// use giotto_shared::model::{Cumulants, Element, RadiusModel};
+///
+/// // A position loop of kv = 50/s behind a linear acceleration filter of 40 ms: cumulants add.
+/// let chain: Cumulants<f64> = [
+///     Element::Lag { kv_per_s: 50.0 },
+///     Element::MovingAverage { window_s: 0.04 },
+/// ]
+/// .iter()
+/// .map(Element::cumulants)
+/// .sum();
+/// assert!((chain.kappa2_s2 - (0.02 * 0.02 + 0.04 * 0.04 / 12.0)).abs() < 1e-18);
+/// // The same chain in the coefficients of the paper's model, and back.
+/// let beta = RadiusModel::from(chain);
+/// assert_eq!(beta.beta1_s2, -chain.kappa2_s2 / 2.0);
+/// assert!((Cumulants::from(beta).kappa4_s4 / chain.kappa4_s4 - 1.0).abs() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Default, Serialize, Deserialize)]
 pub struct Cumulants<T> {
     /// κ2, s².
@@ -44,6 +76,9 @@ pub struct Cumulants<T> {
     /// κ4, s⁴.
     pub kappa4_s4: T,
 }
+
+/// Least ζ² of an element that is made to measure: what is fitted to noise may ask for less than no damping.
+const LEAST_DAMPING_SQUARED: f64 = 1e-4;
 
 /// A small whole number as a float.
 pub(crate) fn number<T: Float>(value: f64) -> T {

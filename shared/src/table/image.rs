@@ -243,6 +243,33 @@ fn read(
 ///
 /// # Errors
 /// Those of [`Table::validate`]; [`TableError::TooLong`] if `out` is shorter than the image.
+///
+/// ```
+/// use giotto_shared::Actuator;
+/// use giotto_shared::model::{Cumulants, Element};
+/// use giotto_shared::table::{decode, encode, Limits, Table, TableError, Terms, Travel, Zone, MAX_IMAGE_BYTES};
+/// use giotto_shared::term::Term;
+///
+/// let mut table = Table::empty();
+/// table.limits = Limits { offset_m: 1e-3, slew_m_s: 0.01 };
+/// let backlash = Term::Backlash { actuator: Actuator::Y, step_m: 8e-6 };
+/// table.zones.push(Zone {
+///     place_m: None,
+///     radius_m: [0.05, 0.3],
+///     feed_m_s: [0.02, 0.7],
+///     travel: Travel::Both,
+///     cumulants: Element::Lag { kv_per_s: 50.0_f32 }.cumulants(),
+///     terms: [backlash].into_iter().collect(),
+/// }).unwrap();
+///
+/// let mut image = [0; MAX_IMAGE_BYTES];
+/// let length = encode(&table, &mut image)?;
+/// assert_eq!(decode(&image[..length])?, table);
+/// // One flipped bit is noticed before anything is believed.
+/// image[length - 1] ^= 1;
+/// assert!(matches!(decode(&image[..length]), Err(TableError::BadCrc { .. })));
+/// # Ok::<(), TableError>(())
+/// ```
 pub fn encode(table: &Table, out: &mut [u8]) -> Result<usize, TableError> {
     table.validate()?;
     let max = out.len() as u32;

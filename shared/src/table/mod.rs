@@ -1,5 +1,5 @@
 //! The correction table that the controller keeps: its types here, its bytes in [`image`], its checks in
-//! [`validate`], the bounds of the image in [`bounds`](crate::bounds).
+//! [`validate`], the bounds of the image in [`crate::bounds`].
 pub mod image;
 pub mod validate;
 

@@ -223,6 +223,22 @@ pub struct ProfileError {
 ///
 /// # Errors
 /// The first term that cannot be merged with those before it.
+///
+/// ```
+/// use giotto_shared::term::{merged, ProfileError, Term};
+/// use giotto_shared::{Actuator, Plane};
+///
+/// let terms = [
+///     Term::Backlash { actuator: Actuator::Z, step_m: 8e-6_f64 },
+///     Term::Squareness { plane: Plane::Zx, shear_rad: 20e-6 },
+///     Term::Backlash { actuator: Actuator::Z, step_m: 1e-6 },
+/// ];
+/// let profile = merged(&terms)?;
+/// // Both plays of Z are one; X and Y have none.
+/// assert!((profile.play_m[2][2].abs() - 9e-6).abs() < 1e-12);
+/// assert_eq!(profile.play_m[1], [0.0; 3]);
+/// # Ok::<(), ProfileError>(())
+/// ```
 pub fn merged<T: Float + Default>(terms: &[Term<T>]) -> Result<Profile<T>, ProfileError> {
     let mut profile = Profile::default();
     for (index, term) in terms.iter().enumerate() {

@@ -74,6 +74,25 @@ pub struct FrameCounts {
 }
 
 /// Collects bytes into frames.
+///
+/// ```
+/// use giotto_shared::wire::{Accumulator, Command, MAX_FRAME, Request, encode, take};
+///
+/// let request = Request { session: 7, seq: 1, command: Command::Hello };
+/// let mut buffer = [0; MAX_FRAME];
+/// let frame = encode(&request, &mut buffer)?;
+/// // Part of another frame comes first: it is counted, and the whole frame behind it is found.
+/// let mut accumulator = Accumulator::new();
+/// let mut found = None;
+/// for byte in [0x55, 0x00].iter().chain(frame.iter()) {
+///     if let Some(payload) = accumulator.push(*byte) {
+///         found = take::<Request>(payload).map(|(request, _)| request);
+///     }
+/// }
+/// assert_eq!(found, Some(request));
+/// assert_eq!(accumulator.counts().malformed, 1);
+/// # Ok::<(), giotto_shared::wire::frame::TooLong>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Accumulator {
     bytes: [u8; MAX_FRAME],

@@ -171,10 +171,13 @@ impl Case {
         };
         let mut machine = base.clone();
         let mut truth = Vec::new();
+        // An effect is sized on whole turns: what a start and a stop do is none of it.
+        let mut sized_on = plan.clone();
+        sized_on.tests.iter_mut().for_each(|t| t.from_rest = false);
         for effect in &effects {
             // Each is sized alone on the bare machine, then put on top of those before it.
             let wanted_m = strength * instrument.noise_m;
-            let (alone, misfit_m) = scaled(effect, &base, &plan, wanted_m);
+            let (alone, misfit_m) = scaled(effect, &base, &sized_on, wanted_m);
             machine = merged(machine, &base, &alone);
             let pair = match effect.seat {
                 Seat::Pair(pair) => pair,

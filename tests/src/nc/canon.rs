@@ -12,7 +12,7 @@ pub struct Rs274 {
 /// What a program makes the interpreter call.
 #[derive(Clone, Debug, Default)]
 pub struct Canon {
-    /// Calls in order, without comments.
+    /// Calls in order, without comments and without those that set the feed, which each call has beside it.
     pub calls: Vec<Call>,
     /// Where it stopped before its end, and why.
     pub error: Option<String>,
@@ -27,6 +27,8 @@ pub struct Call {
     pub values: Vec<f64>,
     /// The whole call as printed.
     pub text: String,
+    /// Feed in force, in the units of the program.
+    pub feed: f64,
 }
 
 impl Rs274 {
@@ -48,6 +50,16 @@ impl Rs274 {
     /// # Errors
     /// The interpreter cannot be started.
     pub fn run(&self, program: &str) -> std::io::Result<Canon> {
+        let canon = self.run_once(program)?;
+        // On a machine short of everything the interpreter may not come up at all; that is not the program's doing, which
+        // it would meet again.
+        if canon.calls.is_empty() {
+            return self.run_once(program);
+        }
+        Ok(canon)
+    }
+
+    fn run_once(&self, program: &str) -> std::io::Result<Canon> {
         let dir = self.dir.path();
         let name = format!("{:?}.ngc", std::thread::current().id()).replace(['(', ')'], "_");
         let file = dir.join(name);
@@ -61,12 +73,20 @@ impl Rs274 {
             .stdin(Stdio::null())
             .output()?;
         let mut canon = Canon::default();
+        let mut feed = 0.0;
         for line in String::from_utf8_lossy(&output.stdout).lines() {
             // `   12 N..... CALL(…)`, with the number of the line where it has one.
             let mut words = line.trim_start().splitn(2, ' ');
             let numbered = words.next().is_some_and(|n| n.parse::<u32>().is_ok());
             if let Some(call) = words.next().filter(|_| numbered).and_then(|r| r.get(6..)) {
-                canon.calls.extend(Call::read(call.trim()));
+                let Some(call) = Call::read(call.trim()) else {
+                    continue;
+                };
+                if call.name == "SET_FEED_RATE" {
+                    feed = call.values.first().copied().unwrap_or(f64::NAN);
+                } else {
+                    canon.calls.push(Call { feed, ..call });
+                }
             }
         }
         let errors = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -74,7 +94,10 @@ impl Rs274 {
             !l.trim().is_empty() && !l.starts_with("executing") && !l.contains("trying to open")
         });
         if !output.status.success() || !canon.calls.iter().any(|c| c.name == "PROGRAM_END") {
-            canon.error = Some(words.next().unwrap_or("no end").to_owned());
+            canon.error = Some(match words.next() {
+                Some(words) => words.to_owned(),
+                None => format!("no end ({})", output.status),
+            });
         }
         Ok(canon)
     }
@@ -95,6 +118,7 @@ impl Call {
                 .map(|v| v.parse().unwrap_or(f64::NAN))
                 .collect(),
             text: text.to_owned(),
+            feed: 0.0,
         })
     }
 
@@ -128,6 +152,9 @@ struct Place {
     unit_mm: f64,
     inverse_time: bool,
     at: [f64; 6],
+    /// G92 and G54 … in force, and the turn of the latter, rad.
+    offsets: [[f64; 3]; 2],
+    turn: f64,
 }
 
 impl Place {
@@ -137,6 +164,8 @@ impl Place {
             unit_mm: 1.0,
             inverse_time: false,
             at: [0.0; 6],
+            offsets: [[0.0; 3]; 2],
+            turn: 0.0,
         }
     }
 
@@ -159,6 +188,16 @@ impl Place {
                 (0..3).for_each(|i| self.at[i] *= scale);
                 self.unit_mm = unit;
             }
+            // The tool stands still, and its place has other numbers.
+            "SET_G92_OFFSET" => self.count_from(0, call.values.get(..3)),
+            "SET_G5X_OFFSET" => self.count_from(1, call.values.get(1..4)),
+            "SET_XY_ROTATION" => {
+                let turn = call.values.first().copied().unwrap_or(0.0).to_radians();
+                let (sin, cos) = (self.turn - turn).sin_cos();
+                let [x, y, ..] = self.at;
+                (self.at[0], self.at[1]) = (cos * x - sin * y, sin * x + cos * y);
+                self.turn = turn;
+            }
             "COMMENT" => self.inverse_time = call.text.contains("inverse time"),
             "STRAIGHT_FEED" | "STRAIGHT_TRAVERSE" => {
                 (0..6).for_each(|i| self.at[i] = call.values.get(i).copied().unwrap_or(0.0));
@@ -166,6 +205,19 @@ impl Place {
             "ARC_FEED" => self.at = self.end_of(call),
             _ => {}
         }
+    }
+
+    fn count_from(&mut self, which: usize, origin: Option<&[f64]>) {
+        let Some([x, y, z]) = origin.and_then(|o| <[f64; 3]>::try_from(o).ok()) else {
+            return;
+        };
+        let before = std::mem::replace(&mut self.offsets[which], [x, y, z]);
+        let moved = [before[0] - x, before[1] - y];
+        // G92 counts in the turned axes, the others turn about their origin.
+        let (sin, cos) = if which == 1 { self.turn } else { 0.0 }.sin_cos();
+        self.at[0] += cos * moved[0] + sin * moved[1];
+        self.at[1] += cos * moved[1] - sin * moved[0];
+        self.at[2] += before[2] - z;
     }
 
     fn end_of(&self, call: &Call) -> [f64; 6] {
@@ -217,21 +269,13 @@ fn beside(p: [f64; 6], from: [f64; 6], to: [f64; 6]) -> (f64, f64) {
 /// # Errors
 /// The first difference, in words.
 pub fn compare(before: &Canon, after: &Canon, feeds_may_differ: bool) -> Result<(), String> {
-    let skip = |place: &Place, call: &Call| {
-        call.name == "SET_FEED_RATE" && (place.inverse_time || feeds_may_differ)
-    };
     let (mut place, mut j) = (Place::new(), 0);
     let mut out = Place::new();
     let mut i = 0;
     while i < before.calls.len() {
         let call = &before.calls[i];
-        if skip(&place, call) {
-            i += 1;
-            continue;
-        }
-        while after.calls.get(j).is_some_and(|c| skip(&out, c)) {
-            j += 1;
-        }
+        // With inverse time each block has its own.
+        let feeds = !(feeds_may_differ || place.inverse_time);
         if !call.is_arc() {
             let Some(other) = after.calls.get(j) else {
                 return match &after.error {
@@ -243,6 +287,10 @@ pub fn compare(before: &Canon, after: &Canon, feeds_may_differ: bool) -> Result<
             if !call.same(other) {
                 return Err(format!("{} became {}", call.text, other.text));
             }
+            if feeds && call.is_line() && call.feed != other.feed {
+                let (was, is) = (call.feed, other.feed);
+                return Err(format!("{} at a feed of {is}, not {was}", call.text));
+            }
             place.take(call);
             out.take(other);
             (i, j) = (i + 1, j + 1);
@@ -251,30 +299,24 @@ pub fn compare(before: &Canon, after: &Canon, feeds_may_differ: bool) -> Result<
         // A group of arcs, and what takes its place.
         let first = i;
         let start = place.at;
-        while before
-            .calls
-            .get(i)
-            .is_some_and(|c| c.is_arc() || skip(&place, c))
-        {
+        while before.calls.get(i).is_some_and(Call::is_arc) {
             place.take(&before.calls[i]);
             i += 1;
         }
-        let arcs: Vec<&Call> = before.calls[first..i]
-            .iter()
-            .filter(|c| c.is_arc())
-            .collect();
+        let arcs: Vec<&Call> = before.calls[first..i].iter().collect();
+        let fastest = arcs.iter().map(|a| a.feed).fold(0.0, f64::max);
         let next = before.calls.get(i);
         let next_line = next.filter(|c| c.is_line());
         let (mut pieces, mut arc_length) = (0, 0.0);
         while let Some(other) = after.calls.get(j) {
-            if skip(&out, other) {
-                j += 1;
-                continue;
-            }
-            let feeds = other.is_arc() || other.is_line();
+            let moves = other.is_arc() || other.is_line();
             let is_next = next_line.is_some_and(|n| n.same(other));
-            if !feeds || (is_next && pieces >= arcs.len()) {
+            if !moves || (is_next && pieces >= arcs.len()) {
                 break;
+            }
+            // A stretch before a stop may be slower.
+            if feeds && !(other.feed > 0.0 && other.feed <= fastest) {
+                return Err(format!("{} at a feed of {}", other.text, other.feed));
             }
             let begin = out.at;
             let end = out.end_of(other);
@@ -331,7 +373,7 @@ pub fn compare(before: &Canon, after: &Canon, feeds_may_differ: bool) -> Result<
     match (&before.error, &after.error) {
         (None, Some(error)) => Err(format!("the output stops: {error}")),
         _ if j < after.calls.len() && before.error.is_none() => {
-            let rest = after.calls[j..].iter().find(|c| c.name != "SET_FEED_RATE");
+            let rest = after.calls.get(j);
             rest.map_or(Ok(()), |c| Err(format!("{} is new", c.text)))
         }
         _ => Ok(()),

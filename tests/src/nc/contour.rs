@@ -176,32 +176,93 @@ fn stretch(from: [f64; 3], to: [f64; 3], m: &Move) -> Stretch {
     }
 }
 
+/// The speed that a controller reaches along a chain from rest to rest: each stretch at its feed, slowed down ahead of a slower
+/// one.
+struct Course<'a> {
+    chain: &'a [Stretch],
+    /// Way at the end of each stretch, mm.
+    ends: Vec<f64>,
+}
+
+impl<'a> Course<'a> {
+    fn new(chain: &'a [Stretch]) -> Self {
+        let ends = chain
+            .iter()
+            .scan(0.0, |way, stretch| {
+                *way += stretch.length();
+                Some(*way)
+            })
+            .collect();
+        Self { chain, ends }
+    }
+
+    fn total(&self) -> f64 {
+        self.ends.last().copied().unwrap_or(0.0)
+    }
+
+    /// Highest speed at a way from which all that follows and all that went before can be met, mm/s.
+    fn speed(&self, way: f64) -> f64 {
+        let within = |distance: f64, speed: f64| {
+            (speed * speed + 2.0 * ACCELERATION * distance.max(0.0)).sqrt()
+        };
+        let mut most = within(way, 0.0).min(within(self.total() - way, 0.0));
+        let mut from = 0.0;
+        for (stretch, to) in self.chain.iter().zip(&self.ends) {
+            let distance = (from - way).max(way - to).max(0.0);
+            most = most.min(within(distance, stretch.feed));
+            from = *to;
+        }
+        most
+    }
+
+    fn place(&self, way: f64) -> [f64; 3] {
+        let k = self
+            .ends
+            .partition_point(|end| *end < way)
+            .min(self.chain.len() - 1);
+        let stretch = &self.chain[k];
+        let length = stretch.length();
+        stretch.at(((way - self.ends[k]) / length + 1.0).clamp(0.0, 1.0))
+    }
+
+    /// Ways at every time step, to the end.
+    fn ways(&self) -> Vec<f64> {
+        // Finer than the plant's, for the ramps last a few steps.
+        let parts = 20;
+        let dt = STEP_S / f64::from(parts);
+        let total = self.total();
+        let (mut way, mut speed) = (0.0, 0.0);
+        let mut ways = vec![0.0];
+        while way < total - 1e-7 {
+            for _ in 0..parts {
+                let faster: f64 = speed + ACCELERATION * dt;
+                let ahead = way + speed * dt + 0.5 * ACCELERATION * dt * dt;
+                let next = faster.min(self.speed(ahead.min(total)));
+                way += 0.5 * (speed + next) * dt;
+                speed = next;
+            }
+            // The last step to rest is a tenth of a micrometre.
+            let still = speed * dt < 1e-9;
+            ways.push(if still { total } else { way.min(total) });
+            if still {
+                break;
+            }
+        }
+        ways
+    }
+}
+
 /// Where the plant goes along a chain, from rest to rest.
 fn driven(plant: Plant, chain: &[Stretch]) -> Vec<[f64; 3]> {
-    let feed = chain[0].feed;
-    let total: f64 = chain.iter().map(Stretch::length).sum();
-    let ramp = feed / ACCELERATION;
-    let end = total / feed + ramp;
-    let way = |t: f64| match t {
-        t if t < ramp => 0.5 * ACCELERATION * t * t,
-        t if t < end - ramp => feed * (t - 0.5 * ramp),
-        t => total - 0.5 * ACCELERATION * (end - t).max(0.0).powi(2),
-    };
-    let place = |mut s: f64| {
-        for stretch in chain {
-            let length = stretch.length();
-            if s <= length {
-                return stretch.at(s / length);
-            }
-            s -= length;
-        }
-        chain[chain.len() - 1].at(1.0)
-    };
+    let course = Course::new(chain);
+    let mut ways = course.ways();
+    let settling = (0.6 / STEP_S) as usize;
+    ways.extend(std::iter::repeat_n(course.total(), settling));
     let start = chain[0].at(0.0);
     let mut axes: Vec<Box<dyn FnMut(f64) -> f64>> = start.iter().map(|p| axis(plant, *p)).collect();
-    (0..((end + 0.6) / STEP_S) as usize)
-        .map(|k| {
-            let p = place(way(k as f64 * STEP_S));
+    ways.into_iter()
+        .map(|way| {
+            let p = course.place(way);
             [0, 1, 2].map(|i| axes[i](p[i]))
         })
         .collect()
@@ -250,4 +311,35 @@ pub fn deviations(plant: Plant, program: &str, nominal: &str) -> Vec<Deviation> 
         most
     };
     driven_chains.iter().zip(&meant).map(one).collect()
+}
+
+/// Parts of a circle whose walls are told apart.
+const PARTS: usize = 720;
+
+/// What the plant leaves of the wall of a circle about a centre, µm: the least and the most, positive where material is left,
+/// negative where it goes too deep. The wall is cut by all moves but rapids. `hole`: the material lies outside.
+///
+/// # Panics
+/// The program does not go all the way round.
+pub fn wall_um(plant: Plant, program: &str, centre: [f64; 2], radius: f64, hole: bool) -> [f64; 2] {
+    let mut reached = [f64::NAN; PARTS];
+    for chain in chains(program) {
+        for p in driven(plant, &chain) {
+            let [x, y] = [p[0] - centre[0], p[1] - centre[1]];
+            let turn = y.atan2(x) / std::f64::consts::TAU;
+            let part = (turn.rem_euclid(1.0) * PARTS as f64) as usize % PARTS;
+            let off = if hole {
+                radius - x.hypot(y)
+            } else {
+                x.hypot(y) - radius
+            };
+            // The minimum of a number and NaN is the number.
+            reached[part] = off.min(reached[part]);
+        }
+    }
+    let start = [f64::INFINITY, f64::NEG_INFINITY];
+    reached.iter().fold(start, |[least, most], off| {
+        assert!(!off.is_nan(), "not all the way round in\n{program}");
+        [least.min(off * 1e3), most.max(off * 1e3)]
+    })
 }

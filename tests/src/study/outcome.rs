@@ -43,7 +43,9 @@ pub struct Outcome {
 impl Outcome {
     /// Diagnoses the campaign in `dir`, with its `model.toml` if there is one, through the contract's JSON.
     pub fn of(dir: &Path) -> Result<Self, String> {
-        let campaign = giotto::campaign::read(dir).map_err(|e| e.to_string())?;
+        // As the command does: the odd run whose file contradicts its label is left out and named.
+        let manifest = giotto::campaign::Manifest::open(dir).map_err(|e| e.to_string())?;
+        let (campaign, _, mislabelled) = manifest.read_labelled().map_err(|e| e.to_string())?;
         let model = dir.join("model.toml");
         let model = if model.exists() {
             Some(ModelFile::load(&model).map_err(|e| e.to_string())?)
@@ -59,7 +61,12 @@ impl Outcome {
         )
         .map_err(|e| e.to_string())?;
         let json = serde_json::to_value(&diagnosis).map_err(|e| e.to_string())?;
-        Self::from_json(&json).ok_or_else(|| format!("not as the contract has it: {json}"))
+        let mut outcome =
+            Self::from_json(&json).ok_or_else(|| format!("not as the contract has it: {json}"))?;
+        outcome
+            .left_out
+            .extend(mislabelled.into_iter().map(|run| run.file));
+        Ok(outcome)
     }
 
     /// Reads the contract's JSON; `None` where a field is missing or of another kind.

@@ -2,7 +2,7 @@
 use super::Args;
 use crate::Output;
 use giotto::model_file::ModelFile;
-use giotto_nc::{Fate, Left, Report};
+use giotto_nc::{Fate, Led, Left, Report};
 use std::collections::BTreeMap;
 
 /// What remains at a joint is said from this share of the correction on.
@@ -52,6 +52,7 @@ impl Summary<'_> {
         } else {
             self.by_size(out);
         }
+        self.leads(out);
         self.reasons(out);
         let not_applied = super::not_applied(self.model);
         if !not_applied.is_empty() {
@@ -129,6 +130,35 @@ impl Summary<'_> {
         }
         if rest > 0 {
             out.say(format_args!("  {rest} of other sizes; --json names each"));
+        }
+    }
+
+    fn leads(&self, out: Output) {
+        let lines = |wanted: Led| -> Vec<String> {
+            let of = |report: &&Report| matches!(report.fate, Fate::Corrected { led, .. } if led == wanted);
+            let list = self.arcs.iter().filter(of);
+            list.map(|report| report.line.to_string()).collect()
+        };
+        for (led, words) in [
+            (Led::Tangent, "with leads of their own"),
+            (
+                Led::SideUnknown,
+                "begin or end at a stop and got no lead: say which side is free by --inside, --outside or a comment before them",
+            ),
+            (
+                Led::NoRoom,
+                "begin or end at a stop and got no lead: none can be run there within the model and the acceleration",
+            ),
+        ] {
+            let lines = lines(led);
+            if !lines.is_empty() {
+                let named = lines[..lines.len().min(LINES)].join(", ");
+                let more = if lines.len() > LINES { " …" } else { "" };
+                out.say(format_args!(
+                    "  circles {words}: {} (line {named}{more})",
+                    lines.len()
+                ));
+            }
         }
     }
 

@@ -1,5 +1,5 @@
 //! The view as a picture of characters.
-use super::view::{View, motion};
+use super::controller_state::{View, motion};
 use giotto_shared::wire::{Probation, SlotState, Status};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};

@@ -1,5 +1,5 @@
 //! The terminal: keys in, pictures out.
-use super::view::View;
+use super::controller_state::View;
 use super::watch::{Wish, watch};
 use super::{Args, Failure, Output, draw};
 use giotto_link::Controller;

@@ -6,9 +6,9 @@
 //! | `view` | what is known, without a terminal |
 //! | `draw` | the view as a picture of characters |
 //! | `live` | the terminal: keys in, pictures out |
+mod controller_state;
 mod draw;
 mod live;
-mod view;
 mod watch;
 
 use super::port::PortArgs;
@@ -143,7 +143,7 @@ fn back(args: &Args) -> Controller {
 fn show(controller: &Controller, status: &Status, out: Output) {
     if out.json {
         let line = serde_json::json!({
-            "motion": view::motion(status.motion),
+            "motion": controller_state::motion(status.motion),
             "bypass": status.bypass,
             "ticks": status.tick,
             "programmed_nm": status.raw_nm,

@@ -14,6 +14,23 @@ pub(super) struct Row {
 
 const EXPECTED: &str = "expected a CSV with time_s,x_mm,y_mm[,z_mm], one row a tick";
 
+/// Where `time_s`, `x_mm`, `y_mm` and `z_mm` stand in a header.
+fn columns(header: &[&str]) -> Result<[Option<usize>; 4], String> {
+    let mut columns = [None; 4];
+    for (at, column) in header.iter().enumerate() {
+        match ["time_s", "x_mm", "y_mm", "z_mm"]
+            .iter()
+            .position(|known| known == column)
+        {
+            Some(known) if columns[known].is_none() => columns[known] = Some(at),
+            Some(_) => return Err(format!("has two columns {column}")),
+            None if column.starts_with("corrected_") => {}
+            None => return Err(format!("has a column \"{column}\"")),
+        }
+    }
+    Ok(columns)
+}
+
 /// Reads all rows.
 pub(super) fn read(path: &Path) -> Result<Vec<Row>, Failure> {
     let name = path.display();
@@ -34,18 +51,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<Row>, Failure> {
         .split(',')
         .map(str::trim)
         .collect();
-    let mut columns = [None; 4];
-    for (at, column) in header.iter().enumerate() {
-        match ["time_s", "x_mm", "y_mm", "z_mm"]
-            .iter()
-            .position(|known| known == column)
-        {
-            Some(known) if columns[known].is_none() => columns[known] = Some(at),
-            Some(_) => return Err(file(&format!("has two columns {column}"))),
-            None if column.starts_with("corrected_") => {}
-            None => return Err(file(&format!("has a column \"{column}\""))),
-        }
-    }
+    let columns = columns(&header).map_err(|what| file(&what))?;
     let [Some(time), Some(x), Some(y), z] = columns else {
         return Err(file("lacks a column"));
     };

@@ -14,7 +14,7 @@ use super::correct::{Law, Plan, Visit, decide};
 use super::mark::{self, Mark};
 use super::state::{Action, Arc};
 use super::word::{Line, Sort};
-use super::{Compensated, Fate, Options, Report, inverse::Inverse};
+use super::{Compensated, Fate, Led, Options, Report, inverse::Inverse};
 use giotto::model_file::ModelFile;
 use read::{Motion, Reader};
 use std::io;
@@ -28,6 +28,13 @@ const LEAST_TURN_RAD: f64 = 4.1 * std::f64::consts::PI / 180.0;
 const MOST_TURN_RAD: f64 = 239.0 * std::f64::consts::PI / 180.0;
 
 /// Whether a program is RAPID: a module or a procedure, behind the head of a backup or not.
+///
+/// ```
+/// use giotto_nc::rapid::is_rapid;
+///
+/// assert!(is_rapid(b"MODULE part\n  PROC main()\n  ENDPROC\nENDMODULE\n"));
+/// assert!(!is_rapid(b"G21\nG1 X10 F300\n"));
+/// ```
 pub fn is_rapid(program: &[u8]) -> bool {
     let mut words = program
         .split(|b| *b == b'\n')
@@ -174,7 +181,7 @@ pub fn compensate(program: &[u8], model: &ModelFile, options: &Options) -> Compe
                 );
                 out.program.extend_from_slice(&text);
                 from = pieces.last().map(|p| p.end);
-                Some(plan.fate(arc, pieces.len()))
+                Some(plan.fate(arc, pieces.len(), Led::Not))
             }
             (action, plan, _) => {
                 out.program.extend_from_slice(line);
@@ -227,7 +234,7 @@ fn blocks(
             motion.pose
         )
     };
-    let speed = match plan.twin.feed_factor {
+    let speed_of = |piece: &Piece| match plan.twin.feed_factor * piece.speed {
         1.0 => motion.speed.clone(),
         factor => format!(
             "[{},{}]",
@@ -244,6 +251,7 @@ fn blocks(
     let mut from = start;
     for (k, piece) in pieces.iter().enumerate() {
         let last = k + 1 == pieces.len();
+        let speed = speed_of(piece);
         // The end of the arc, if it is where it was, as it was written.
         let to = if last && piece.end == arc.end {
             motion.to.clone()

@@ -312,6 +312,20 @@ fn by_angle(
     Ok(turns)
 }
 
+impl Seen {
+    /// Reserves once, so that growing never doubles the memory: the rows of `size` bytes are about as long as the first ones.
+    fn reserve(&mut self, size: u64, first_bytes: u64, first_rows: usize, by_time: bool) {
+        let rows = size / (first_bytes / first_rows.max(1) as u64).max(1);
+        let rows = usize::try_from(rows + rows / 64).unwrap_or(0);
+        if by_time {
+            self.time.reserve_exact(rows);
+            self.deviation.reserve_exact(rows);
+        } else {
+            self.angle.reserve_exact(rows);
+        }
+    }
+}
+
 fn look(
     path: &Path,
     all: &Slice,
@@ -345,19 +359,11 @@ fn look(
     let mut seen = Seen::default();
     all.walk(path, prepare, |block, (batch, scatter, angle, on)| {
         if seen.angle.is_empty() && seen.deviation.is_empty() {
-            // Rows are about as long as the first ones: reserve once, so that growing never doubles the memory.
             let size = match &all.text {
                 Some(text) => text.len() as u64,
                 None => std::fs::metadata(path).map_or(0, |m| m.len()),
             };
-            let rows = size / ((block.bytes[1] - block.bytes[0]) / block.rows.max(1) as u64).max(1);
-            let rows = usize::try_from(rows + rows / 64).unwrap_or(0);
-            if by_time {
-                seen.time.reserve_exact(rows);
-                seen.deviation.reserve_exact(rows);
-            } else {
-                seen.angle.reserve_exact(rows);
-            }
+            seen.reserve(size, block.bytes[1] - block.bytes[0], block.rows, by_time);
         }
         seen.marks.push(Mark {
             first: block.first,

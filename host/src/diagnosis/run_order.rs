@@ -4,7 +4,7 @@ use super::explained::Explained;
 use super::finding::Signature;
 use super::linear;
 use super::omnibus::{FALSE_ALARM, Leftover};
-use super::orders::median;
+use super::residual_waves::median;
 use std::f64::consts::TAU;
 
 /// Fewest runs whose order says anything beside what is fitted to them.

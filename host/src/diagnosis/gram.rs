@@ -1,10 +1,10 @@
-//! The ledger: for every run, the scalar products of all columns in play.
+//! Gram matrices: for every run, the scalar products of all columns in play.
 //!
 //! Selection, folds, intervals and the bootstrap all work on sums of these small matrices over runs, so that
 //! a thousand refits cost less than one pass over the samples. Two metrics are kept: `white` weighs by noise
 //! and scatter between runs (evidence), `plain` is the energy on the circle with the centre free (misfit).
-use super::basis::{COLUMNS, Low};
-use super::column::Column;
+use super::design_column::Column;
+use super::low_orders::{COLUMNS, Low};
 use super::products::Products;
 use super::spread::Spread;
 use super::survey::Prepared;
@@ -13,7 +13,7 @@ use std::ops::Range;
 
 /// Products of columns; column 0 is the data.
 #[derive(Clone, Debug)]
-pub struct Ledger {
+pub struct Gram {
     columns: Vec<Column>,
     /// Per run: where its samples are in a column, and the discount of each basis column.
     places: Vec<Range<usize>>,
@@ -23,10 +23,10 @@ pub struct Ledger {
     plain: Vec<Products>,
 }
 
-impl Ledger {
-    /// Opens a ledger on the data.
+impl Gram {
+    /// Gram matrices of the data alone.
     pub fn open(runs: &[Prepared], spread: &Spread, data: Column) -> Self {
-        let mut ledger = Self {
+        let mut gram = Self {
             columns: Vec::new(),
             places: runs.iter().map(|run| run.place.clone()).collect(),
             discounts: runs
@@ -37,8 +37,8 @@ impl Ledger {
             white: vec![Products::default(); runs.len()],
             plain: vec![Products::default(); runs.len()],
         };
-        ledger.push(data);
-        ledger
+        gram.push(data);
+        gram
     }
 
     /// Adds a column and gives its number.
@@ -192,10 +192,10 @@ fn total(products: &[Products], weights: &[f64]) -> Products {
 
 #[cfg(test)]
 mod tests {
-    use super::super::item::Kind;
+    use super::super::hypothesis::Kind;
     use super::super::pattern::Pattern;
     use super::super::spread;
-    use super::super::survey::{Response, Survey, misfit};
+    use super::super::survey::{Survey, misfit};
     use super::*;
     use crate::causes::Cause;
     use crate::causes::Site;
@@ -206,7 +206,7 @@ mod tests {
 
     const PLAN: &str = r#"
 [campaign]
-name = "ledger"
+name = "gram matrices"
 [machine]
 x = { backlash_um = 8.0 }
 [instrument]
@@ -236,10 +236,9 @@ directions = ["ccw", "cw"]
 
     #[test]
     fn columns_that_come_or_change_together_are_those_that_did_so_one_by_one() {
-        let campaign =
-            simulation::campaign(&Plan::parse(PLAN, Path::new("ledger.toml")).unwrap(), 1);
+        let campaign = simulation::campaign(&Plan::parse(PLAN, Path::new("gram.toml")).unwrap(), 1);
         let (runs, _) =
-            Survey::new(&campaign).prepare(&Response::of(&Servo::Lag { kv_per_s: 90.0 }), 0.0);
+            Survey::new(&campaign).prepare(&Servo::Lag { kv_per_s: 90.0 }.response(), 0.0);
         let data = misfit(&runs);
         let spread = spread::measure(&runs, &data.all_samples(&runs), false);
         let columns: Vec<Column> = kinds()
@@ -256,13 +255,13 @@ directions = ["ccw", "cw"]
                 .iter()
                 .any(|column| !column.outside(&runs[0]).is_empty())
         );
-        let mut one_by_one = Ledger::open(&runs, &spread, data.clone());
+        let mut one_by_one = Gram::open(&runs, &spread, data.clone());
         for column in &columns {
             one_by_one.push(column.clone());
         }
-        let mut together = Ledger::open(&runs, &spread, data.clone());
+        let mut together = Gram::open(&runs, &spread, data.clone());
         assert_eq!(together.push_all(columns.clone()), 1..columns.len() + 1);
-        let same = |a: &Ledger, b: &Ledger| a.white == b.white && a.plain == b.plain;
+        let same = |a: &Gram, b: &Gram| a.white == b.white && a.plain == b.plain;
         assert!(same(&together, &one_by_one));
         let mut all = [vec![data], columns].concat();
         is_by_definition(&together, &all, &runs);
@@ -280,9 +279,9 @@ directions = ["ccw", "cw"]
     }
 
     /// White products weigh the low orders of a run by what scatter leaves of them, plain ones are without the centre.
-    fn is_by_definition(ledger: &Ledger, all: &[Column], runs: &[Prepared]) {
+    fn is_by_definition(gram: &Gram, all: &[Column], runs: &[Prepared]) {
         for (run, prepared) in runs.iter().enumerate() {
-            let [white, plain] = [&ledger.white[run], &ledger.plain[run]];
+            let [white, plain] = [&gram.white[run], &gram.plain[run]];
             for (i, j) in (0..all.len()).flat_map(|i| (0..all.len()).map(move |j| (i, j))) {
                 let (a, b) = (&all[i].low()[run], &all[j].low()[run]);
                 let outside = all[i].product_outside(&all[j], &prepared.place);
@@ -295,11 +294,8 @@ directions = ["ccw", "cw"]
                     (products.at(i, j) - value).abs() <= 1e-9 * size
                 };
                 assert!(close(plain, low + outside), "run {run}: {i}, {j}");
-                let weighed = kept(a, b, ledger.discounts(run)) + outside;
-                assert!(
-                    close(white, weighed / ledger.noise_m2),
-                    "run {run}: {i}, {j}"
-                );
+                let weighed = kept(a, b, gram.discounts(run)) + outside;
+                assert!(close(white, weighed / gram.noise_m2), "run {run}: {i}, {j}");
             }
             assert!(
                 (0..all.len()).all(|i| white.at(i, i) > 0.0 && plain.at(i, i) > 0.0),

@@ -1,6 +1,6 @@
 //! What an explanation does to every run, or the data: the low orders of each run by their coordinates, and the samples of
 //! what lies outside them. Most explanations are a few waves a turn and have no such samples at all.
-use super::basis::{COLUMNS, Low};
+use super::low_orders::{COLUMNS, Low};
 use super::survey::Prepared;
 use super::vector::{axpy, dot};
 use rayon::prelude::*;

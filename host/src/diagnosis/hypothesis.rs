@@ -1,6 +1,6 @@
 //! Explanations that compete: causes of the list and patterns without a name, and what each costs.
-use super::basis::Low;
-use super::column::Column;
+use super::design_column::Column;
+use super::low_orders::Low;
 use super::pattern::Pattern;
 use super::survey::Prepared;
 use crate::causes::{Cause, Harmonics, Seat, Site};
@@ -17,10 +17,10 @@ const PRICE_OF_PATTERN: f64 = 14.0;
 const PRICE_OF_VAGUENESS: f64 = 0.5;
 /// An explanation the search may choose.
 #[derive(Clone, Debug)]
-pub struct Item {
+pub struct Hypothesis {
     /// What it is.
     pub kind: Kind,
-    /// Its columns in the ledger.
+    /// Its columns in the Gram matrices.
     pub columns: Vec<usize>,
     /// What it has to take off χ² to be worth while.
     pub price: f64,
@@ -44,7 +44,7 @@ pub enum Kind {
     Pattern(Pattern),
 }
 
-impl Item {
+impl Hypothesis {
     /// Whether it is in the closed list.
     pub fn listed(&self) -> bool {
         matches!(self.kind, Kind::Cause { .. })

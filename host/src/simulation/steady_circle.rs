@@ -3,8 +3,8 @@
 use super::axis::AxisPoint;
 use super::chain::{Discrete, Stepper};
 use super::circle::{MAX_STEPS, ONE_REVERSAL_TURNS, RUN_IN_TIME_CONSTANTS};
+use super::hysteresis::{Hysteresis, turning_point};
 use super::machine::Machine;
-use super::memory::{Memory, turning_point};
 use super::wave::{Turns, phasor};
 
 /// Steps for which waves are worked out at a time: they stay in the L1 cache.
@@ -47,9 +47,9 @@ struct Axis<const S: usize> {
     track: Option<Track>,
 }
 
-/// Where an axis with a memory is.
+/// Where an axis with hysteresis is.
 struct Track {
-    memory: Memory,
+    hysteresis: Hysteresis,
     step_s: f64,
     last: [f64; 2],
 }
@@ -73,8 +73,8 @@ impl<const S: usize> Axis<S> {
         let start = turns.at(-before);
         let chain = chain.in_orbit(phasor, omega_rad_s, turns.step_rad(), start);
         let last = chain.look(start);
-        let track = Memory::new(machine, axis, last, step_s).map(|memory| Track {
-            memory,
+        let track = Hysteresis::new(machine, axis, last, step_s).map(|hysteresis| Track {
+            hysteresis,
             step_s,
             last,
         });
@@ -95,7 +95,7 @@ impl<const S: usize> Axis<S> {
 /// How long an axis has to move before what it remembers is that of the lap, s; none for one that remembers nothing.
 fn run_in_s(round: Round<'_>, axis: usize) -> Option<f64> {
     let machine = round.machine;
-    Memory::needed(machine, axis).then(|| {
+    Hysteresis::needed(machine, axis).then(|| {
         let turn_s = std::f64::consts::TAU / round.omega_rad_s.abs();
         let friction_s = machine.friction[axis].map_or(0.0, |_| machine.settling_s(axis));
         ONE_REVERSAL_TURNS * turn_s + RUN_IN_TIME_CONSTANTS * friction_s
@@ -112,7 +112,10 @@ impl<const S: usize> Orbit for Axis<S> {
                         track.go(now);
                     }
                     if k == 0 {
-                        points.push(AxisPoint::new(now, self.track.as_ref().map(|t| &t.memory)));
+                        points.push(AxisPoint::new(
+                            now,
+                            self.track.as_ref().map(|t| &t.hysteresis),
+                        ));
                     }
                 }
                 self.chain.step(*wave);
@@ -127,7 +130,7 @@ impl Track {
         let ([p0, v0], [p1, v1]) = (self.last, now);
         let y = [p0, v0, p1, v1];
         let mut turn = turning_point(y, self.step_s);
-        self.memory.follow(y, [0.0, 1.0], &mut turn);
+        self.hysteresis.follow(y, [0.0, 1.0], &mut turn);
         self.last = now;
     }
 }

@@ -1,9 +1,9 @@
 //! What the template is given: words and numbers, ready.
-use super::alone::Alone;
 use super::cause_view::{CauseView, cause, unexplained};
 use super::chart::shape;
+use super::each_cause_alone::Alone;
 use super::iso::{BudgetView, budget, iso_groups};
-use super::map::{Map, map};
+use super::misfit_map::{Map, map};
 use super::number::{fixed, plain};
 use super::plots::{collapse, over_acceleration, residuals};
 use super::verdict;
@@ -14,7 +14,7 @@ use serde::Serialize;
 
 /// The whole page.
 #[derive(Debug, Serialize)]
-pub struct View {
+pub struct PageContent {
     name: String,
     machine: String,
     grid: String,
@@ -74,7 +74,7 @@ struct Legend {
     radius: String,
 }
 
-impl View {
+impl PageContent {
     /// Of a campaign and its diagnosis.
     pub fn of(campaign: &Campaign, d: &Diagnosis) -> Self {
         let radii = radii(campaign);

@@ -29,7 +29,7 @@ pub(super) fn turning_point([p0, v0, p1, v1]: [f64; 4], h: f64) -> Option<f64> {
 
 /// What an axis remembers of its way.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Memory {
+pub(super) struct Hysteresis {
     half_backlash_m: f64,
     friction: Option<Friction>,
     /// Height of the pulse that an answer of 1 makes, m.
@@ -51,7 +51,7 @@ pub(super) struct Memory {
     step_keeps: [f64; 2],
 }
 
-impl Memory {
+impl Hysteresis {
     /// Whether anything on an axis depends on the way.
     pub(super) fn needed(machine: &Machine, axis: usize) -> bool {
         machine.backlash_m[axis] != 0.0
@@ -245,16 +245,16 @@ mod tests {
             backlash_m: [2e-5, 0.0, 0.0],
             ..Machine::default()
         };
-        let mut memory = Memory::new(&machine, 0, [0.0, 1.0], 1.0).unwrap();
-        memory.notice(1.0, 1e-3);
-        assert!((memory.error_m(1e-3, 1.0) + 1e-5).abs() < 1e-15);
-        memory.notice(1.0, 1e-3 - 5e-6);
+        let mut hysteresis = Hysteresis::new(&machine, 0, [0.0, 1.0], 1.0).unwrap();
+        hysteresis.notice(1.0, 1e-3);
+        assert!((hysteresis.error_m(1e-3, 1.0) + 1e-5).abs() < 1e-15);
+        hysteresis.notice(1.0, 1e-3 - 5e-6);
         assert!(
-            (memory.error_m(1e-3 - 5e-6, -1.0) + 5e-6).abs() < 1e-15,
+            (hysteresis.error_m(1e-3 - 5e-6, -1.0) + 5e-6).abs() < 1e-15,
             "inside the gap the load stands"
         );
-        memory.notice(1.0, 0.0);
-        assert!((memory.error_m(0.0, -1.0) - 1e-5).abs() < 1e-15);
+        hysteresis.notice(1.0, 0.0);
+        assert!((hysteresis.error_m(0.0, -1.0) - 1e-5).abs() < 1e-15);
     }
 
     /// Two samples at nearly the same time: rounding may put the later one behind the earlier.
@@ -268,16 +268,16 @@ mod tests {
             friction: [Some(friction), None, None],
             ..Machine::default()
         };
-        let mut memory = Memory::new(&machine, 0, [0.0, 1.0], 1.0).unwrap();
-        memory.notice(1.0, 0.1);
-        memory.notice(1.0, 0.0);
-        memory.notice(1.0, 0.1);
-        memory.notice(1.0, 0.2);
-        let before = memory.error_m(0.2, 1.0);
-        memory.notice(1e-16, 0.2 - 2.0 * f64::EPSILON);
+        let mut hysteresis = Hysteresis::new(&machine, 0, [0.0, 1.0], 1.0).unwrap();
+        hysteresis.notice(1.0, 0.1);
+        hysteresis.notice(1.0, 0.0);
+        hysteresis.notice(1.0, 0.1);
+        hysteresis.notice(1.0, 0.2);
+        let before = hysteresis.error_m(0.2, 1.0);
+        hysteresis.notice(1e-16, 0.2 - 2.0 * f64::EPSILON);
         assert!(
-            (memory.error_m(0.2, 1.0) - before).abs() < 1e-12,
-            "{memory:?}"
+            (hysteresis.error_m(0.2, 1.0) - before).abs() < 1e-12,
+            "{hysteresis:?}"
         );
     }
 }

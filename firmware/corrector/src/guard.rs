@@ -1,0 +1,91 @@
+//! The last gate before a drive: bounds of the offset and of its change, and the soft limits of a joint.
+
+/// The offset that passed last, by slide, m.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Guard {
+    last_m: [f64; 3],
+}
+
+/// What the gate had to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub(crate) struct Verdict {
+    pub(crate) offset_cut: bool,
+    pub(crate) slew_cut: bool,
+}
+
+impl Guard {
+    pub(crate) const fn new() -> Self {
+        Self { last_m: [0.0; 3] }
+    }
+
+    /// The offset that passed last, m.
+    pub(crate) const fn last_m(&self) -> [f64; 3] {
+        self.last_m
+    }
+
+    /// The offset that may go out: within ±`offset_m`, no more than `step_m` from the last one. What is no number is
+    /// taken for the last one.
+    pub(crate) fn pass(&mut self, wanted: [f64; 3], offset_m: f64, step_m: f64) -> Verdict {
+        let mut verdict = Verdict::default();
+        for (last, wanted) in self.last_m.iter_mut().zip(wanted) {
+            let wanted = if wanted.is_finite() { wanted } else { *last };
+            let bounded = wanted.max(-offset_m).min(offset_m);
+            let change = bounded - *last;
+            let slewed = change.max(-step_m).min(step_m);
+            verdict.offset_cut |= bounded != wanted;
+            verdict.slew_cut |= slewed != change;
+            // Reached exactly: 0 has to come back as 0.
+            *last = if slewed == change {
+                bounded
+            } else {
+                *last + slewed
+            };
+        }
+        verdict
+    }
+}
+
+/// A corrected place within the soft limits of its joint, or, where the planner itself is beyond them, no farther out.
+pub(crate) fn within(corrected: f64, planned: f64, [least, most]: [f64; 2]) -> f64 {
+    let (least, most) = (least.min(planned), most.max(planned));
+    // Limits that are no numbers limit nothing.
+    if least <= most {
+        corrected.max(least).min(most)
+    } else {
+        corrected
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_passes_beyond_its_bounds_and_everything_within_passes_unchanged() {
+        let mut guard = Guard::new();
+        assert_eq!(guard.pass([0.1, -0.1, 0.0], 1.0, 0.1), Verdict::default());
+        assert_eq!(guard.last_m(), [0.1, -0.1, 0.0]);
+        let verdict = guard.pass([9.0, -9.0, f64::NAN], 1.0, 0.1);
+        assert_eq!(guard.last_m(), [0.2, -0.2, 0.0]);
+        assert!(verdict.offset_cut && verdict.slew_cut);
+        for _ in 0..50 {
+            guard.pass([f64::INFINITY, -9.0, 0.0], 1.0, 0.1);
+        }
+        let [x, y, z] = guard.last_m();
+        assert!(
+            x <= 0.3 && y == -1.0 && z == 0.0,
+            "infinite is no number: {x}"
+        );
+    }
+
+    #[test]
+    fn soft_limits_hold_where_the_planner_keeps_them() {
+        assert_eq!(within(10.2, 9.9, [0.0, 10.0]), 10.0);
+        assert_eq!(within(-0.2, 0.1, [0.0, 10.0]), 0.0);
+        // The planner is out: no farther.
+        assert_eq!(within(11.5, 11.0, [0.0, 10.0]), 11.0);
+        assert_eq!(within(10.5, 11.0, [0.0, 10.0]), 10.5);
+        assert_eq!(within(5.0, 4.0, [f64::NEG_INFINITY, f64::INFINITY]), 5.0);
+        assert_eq!(within(5.0, 4.0, [f64::NAN, f64::NAN]), 4.0);
+    }
+}

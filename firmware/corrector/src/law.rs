@@ -1,0 +1,151 @@
+//! A table in the form that the tick runs: operator and merged terms of each zone, in double precision, SI.
+use giotto_shared::bounds::{OFFSET_MAX_M, SLEW_MAX_M_S};
+use giotto_shared::law::{Operator, Profile};
+use giotto_shared::model::Cumulants;
+use giotto_shared::table::{self, MAX_ZONES, Table, TableError, Travel, Zone};
+use giotto_shared::term::{ProfileError, Term};
+
+/// Why a table cannot be used.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LawError {
+    /// Its bytes or numbers.
+    Table(TableError),
+    /// A term of a zone (from 0) that cannot be undone together with those before it.
+    Term(usize, ProfileError),
+    /// The table before is still being exchanged for the one in use.
+    Busy,
+}
+
+/// One zone.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ZoneLaw {
+    pub(crate) operator: Operator<f64>,
+    pub(crate) profile: Profile<f64>,
+    /// Whether any profile term is there at all.
+    pub(crate) has_terms: bool,
+    place_m: Option<[[f64; 2]; 3]>,
+    pub(crate) radius_m: [f64; 2],
+    feed_m_s: f64,
+    travel: Travel,
+}
+
+/// What the path does at the place that is corrected.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Here {
+    pub(crate) place_m: [f64; 3],
+    pub(crate) speed_m_s: f64,
+    pub(crate) centripetal_m_s2: f64,
+    /// Turns counter-clockwise (`true`) or clockwise in the coordinate plane nearest to that of the turn; `None`: straight.
+    pub(crate) ccw: Option<bool>,
+}
+
+/// Below this acceleration across the path it is straight, m/s².
+pub(crate) const STRAIGHT_M_S2: f64 = 1e-3;
+/// What feeds and radii may be beyond a zone's and still count as meant, share.
+const SLACK: f64 = 0.02;
+
+impl ZoneLaw {
+    fn new(zone: &Zone, index: usize) -> Result<Self, LawError> {
+        let mut profile = Profile::default();
+        for (at, term) in zone.terms.iter().enumerate() {
+            let term: Term<f64> = term.map(f64::from);
+            term.add_to(&mut profile)
+                .map_err(|reason| LawError::Term(index, ProfileError { index: at, reason }))?;
+        }
+        let place_m = zone.place_m.map(|[[x0, y0, z0], [x1, y1, z1]]| {
+            [[x0, x1], [y0, y1], [z0, z1]].map(|range| range.map(f64::from))
+        });
+        Ok(Self {
+            operator: Operator::new(&Cumulants {
+                kappa2_s2: f64::from(zone.cumulants.kappa2_s2),
+                kappa4_s4: f64::from(zone.cumulants.kappa4_s4),
+            }),
+            profile,
+            has_terms: !zone.terms.is_empty(),
+            place_m,
+            radius_m: zone.radius_m.map(f64::from),
+            feed_m_s: f64::from(zone.feed_m_s[1]),
+            travel: zone.travel,
+        })
+    }
+
+    /// Where errors of position are counted from: the middle of the zone's place, if it has one.
+    pub(crate) fn reference_m(&self) -> Option<[f64; 3]> {
+        self.place_m
+            .map(|place| place.map(|[low, high]| 0.5 * (low + high)))
+    }
+
+    /// Whether the zone holds here. A stream has no segments, so that nobody says which circle is meant: feed and radius
+    /// are judged by what the path does, and only where it turns.
+    fn fits(&self, here: &Here) -> bool {
+        let inside = |(value, [low, high]): (f64, [f64; 2])| {
+            let slack = 1e-6 * value.abs();
+            value >= low - slack && value <= high + slack
+        };
+        let place = self
+            .place_m
+            .is_none_or(|place| here.place_m.into_iter().zip(place).all(inside));
+        if !place || here.centripetal_m_s2 < STRAIGHT_M_S2 {
+            return place;
+        }
+        let travel = match (self.travel, here.ccw) {
+            (Travel::Both, _) | (_, None) => true,
+            (Travel::Ccw, Some(ccw)) => ccw,
+            (Travel::Cw, Some(ccw)) => !ccw,
+        };
+        let most = 1.0 + SLACK;
+        let [smallest_m, _] = self.radius_m;
+        travel
+            && here.speed_m_s <= self.feed_m_s * most
+            && here.centripetal_m_s2 * smallest_m <= self.feed_m_s * self.feed_m_s * most
+    }
+}
+
+/// A whole table.
+#[derive(Clone, Debug)]
+pub struct Law {
+    zones: [Option<ZoneLaw>; MAX_ZONES],
+    /// Bounds of table and image, the harder of each.
+    pub(crate) offset_m: f64,
+    pub(crate) slew_m_s: f64,
+}
+
+impl Law {
+    /// No zones: corrects nothing.
+    pub const fn none() -> Self {
+        Self {
+            zones: [None; MAX_ZONES],
+            offset_m: 0.0,
+            slew_m_s: 0.0,
+        }
+    }
+
+    /// From the bytes of a table, checked as a board checks them.
+    ///
+    /// # Errors
+    /// [`LawError`]; the law is as it was.
+    pub fn load(&mut self, image: &[u8], place: &mut Table) -> Result<(), LawError> {
+        table::decode_into(image, place).map_err(LawError::Table)?;
+        let mut zones = [None; MAX_ZONES];
+        for (index, (built, zone)) in zones.iter_mut().zip(&place.zones).enumerate() {
+            *built = Some(ZoneLaw::new(zone, index)?);
+        }
+        *self = Self {
+            zones,
+            offset_m: f64::from(place.limits.offset_m.min(OFFSET_MAX_M)),
+            slew_m_s: f64::from(place.limits.slew_m_s.min(SLEW_MAX_M_S)),
+        };
+        Ok(())
+    }
+
+    /// The first zone that holds here.
+    pub(crate) fn choose(&self, here: &Here) -> Option<usize> {
+        self.zones
+            .iter()
+            .position(|zone| zone.as_ref().is_some_and(|zone| zone.fits(here)))
+    }
+
+    pub(crate) fn zone(&self, index: usize) -> Option<&ZoneLaw> {
+        self.zones.get(index).and_then(Option::as_ref)
+    }
+}
