@@ -241,11 +241,31 @@ impl Source<'_> {
                 }
             },
         };
+        let runs = self.entries(list, &head, kinematics.is_some())?;
+        Ok(Manifest {
+            path: self.file.to_path_buf(),
+            name: head.name,
+            machine: head.machine,
+            repeatability_m: head.repeatability_m,
+            table: head.table,
+            kinematics,
+            runs,
+            notes: self.notes,
+        })
+    }
+
+    /// The runs of the list; those of an arm say where they are.
+    fn entries(
+        &mut self,
+        list: &[Value<'_>],
+        head: &Head,
+        of_arm: bool,
+    ) -> Result<Vec<Entry>, CampaignError> {
         let mut runs = Vec::with_capacity(list.len());
         let mut seen: HashMap<PathBuf, usize> = HashMap::new();
         for value in list {
             let (entry, span) = self.entry(value, head.plane)?;
-            if kinematics.is_some() {
+            if of_arm {
                 self.with_centre(&entry, span.clone())?;
             }
             let plain: PathBuf = entry
@@ -265,16 +285,7 @@ impl Source<'_> {
             seen.insert(plain, entry.line);
             runs.push(entry);
         }
-        Ok(Manifest {
-            path: self.file.to_path_buf(),
-            name: head.name,
-            machine: head.machine,
-            repeatability_m: head.repeatability_m,
-            table: head.table,
-            kinematics,
-            runs,
-            notes: self.notes,
-        })
+        Ok(runs)
     }
 
     fn head(&mut self, value: &Value<'_>) -> Result<Head, CampaignError> {

@@ -38,7 +38,9 @@ impl Arms {
         let Some(kinematics) = &campaign.kinematics else {
             return Self::default();
         };
-        let mut known: Vec<(([f64; 3], Frame, f64), Arc<Orbit>)> = Vec::new();
+        /// Centre, frame and radius, m.
+        type Circle = ([f64; 3], Frame, f64);
+        let mut known: Vec<(Circle, Arc<Orbit>)> = Vec::new();
         let mut orbits = Vec::with_capacity(campaign.runs.len());
         for run in &campaign.runs {
             let centre_m = run.centre_m.unwrap_or_default();

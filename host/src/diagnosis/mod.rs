@@ -217,10 +217,6 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
     } else {
         Survey::new(&seen)
     };
-    let clamp = match durations {
-        Durations::Clamped(clamp) if !knows_clamp(&baseline.known) => Some(clamp),
-        _ => None,
-    };
     let ground = Footing::of(
         &session.campaign,
         &durations,
@@ -231,7 +227,10 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
     if like_arm {
         like_arm::take_out_slides(&mut explanation.found);
     }
-    let clamp = clamp.filter(|_| !like_arm);
+    let clamp = match durations {
+        Durations::Clamped(clamp) if !like_arm && !knows_clamp(&baseline.known) => Some(clamp),
+        _ => None,
+    };
     let ties = verdict::ties(&explanation.found);
     explanation.found.tied = ties.iter().map(|(item, _)| *item).collect();
     let proof = prove(
@@ -251,15 +250,7 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
         &ground,
         proof.as_ref(),
     );
-    let mut cannot_tell = ground.cannot_tell;
-    if like_arm {
-        cannot_tell.insert(0, like_arm::WORDS.to_owned());
-    }
-    cannot_tell.extend(explanation.words());
-    cannot_tell.extend(
-        ties.iter()
-            .map(|(item, other)| tie_words(found, *item, *other)),
-    );
+    let cannot_tell = open_questions(ground.cannot_tell, &explanation, &ties, like_arm);
     let model = extended_model(&session.campaign, &survey, found, &baseline, &stated);
     let picture = pictured(&session.campaign, &session.places, &seen, found);
     // Where no run can be left out, what the search leaves of the runs it saw.
@@ -291,12 +282,35 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
         model,
         findings: stated.findings,
     };
-    diagnosis.recommendation = recommendation::of(&diagnosis);
+    recommend(&mut diagnosis, like_arm);
+    Ok(diagnosis)
+}
+
+/// Adds the one thing to do.
+fn recommend(diagnosis: &mut Diagnosis, like_arm: bool) {
+    diagnosis.recommendation = recommendation::of(diagnosis);
     if like_arm {
         diagnosis.unexplained.present = true;
         diagnosis.recommendation = like_arm::recommendation();
     }
-    Ok(diagnosis)
+}
+
+/// What these runs leave open, the weightiest first.
+fn open_questions(
+    poverty: Vec<String>,
+    explanation: &Explanation,
+    ties: &[(usize, crate::causes::Cause)],
+    like_arm: bool,
+) -> Vec<String> {
+    let of_tie = |(item, other): &(usize, crate::causes::Cause)| {
+        tie_words(&explanation.found, *item, *other)
+    };
+    let arm = like_arm.then(|| like_arm::WORDS.to_owned());
+    arm.into_iter()
+        .chain(poverty)
+        .chain(explanation.words())
+        .chain(ties.iter().map(of_tie))
+        .collect()
 }
 
 /// What the plots of a report draw, run by run; `places` are those of the runs in the given campaign.

@@ -105,8 +105,8 @@ fn the_hand_points_where_it_is_told_to() {
             longer.tool_m[axis] += 0.1;
             let moved = Kinematics::Opw(longer).place(&q);
             let from = Kinematics::Opw(arm).place(&q);
-            for k in 0..3 {
-                let want = 0.1 * matrix[k][axis];
+            for (k, row) in matrix.iter().enumerate() {
+                let want = 0.1 * row[axis];
                 assert!((moved[k] - from[k] - want).abs() < 1e-12, "{branch:?}");
             }
         }
@@ -202,14 +202,14 @@ fn a_circle_is_that_of_its_joints() {
             let place = [0, 1, 2]
                 .map(|k| places[0][k] + 0.08 * (cos * frame.first()[k] + sin * frame.second()[k]));
             let q = arm.angles(place).unwrap();
-            for joint in 0..arm.turning() {
+            for (joint, &truth) in q.iter().enumerate().take(arm.turning()) {
                 let [got, ..] = orbit.at(joint, angle);
-                assert!(short_way(got, q[joint]).abs() < 1e-6);
+                assert!(short_way(got, truth).abs() < 1e-6);
                 let waves = orbit.waves(joint).iter().enumerate();
                 let sum: Complex<f64> = waves
                     .map(|(n, wave)| wave * Complex::cis(n as f64 * angle))
                     .sum();
-                assert!(short_way(sum.re, q[joint]).abs() < 1e-6, "{arm:?} {joint}");
+                assert!(short_way(sum.re, truth).abs() < 1e-6, "{arm:?} {joint}");
             }
         }
         for joint in 0..arm.turning() {
