@@ -5,6 +5,7 @@ pub mod contour;
 pub mod elf;
 pub mod faults;
 pub mod link;
+pub mod linuxcnc;
 pub mod planes;
 pub mod programs;
 pub mod rate;

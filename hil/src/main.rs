@@ -3,6 +3,7 @@
 
 use clap::{Parser, Subcommand};
 use giotto_hil::faults;
+use giotto_hil::linuxcnc::{self, LinuxCncError};
 use giotto_hil::scenarios::{self, Outcome};
 use giotto_hil::ticks::{self, Counts, TERMS};
 use giotto_hil::{link, rate, size, streams};
@@ -67,6 +68,18 @@ enum Command {
         #[arg(long)]
         check: bool,
     },
+    /// The loop closed in LinuxCNC: measured, diagnosed, flashed into the running component, measured again.
+    Linuxcnc {
+        /// The component; without it the one that was built beside this program.
+        #[arg(long)]
+        component: Option<PathBuf>,
+        /// One JSON document.
+        #[arg(long)]
+        json: bool,
+        /// Exit code 5 unless every bar is met, and where there is no LinuxCNC.
+        #[arg(long)]
+        check: bool,
+    },
     /// What an image takes in flash and RAM, its deepest stack, and whether its tick can panic.
     Size {
         /// The board: `mps2_an386` or `stm32f405`; only the first one's stack can be measured.
@@ -108,6 +121,11 @@ fn main() -> ExitCode {
             json,
         } => run_scenarios(&port, &OpenOptions { image, baud }, worn_flash, json),
         Command::Link { json, check } => run_link(json, check),
+        Command::Linuxcnc {
+            component,
+            json,
+            check,
+        } => return run_linuxcnc(component, json, check),
         Command::Rate { json, check } => run_rate(json, check),
         Command::Size {
             board,
@@ -246,6 +264,52 @@ fn run_link(as_json: bool, check: bool) -> Result<ExitCode, ControllerError> {
     } else {
         ExitCode::SUCCESS
     })
+}
+
+/// The component that cargo has built beside this program.
+fn built_component() -> PathBuf {
+    let mut path = std::env::current_exe().unwrap_or_default();
+    path.pop();
+    path.join("libgiotto_linuxcnc.so")
+}
+
+fn run_linuxcnc(component: Option<PathBuf>, as_json: bool, check: bool) -> ExitCode {
+    let component = component.unwrap_or_else(built_component);
+    let report = match linuxcnc::run(&component, &mut |text: &str| eprintln!("{text}")) {
+        Ok(report) => report,
+        Err(error) => {
+            eprintln!("{error}");
+            let skipped = matches!(error, LinuxCncError::Skipped(_));
+            return ExitCode::from(if skipped && !check { 0 } else { 5 });
+        }
+    };
+    if as_json {
+        println!("{:#}", report.document());
+    } else {
+        println!(
+            "                     radius error, rms    out-of-roundness, mean    contour of the part, largest"
+        );
+        for (name, left) in [
+            ("without", &report.before),
+            ("component", &report.component),
+            ("compensate", &report.compensated),
+        ] {
+            let ([radius, round, contour], [less, rounder, nearer]) =
+                (left.figures_um(), left.gains_percent(&report.before));
+            println!(
+                "{name:12} {radius:12.2} um {less:7.2} % {round:12.2} um {rounder:7.1} % {contour:14.2} um {nearer:7.1} %"
+            );
+        }
+        let [median, longest] = report.update_us;
+        println!(
+            "update: {median:.2} us median, {longest:.2} us at most; {} runs diagnosed",
+            report.runs
+        );
+        for finding in &report.findings {
+            println!("found: {finding}");
+        }
+    }
+    ExitCode::from(if check && !report.meets_bars() { 5 } else { 0 })
 }
 
 fn run_rate(as_json: bool, check: bool) -> Result<ExitCode, ControllerError> {

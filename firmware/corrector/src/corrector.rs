@@ -398,9 +398,9 @@ impl Corrector {
                     .copied()
                     .unwrap_or([0.0; 2])
                     .map(|limit| limit + motor);
-                let corrected = planned + add;
-                place = within(corrected, planned, soft);
-                cut |= place != corrected;
+                let allowed = within(add, planned, soft);
+                place = planned + allowed;
+                cut |= allowed != add;
             }
             if let (Some(command), Some(feedback)) =
                 (out.command.get_mut(joint), out.feedback.get_mut(joint))

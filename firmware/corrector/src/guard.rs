@@ -45,15 +45,24 @@ impl Guard {
     }
 }
 
-/// A corrected place within the soft limits of its joint, or, where the planner itself is beyond them, no farther out.
-pub(crate) fn within(corrected: f64, planned: f64, [least, most]: [f64; 2]) -> f64 {
-    let (least, most) = (least.min(planned), most.max(planned));
-    // Limits that are no numbers limit nothing.
-    if least <= most {
-        corrected.max(least).min(most)
+/// Within so many times its own size from a soft limit an offset toward it is taken back.
+const NEAR: f64 = 8.0;
+
+/// The part of an offset that may be added to a planned place: less and less of it as the place comes near the soft limit
+/// that it leads to, none at the limit, none beyond. It never leads over the limit, and its velocity does not jump.
+pub(crate) fn within(add: f64, planned: f64, [least, most]: [f64; 2]) -> f64 {
+    let room = if add > 0.0 {
+        most - planned
     } else {
-        corrected
+        planned - least
+    };
+    let near = NEAR * add.abs();
+    // Limits that are no numbers limit nothing.
+    if room >= near || room.is_nan() {
+        return add;
     }
+    let share = (room / near).max(0.0);
+    add * share * (2.0 - share)
 }
 
 #[cfg(test)]
@@ -80,12 +89,19 @@ mod tests {
 
     #[test]
     fn soft_limits_hold_where_the_planner_keeps_them() {
-        assert_eq!(within(10.2, 9.9, [0.0, 10.0]), 10.0);
-        assert_eq!(within(-0.2, 0.1, [0.0, 10.0]), 0.0);
-        // The planner is out: no farther.
-        assert_eq!(within(11.5, 11.0, [0.0, 10.0]), 11.0);
-        assert_eq!(within(10.5, 11.0, [0.0, 10.0]), 10.5);
-        assert_eq!(within(5.0, 4.0, [f64::NEG_INFINITY, f64::INFINITY]), 5.0);
-        assert_eq!(within(5.0, 4.0, [f64::NAN, f64::NAN]), 4.0);
+        assert_eq!(within(0.2, 5.0, [0.0, 10.0]), 0.2);
+        assert_eq!(within(-0.2, 5.0, [0.0, 10.0]), -0.2);
+        assert_eq!(within(0.2, 10.0, [0.0, 10.0]), 0.0);
+        // The planner is out: no farther, but back.
+        assert_eq!(within(0.5, 11.0, [0.0, 10.0]), 0.0);
+        assert_eq!(within(-0.5, 11.0, [0.0, 10.0]), -0.5);
+        assert_eq!(within(1.0, 4.0, [f64::NAN, f64::NAN]), 1.0);
+        let mut last = within(0.2, 8.0, [0.0, 10.0]);
+        for step in 0..2000 {
+            let planned = 8.0 + f64::from(step) * 1e-3;
+            let add = within(0.2, planned, [0.0, 10.0]);
+            assert!(planned + add <= 10.0 && (add - last).abs() < 0.5e-3);
+            last = add;
+        }
     }
 }

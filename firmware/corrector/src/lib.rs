@@ -42,3 +42,5 @@ pub use corrector::{Corrector, Counters, Input, Output};
 pub use history::LONGEST_STRIDE;
 pub use law::{Law, LawError};
 pub use settings::{JOINTS, PERIOD_S, Settings, SettingsError};
+#[cfg(test)]
+mod tests;

@@ -171,6 +171,11 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
         &mut self.store
     }
 
+    /// Goes on in the bypass that another server of the same engine has left.
+    pub fn keep_bypass(&mut self, on: bool) {
+        self.bypass = on;
+    }
+
     /// Gives back flash and engine, as a reset does.
     pub fn into_parts(self) -> (F, M) {
         (self.store.into_flash(), self.motion)
@@ -216,6 +221,9 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     pub fn supervise(&mut self) {
         let snapshot = self.motion.snapshot();
         self.events.look(&snapshot);
+        if !self.motion.plans() {
+            return;
+        }
         let now = self.motion.now();
         if self.supervision.silent(now) && self.supervision.dead(snapshot.state, now) {
             self.motion.hold();
@@ -430,6 +438,15 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             MotionState::Running | MotionState::Stopping | MotionState::Paused => {
                 Err(Refusal::Busy)
             }
+        }
+    }
+
+    /// A table may be exchanged.
+    fn exchanges(&self) -> Result<(), Refusal> {
+        if self.motion.plans() {
+            self.idle()
+        } else {
+            Ok(())
         }
     }
 

@@ -69,6 +69,12 @@ pub trait Motion {
     /// Ticks since boot, as in the snapshot.
     fn now(&self) -> u32;
 
+    /// Whether it plans the path itself. One that corrects the set-points of another controller does not: nothing is stopped
+    /// there because a host falls silent, and tables are exchanged while the machine moves.
+    fn plans(&self) -> bool {
+        true
+    }
+
     /// Corrects with the table of this image from the next program on; `None`: no correction.
     ///
     /// # Errors

@@ -58,7 +58,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     /// Checks the uploaded table and programs the slot that does not boot.
     #[inline(never)]
     pub(super) fn program(&mut self) -> Result<u8, Refusal> {
-        self.idle()?;
+        self.exchanges()?;
         let length = self.upload.end(&self.buffers.image)?;
         let image = self
             .buffers
@@ -86,7 +86,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     /// Hands the written table to the engine, on probation.
     #[inline(never)]
     pub(super) fn commit(&mut self) -> Result<u8, Refusal> {
-        self.idle()?;
+        self.exchanges()?;
         let slot = self.written.ok_or(Refusal::NothingToCommit)?;
         if let Err(refusal) = self.install(slot) {
             self.install_last_good();
@@ -116,7 +116,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     /// Ends a probation, or else makes the other confirmed table the one that boots.
     #[inline(never)]
     pub(super) fn roll_back(&mut self) -> Result<(), Refusal> {
-        self.idle()?;
+        self.exchanges()?;
         if self.probation != Probation::None {
             self.install_last_good();
             return Ok(());

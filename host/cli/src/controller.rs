@@ -1,6 +1,7 @@
 //! `giotto controller`: start a virtual controller.
 use super::{Failure, Output};
 use giotto_link::emulator::{Emulator, Pace};
+use giotto_link::linuxcnc::LinuxCncLink;
 use giotto_link::serve::serve;
 use giotto_link::virtual_controller::VirtualLink;
 use std::io::Write;
@@ -9,7 +10,8 @@ use std::path::PathBuf;
 /// Arguments of `giotto controller`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// `sim`: the firmware's library in this process; `qemu`: the firmware image in the emulator.
+    /// `sim`: the firmware's library in this process; `qemu`: the firmware image in the emulator; `linuxcnc`: the component
+    /// in a LinuxCNC that runs on this computer.
     kind: Kind,
     /// Firmware image for `qemu`, instead of the one of this workspace.
     #[arg(long, value_name = "PATH")]
@@ -20,6 +22,7 @@ pub struct Args {
 enum Kind {
     Sim,
     Qemu,
+    Linuxcnc,
 }
 
 /// The line that says where the controller can be reached; always the first on stdout.
@@ -33,6 +36,7 @@ fn announce(path: &str) {
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     match args.kind {
         Kind::Sim => match serve(VirtualLink::new(), &mut announce)? {},
+        Kind::Linuxcnc => match serve(LinuxCncLink::open()?, &mut announce)? {},
         Kind::Qemu => {
             let mut note = |text: &str| out.note(text);
             let emulator = Emulator::start(args.image.as_deref(), Pace::Stepped, &mut note)?;

@@ -7,7 +7,8 @@ use std::path::PathBuf;
 /// Which controller.
 #[derive(clap::Args, Debug)]
 pub(super) struct PortArgs {
-    /// Serial device, `sim` (virtual controller in this process) or `qemu` (boots the firmware image).
+    /// Serial device, `sim` (virtual controller in this process), `qemu` (boots the firmware image) or `linuxcnc` (the
+    /// component in a LinuxCNC that runs on this computer).
     #[arg(long, value_name = "PORT", value_parser = clap::builder::NonEmptyStringValueParser::new())]
     port: String,
     /// Firmware image for `qemu`, instead of the one of this workspace.

@@ -99,6 +99,12 @@ pub enum ControllerError {
         /// How many.
         lost: usize,
     },
+    /// No LinuxCNC with the component runs here.
+    #[error("linuxcnc: no LinuxCNC that has loaded giotto runs on this computer: {reason}")]
+    NoComponent {
+        /// What was looked for, and what was found.
+        reason: String,
+    },
     /// No emulator.
     #[error("{program} is not installed")]
     NoEmulator {
@@ -128,6 +134,10 @@ impl ControllerError {
             Self::NoPort { .. } | Self::CannotOpen { .. } => {
                 "name a serial device such as /dev/ttyUSB0, `sim`, or `qemu`; \
                  `giotto controller sim` starts a virtual controller and prints its port"
+            }
+            Self::NoComponent { .. } => {
+                "start LinuxCNC with `loadrt giotto joints=3` and `addf giotto.update servo-thread` in its HAL file, as the \
+                 user who runs this; the guide's page on LinuxCNC has the lines"
             }
             Self::InUse { .. } => "close the other program, or wait until it is done",
             Self::NoAnswer { .. } | Self::Lost { .. } => {

@@ -13,6 +13,7 @@
 //! | [`settings`] | stored limits, and the log of events |
 //! | [`port`] | what `--port` may name, and opening it |
 //! | [`serial`] | a serial device |
+//! | [`linuxcnc`] | the component in a LinuxCNC that runs on this computer |
 //! | [`stepped`] | an emulator whose time passes only while someone waits |
 //! | [`virtual_controller`] | the firmware's library in this process, in simulated time, or behind a pty |
 //! | [`emulator`] | the firmware image in QEMU |
@@ -42,6 +43,7 @@ pub mod error;
 pub mod flash;
 pub mod image;
 pub mod link;
+pub mod linuxcnc;
 pub mod log;
 pub mod outside;
 mod pipelined;
@@ -55,6 +57,7 @@ pub mod signing;
 pub mod stepped;
 pub mod streaming;
 pub mod virtual_controller;
+mod wires;
 
 #[cfg(test)]
 mod tests;

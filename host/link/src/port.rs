@@ -3,6 +3,7 @@ use super::client::Controller;
 use super::emulator::{Emulator, Pace};
 use super::error::ControllerError;
 use super::image::Board;
+use super::linuxcnc::LinuxCncLink;
 use super::serial::SerialLink;
 use super::virtual_controller::VirtualLink;
 use giotto_shared::wire::{Command, PositionState};
@@ -29,6 +30,8 @@ pub enum Port {
     Qemu,
     /// The image of another board in QEMU.
     QemuBoard(Board),
+    /// The component in a LinuxCNC that runs on this computer.
+    LinuxCnc,
     /// A serial device.
     Device(String),
 }
@@ -40,6 +43,7 @@ impl FromStr for Port {
         Ok(match name {
             "sim" => Self::Sim,
             "qemu" => Self::Qemu,
+            "linuxcnc" => Self::LinuxCnc,
             device => match device.strip_prefix("qemu:").and_then(Board::named) {
                 Some(board) => Self::QemuBoard(board),
                 None => Self::Device(device.to_owned()),
@@ -100,6 +104,9 @@ pub fn open(
                 controller.supervise(None)?;
             }
             Ok(controller)
+        }
+        Port::LinuxCnc => {
+            Controller::connect(Box::new(LinuxCncLink::open()?), "linuxcnc", session())
         }
         Port::Device(path) => {
             let link = SerialLink::open(path, options.baud)?;

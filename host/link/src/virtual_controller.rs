@@ -3,13 +3,13 @@
 //! In this process ([`VirtualLink`]) time is simulated: it passes only while someone waits for an answer, as fast
 //! as the ticks can be computed. Behind a pty ([`serve`](super::serve::serve)) it is the clock's.
 use super::link::Link;
+use super::wires::Wires;
 use giotto_firmware::control::{Desk, Job, Receiver, SEGMENTS, SET_POINTS, Sender, Shared, Tick};
 use giotto_firmware::engine::{Config, Executor, Planner};
 use giotto_firmware::server::{Board, Buffers, Motion, Server, TimedSetPoint};
 use giotto_firmware::store::{Layout, ram::RamFlash};
 use giotto_shared::wire::{ClockSource, Pose, PositionState, ResetCause};
 use std::collections::VecDeque;
-use std::convert::Infallible;
 use std::io;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -17,9 +17,9 @@ use std::time::Duration;
 /// Ticks a second.
 pub const TICK_HZ: u32 = 1000;
 /// Bytes of a slot.
-const SLOT: usize = 4096;
+pub(crate) const SLOT: usize = 4096;
 /// Two slots, the key and two units of the configuration, each one erase unit.
-const LAYOUT: Layout = Layout::new([0, SLOT as u32], SLOT as u32)
+pub(crate) const LAYOUT: Layout = Layout::new([0, SLOT as u32], SLOT as u32)
     .with_key(2 * SLOT as u32)
     .with_config([3 * SLOT as u32, 4 * SLOT as u32]);
 const BOARD: Board = Board {
@@ -98,44 +98,6 @@ type VirtualTick = Tick<Arc<Shared>, Queue<Job>, Queue<TimedSetPoint>>;
 type VirtualDesk = Desk<Box<Planner>, Arc<Shared>, Queue<Job>, Queue<TimedSetPoint>>;
 type VirtualServer = Server<Flash, VirtualDesk, Box<Buffers>>;
 
-/// The port of a virtual controller: bytes for it, bytes from it.
-#[derive(Debug, Default)]
-struct Wires {
-    to_controller: VecDeque<u8>,
-    to_host: VecDeque<u8>,
-}
-
-impl embedded_io::ErrorType for Wires {
-    type Error = Infallible;
-}
-
-impl embedded_io::Read for Wires {
-    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Infallible> {
-        let count = buffer.len().min(self.to_controller.len());
-        for (to, from) in buffer.iter_mut().zip(self.to_controller.drain(..count)) {
-            *to = from;
-        }
-        Ok(count)
-    }
-}
-
-impl embedded_io::ReadReady for Wires {
-    fn read_ready(&mut self) -> Result<bool, Infallible> {
-        Ok(!self.to_controller.is_empty())
-    }
-}
-
-impl embedded_io::Write for Wires {
-    fn write(&mut self, buffer: &[u8]) -> Result<usize, Infallible> {
-        self.to_host.extend(buffer);
-        Ok(buffer.len())
-    }
-
-    fn flush(&mut self) -> Result<(), Infallible> {
-        Ok(())
-    }
-}
-
 /// A controller without hardware.
 pub struct VirtualController {
     server: VirtualServer,
@@ -206,11 +168,7 @@ impl VirtualController {
 
     /// Bytes for the host.
     pub fn take(&mut self, buffer: &mut [u8]) -> usize {
-        let count = buffer.len().min(self.wires.to_host.len());
-        for (to, from) in buffer.iter_mut().zip(self.wires.to_host.drain(..count)) {
-            *to = from;
-        }
-        count
+        self.wires.take(buffer)
     }
 
     /// Warm reset: the flash stays, and so does what the drives were told last.

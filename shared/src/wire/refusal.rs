@@ -160,4 +160,7 @@ pub enum MotionRefusal {
     /// Nothing runs that could be held, or it is a stream, whose feed is its sender's.
     #[error("nothing runs whose feed could be held")]
     NotHeld,
+    /// The path is planned by the machine's own controller.
+    #[error("the machine's own controller plans the path: run the program there")]
+    PlannedElsewhere,
 }

@@ -1,0 +1,393 @@
+//! The loop closed in LinuxCNC, a controller by others: measured, explained, flashed into the running component, measured
+//! again on circles and a part that were never measured.
+//!
+//! LinuxCNC's threads run by a clock that a busy computer makes late. Nothing that is judged depends on it: samples are taken
+//! by the tick, the machine is made of components of the same thread, and programs wait for each other.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `machine` | the machine of LinuxCNC's own components, its INI and HAL |
+//! | `session`, `driver.py` | LinuxCNC started as an ordinary user, and told what to do |
+//! | `samples` | what halsampler writes |
+//! | `programs` | circles, and a part |
+mod machine;
+mod programs;
+mod samples;
+mod session;
+
+use giotto::analysis::of_campaign;
+use giotto::campaign::import::{Format, Laps, Options, add};
+use giotto::campaign::{Direction, Plane, read};
+use giotto::diagnosis::{self, diagnose};
+use giotto::model_file::ModelFile;
+use giotto::planning::{self, Limits, propose};
+use giotto::table_from_model::table_from_model;
+use giotto_link::{Controller, OpenOptions, Port, open};
+use giotto_shared::table::{MAX_IMAGE_BYTES, image};
+pub use programs::Circle;
+use serde_json::{Value, json};
+pub use session::LinuxCncError;
+use session::Session;
+use std::path::{Path, PathBuf};
+
+/// Of the radius error, the out-of-roundness and the contour error so many percent have to go.
+pub const BARS_PERCENT: [f64; 3] = [98.0, 70.0, 90.0];
+/// What the function may take, µs: the median.
+pub const UPDATE_BAR_US: f64 = 20.0;
+
+/// What one way of correcting, or none, leaves.
+#[derive(Clone, Debug, Default)]
+pub struct Left {
+    /// By circle, µm: radius error and out-of-roundness.
+    pub circles_um: Vec<[f64; 2]>,
+    /// Largest contour error of the part, µm.
+    pub contour_um: f64,
+}
+
+impl Left {
+    fn radius_um(&self) -> f64 {
+        let square: f64 = self
+            .circles_um
+            .iter()
+            .map(|[radius, _]| radius * radius)
+            .sum();
+        (square / self.circles_um.len().max(1) as f64).sqrt()
+    }
+
+    fn roundness_um(&self) -> f64 {
+        let sum: f64 = self.circles_um.iter().map(|[_, round]| round).sum();
+        sum / self.circles_um.len().max(1) as f64
+    }
+
+    /// Radius error (root mean square), out-of-roundness (mean), contour error, µm.
+    pub fn figures_um(&self) -> [f64; 3] {
+        [self.radius_um(), self.roundness_um(), self.contour_um]
+    }
+
+    /// How much less than before, percent.
+    pub fn gains_percent(&self, before: &Self) -> [f64; 3] {
+        let (now, was) = (self.figures_um(), before.figures_um());
+        [0, 1, 2].map(|k| 100.0 * (1.0 - now[k] / was[k]))
+    }
+}
+
+/// The whole scenario's result.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// Circles never measured before.
+    pub circles: Vec<Circle>,
+    /// Without correction; by the component; by `compensate`.
+    pub before: Left,
+    /// See `before`.
+    pub component: Left,
+    /// See `before`.
+    pub compensated: Left,
+    /// What was found.
+    pub findings: Vec<String>,
+    /// Runs that were diagnosed.
+    pub runs: usize,
+    /// Largest difference of set-point and output before the first enable and after the last, mm.
+    pub touched_mm: f64,
+    /// Time of the function: the median of looks, and the longest, µs.
+    pub update_us: [f64; 2],
+}
+
+impl Report {
+    /// Whether all bars are met.
+    pub fn meets_bars(&self) -> bool {
+        let gains = self.component.gains_percent(&self.before);
+        gains
+            .iter()
+            .zip(BARS_PERCENT)
+            .all(|(gain, bar)| *gain >= bar)
+            && self.update_us[0] <= UPDATE_BAR_US
+    }
+
+    /// One JSON document.
+    pub fn document(&self) -> Value {
+        let left = |left: &Left| {
+            let [radius, round, contour] = left.figures_um();
+            let gains = left.gains_percent(&self.before);
+            json!({
+                "radius_error_rms_um": radius, "out_of_roundness_um": round, "contour_um": contour,
+                "gain_percent": gains, "circles_um": left.circles_um,
+            })
+        };
+        json!({
+            "before": left(&self.before), "component": left(&self.component), "compensate": left(&self.compensated),
+            "findings": self.findings, "runs": self.runs, "update_us": self.update_us, "bars_percent": BARS_PERCENT,
+            "met": self.meets_bars(),
+        })
+    }
+}
+
+const fn circle(radius_mm: f64, feed_mm_s: f64, ccw: bool, plane: Plane) -> Circle {
+    let direction = if ccw { Direction::Ccw } else { Direction::Cw };
+    Circle {
+        radius_mm,
+        feed_mm_s,
+        direction,
+        plane,
+    }
+}
+
+/// With what the first look is taken.
+const FIRST: [Circle; 6] = [
+    circle(60.0, 200.0, true, Plane::Xy),
+    circle(60.0, 200.0, false, Plane::Xy),
+    circle(60.0, 400.0, true, Plane::Xy),
+    circle(60.0, 400.0, false, Plane::Xy),
+    circle(100.0, 400.0, true, Plane::Xy),
+    circle(30.0, 300.0, false, Plane::Xy),
+];
+
+/// With what it is proven.
+const PROOF: [Circle; 7] = [
+    circle(20.0, 20.0, true, Plane::Xy),
+    circle(20.0, 100.0, true, Plane::Xy),
+    circle(20.0, 280.0, false, Plane::Yz),
+    circle(50.0, 200.0, true, Plane::Zx),
+    circle(80.0, 300.0, false, Plane::Xy),
+    circle(150.0, 400.0, true, Plane::Yz),
+    circle(200.0, 400.0, false, Plane::Zx),
+];
+
+fn failed(what: impl std::fmt::Display) -> LinuxCncError {
+    LinuxCncError::failed(what)
+}
+
+/// Columns of the samples.
+fn import(
+    file: PathBuf,
+    folder: &Path,
+    radius_mm: f64,
+    feed_mm_s: f64,
+    direction: Direction,
+) -> Result<(), LinuxCncError> {
+    let options = Options {
+        radius_m: radius_mm * 1e-3,
+        feed_m_s: feed_mm_s * 1e-3,
+        direction: Some(direction),
+        format: Format::Columns,
+        columns: Some("time_ms,-,-,-,x_mm,y_mm,z_mm".to_owned()),
+        start_angle_rad: None,
+        started_s: None,
+        temperature_c: None,
+        centre_m: None,
+        even_angles: false,
+        plane: None,
+        setup: Some("A".to_owned()),
+        machine: Some("LinuxCNC scenario".to_owned()),
+        laps: Laps::First,
+    };
+    add(&[file], folder, &options, &|_, _| ())
+        .map(drop)
+        .map_err(failed)
+}
+
+/// Runs circles and adds them to a campaign.
+fn measure(
+    session: &mut Session,
+    name: &str,
+    program: &[u8],
+    circles: &[(f64, f64, Direction)],
+    campaign: &Path,
+) -> Result<(), LinuxCncError> {
+    let recording = samples::run(session, name, program, 240)?;
+    let runs = recording.runs();
+    // A plan begins with a warm-up.
+    let Some(runs) = runs
+        .len()
+        .checked_sub(circles.len())
+        .and_then(|from| runs.get(from..))
+    else {
+        return Err(failed(format!(
+            "{name}: {} runs recorded, {} expected",
+            runs.len(),
+            circles.len()
+        )));
+    };
+    for (k, (rows, (radius_mm, feed_mm_s, direction))) in runs.iter().zip(circles).enumerate() {
+        let file = samples::write(rows, session.folder.path(), &format!("{name}{k:02}.txt"))?;
+        import(file, campaign, *radius_mm, *feed_mm_s, *direction).map_err(|error| {
+            failed(format!(
+                "{name}, R {radius_mm} mm, {feed_mm_s} mm/s: {error}"
+            ))
+        })?;
+    }
+    Ok(())
+}
+
+/// Runs the proof; `programs`: circles and part, as they are or compensated.
+fn prove(session: &mut Session, name: &str, programs: [&[u8]; 2]) -> Result<Left, LinuxCncError> {
+    let [circles, part] = programs;
+    let folder = session.place(format!("{name}-campaign"));
+    let list: Vec<(f64, f64, Direction)> = PROOF
+        .iter()
+        .map(|c| (c.radius_mm, c.feed_mm_s, c.direction))
+        .collect();
+    measure(session, name, circles, &list, &folder)?;
+    let campaign = read(&folder).map_err(failed)?;
+    let report = of_campaign(&campaign)
+        .map_err(|(run, error)| failed(format!("{name}, run {run}: {error}")))?;
+    let circles_um = report
+        .runs
+        .iter()
+        .map(|run| [run.radius_error_m * 1e6, run.out_of_roundness_m * 1e6])
+        .collect();
+    let recording = samples::run(session, &format!("{name}-part"), part, 60)?;
+    Ok(Left {
+        circles_um,
+        contour_um: samples::contour(&recording.rows) * 1e3,
+    })
+}
+
+/// What the component's function takes, µs: median of some looks, and the longest.
+fn update_us(session: &mut Session) -> Result<[f64; 2], LinuxCncError> {
+    let mut looks = Vec::new();
+    for _ in 0..31 {
+        looks.push(
+            session
+                .get("giotto.update.time")?
+                .parse::<f64>()
+                .map_err(failed)?,
+        );
+    }
+    looks.sort_by(f64::total_cmp);
+    let longest = session
+        .get("giotto.update.tmax")?
+        .parse::<f64>()
+        .map_err(failed)?;
+    // LinuxCNC counts in its processor's cycles, or in ns where it has no counter.
+    Ok([looks[looks.len() / 2], longest].map(|time| time / cycles_per_us()))
+}
+
+/// Cycles that LinuxCNC counts in a microsecond.
+fn cycles_per_us() -> f64 {
+    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let mhz = text.lines().find_map(|line| {
+        let (name, value) = line.split_once(':')?;
+        (name.trim() == "cpu MHz").then(|| value.trim().parse().ok())?
+    });
+    mhz.unwrap_or(1000.0)
+}
+
+fn model_of(
+    campaign: &Path,
+    note: &mut dyn FnMut(&str),
+) -> Result<(ModelFile, Vec<String>, usize), LinuxCncError> {
+    let campaign = read(campaign).map_err(failed)?;
+    let diagnosis = diagnose(&campaign, &diagnosis::Options::default()).map_err(failed)?;
+    let findings = diagnosis
+        .findings
+        .iter()
+        .map(|finding| {
+            let estimate = serde_json::to_value(finding).unwrap_or_default();
+            format!(
+                "{} {} {}",
+                estimate["cause"], estimate["axis"], estimate["estimate"]["value"]
+            )
+        })
+        .collect::<Vec<_>>();
+    note(&format!("found: {}", findings.join("; ")));
+    Ok((diagnosis.model, findings, campaign.runs.len()))
+}
+
+/// Flashes over the protocol.
+fn flash(model: &ModelFile) -> Result<Controller, LinuxCncError> {
+    let table = table_from_model(model).map_err(failed)?.table;
+    let mut bytes = vec![0; MAX_IMAGE_BYTES];
+    let length = image::encode(&table, &mut bytes).map_err(failed)?;
+    bytes.truncate(length);
+    let mut controller =
+        open(&Port::LinuxCnc, &OpenOptions::default(), &mut |_| ()).map_err(failed)?;
+    controller.flash(&bytes, &mut |_| ()).map_err(failed)?;
+    Ok(controller)
+}
+
+/// Runs the scenario with a component.
+///
+/// # Errors
+/// [`LinuxCncError::Skipped`] where there is no LinuxCNC.
+pub fn run(component: &Path, note: &mut dyn FnMut(&str)) -> Result<Report, LinuxCncError> {
+    let mut session = Session::start(component)?;
+    session.order(&json!({ "do": "up" }))?;
+    note("LinuxCNC runs; first circles");
+    let campaign = session.place("campaign");
+    let list: Vec<(f64, f64, Direction)> = FIRST
+        .iter()
+        .map(|c| (c.radius_mm, c.feed_mm_s, c.direction))
+        .collect();
+    measure(
+        &mut session,
+        "first",
+        programs::circles(&FIRST).as_bytes(),
+        &list,
+        &campaign,
+    )?;
+    planned(&mut session, &campaign, note)?;
+    let (model, findings, runs) = model_of(&campaign, note)?;
+
+    let (circles, part) = (programs::circles(&PROOF), programs::PART);
+    let plain = [circles.as_bytes(), part.as_bytes()];
+    note("the proof without correction");
+    let before = prove(&mut session, "before", plain)?;
+    note("the same programs, compensated");
+    let options = giotto_nc::Options {
+        acceleration_mm_s2: 8000.0,
+        max_offset_mm: 5.0,
+        all_planes: true,
+        ..giotto_nc::Options::default()
+    };
+    let rewritten = plain.map(|program| giotto_nc::compensate(program, &model, &options).program);
+    let compensated = prove(&mut session, "compensated", [&rewritten[0], &rewritten[1]])?;
+
+    note("flashed into the running component; the proof with it");
+    drop(flash(&model)?);
+    session.set("giotto.enable", "1")?;
+    let component = prove(&mut session, "component", plain)?;
+    let update_us = update_us(&mut session)?;
+    session.set("giotto.enable", "0")?;
+    Ok(Report {
+        circles: PROOF.to_vec(),
+        before,
+        component,
+        compensated,
+        findings,
+        runs,
+        touched_mm: 0.0,
+        update_us,
+    })
+}
+
+/// Runs the program of `giotto plan`.
+fn planned(
+    session: &mut Session,
+    folder: &Path,
+    note: &mut dyn FnMut(&str),
+) -> Result<(), LinuxCncError> {
+    let campaign = read(folder).map_err(failed)?;
+    let diagnosis = diagnose(&campaign, &diagnosis::Options::default()).map_err(failed)?;
+    let options = planning::Options {
+        limits: Limits {
+            radii_m: vec![0.03, 0.06],
+            largest_radius_m: Some(0.06),
+            highest_feed_m_s: Some(0.4),
+            highest_acceleration_m_s2: Some(5.0),
+        },
+        most_runs: 1,
+        seed: 1,
+    };
+    let plan = propose(&campaign, &diagnosis, &options);
+    note(&format!("{} planned runs", plan.runs.len()));
+    if plan.runs.is_empty() {
+        return Ok(());
+    }
+    let list: Vec<(f64, f64, Direction)> = plan
+        .runs
+        .iter()
+        .map(|step| (step.radius_mm, step.feed_mm_s, step.direction))
+        .collect();
+    let program = plan.gcode(&campaign.name);
+    measure(session, "plan", program.as_bytes(), &list, folder)
+}
