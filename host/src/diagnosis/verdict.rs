@@ -382,6 +382,7 @@ pub fn ties(found: &Explained) -> Vec<(usize, Cause)> {
             let mut swapped = found.chosen.clone();
             swapped[at] = index;
             other != cause
+                && !cause.model().alike().contains(&other)
                 && !found.chosen.contains(&index)
                 && worth(&swapped).is_some_and(|worth| worth > best - EVEN)
         })?;
@@ -453,6 +454,7 @@ pub fn effect_with(
         return None;
     };
     let fit = Fitted {
+        site: *site,
         shape,
         amounts,
         first_view: &found.runs.first()?.view,
