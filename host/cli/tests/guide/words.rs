@@ -14,9 +14,7 @@ fn block(model: &dyn CauseModel) -> String {
         Seat::MachineOrJoint => {
             "a joint where the kinematics are known, else the machine as a whole"
         }
-        Seat::PairOrJoint => {
-            "x and y, y and z, or z and x; a joint where the kinematics are known"
-        }
+        Seat::PairOrJoint => "x and y, y and z, or z and x; a joint where the kinematics are known",
     };
     let corrected = words
         .not_compensable
