@@ -58,6 +58,10 @@ impl CauseModel for BandwidthMismatch {
         Some(first.minus(&second).times(size))
     }
 
+    fn is_mutual(&self) -> bool {
+        true
+    }
+
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
         match (effect.site(), &mut machine.arm) {
             (Site::Pair(plane), _) => machine.split_bandwidth(plane, effect.value()),

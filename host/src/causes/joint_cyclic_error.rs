@@ -58,7 +58,7 @@ fn swing_rad(views: &[RunView], joint: usize) -> f64 {
 }
 
 /// Lowest and highest number of waves a turn that these runs can tell of a joint; `None`: none at all.
-pub fn waves_of(views: &[RunView], joint: usize) -> Option<[f64; 2]> {
+fn waves_of(views: &[RunView], joint: usize) -> Option<[f64; 2]> {
     let swing = swing_rad(views, joint);
     let lowest = RATIOS[0].max(FEWEST_WAVES * TAU / swing.max(1e-9));
     let highest = views
@@ -176,6 +176,10 @@ impl CauseModel for JointCyclicError {
             let (sin, cos) = (ratio * q).sin_cos();
             (*sine, *cosine) = (1e-3 * lever * sin, 1e-3 * lever * cos);
         }
+    }
+
+    fn ratios(&self, views: &[RunView], joint: usize) -> Option<[f64; 2]> {
+        waves_of(views, joint)
     }
 
     fn apply(&self, effect: &Effect, machine: &mut Machine) {

@@ -104,6 +104,10 @@ impl CauseModel for JointLagMismatch {
         Some(arm.seen(joint.index(), &answers))
     }
 
+    fn is_mutual(&self) -> bool {
+        true
+    }
+
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
         match (effect.site(), &mut machine.arm) {
             (Site::One(joint), Some(arm)) => {

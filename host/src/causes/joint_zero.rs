@@ -53,8 +53,8 @@ impl CauseModel for JointZero {
         sites
     }
 
-    fn alike(&self) -> &'static [Cause] {
-        &[Cause::LinkLength]
+    fn class(&self) -> Option<&'static str> {
+        Some("geometry of an arm")
     }
 
     fn harmonics(&self, site: Site, _shape: &[f64], view: &RunView) -> Option<Harmonics> {

@@ -52,8 +52,8 @@ impl CauseModel for LinkLength {
         sites
     }
 
-    fn alike(&self) -> &'static [Cause] {
-        &[Cause::JointZero]
+    fn class(&self) -> Option<&'static str> {
+        Some("geometry of an arm")
     }
 
     fn harmonics(&self, site: Site, _shape: &[f64], view: &RunView) -> Option<Harmonics> {

@@ -11,7 +11,7 @@ mod harmonics;
 mod higher_order_dynamics;
 mod interpolation_chord;
 mod joint_backlash;
-pub mod joint_cyclic_error;
+mod joint_cyclic_error;
 mod joint_lag_mismatch;
 mod joint_reversal;
 mod joint_zero;
@@ -225,9 +225,19 @@ pub trait CauseModel: Sync {
         !self.shape_names().is_empty()
     }
 
-    /// Causes that circles at one place cannot tell from it: one of the class is stated, the others beside it.
-    fn alike(&self) -> &'static [Cause] {
-        &[]
+    /// The class of causes that circles at one place cannot tell from each other: one of it is stated, the others beside it.
+    fn class(&self) -> Option<&'static str> {
+        None
+    }
+
+    /// Whether it is how one joint differs from the mean of all: of two joints, what is one's is the other's as well.
+    fn is_mutual(&self) -> bool {
+        false
+    }
+
+    /// Where it is periodic in the turn of a joint: the lowest and highest ratio that these runs can show.
+    fn ratios(&self, _views: &[RunView], _joint: usize) -> Option<[f64; 2]> {
+        None
     }
 
     /// Number of linear columns: 2 where the phase of the signature is free.

@@ -8,8 +8,8 @@ use super::finding::Finding;
 use super::statement;
 use super::survey::{Response, believed_feed_m_s};
 use crate::campaign::Campaign;
+use crate::causes::Harmonics;
 use crate::causes::arm::{ArmView, harmonics};
-use crate::causes::{Cause, Harmonics};
 use crate::kinematics::{Kinematics, Orbit, WAVES};
 use giotto_shared::{Actuator, Frame};
 use rustfft::num_complex::Complex;
@@ -173,11 +173,7 @@ pub fn name_both(findings: &mut [Finding], kinematics: Option<&Kinematics>) {
         return;
     }
     for finding in findings {
-        let mutual = matches!(
-            finding.cause,
-            Cause::JointLagMismatch | Cause::BandwidthMismatch
-        );
-        if mutual && finding.axis == Some(Actuator::Joint1) {
+        if finding.cause.model().is_mutual() && finding.axis == Some(Actuator::Joint1) {
             finding.actuators = vec![Actuator::Joint1, Actuator::Joint2];
             finding.remedy =
                 statement::remedy(finding.cause, &finding.actuators, finding.estimate.value);

@@ -4,8 +4,6 @@
 //! angle, folded into fine bins, holds every ratio at once in one transform, as for the pitch of a slide (`pitch`).
 use super::design_column::Column;
 use super::survey::Prepared;
-use crate::causes::RunView;
-use crate::causes::joint_cyclic_error::waves_of;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use std::f64::consts::TAU;
@@ -28,12 +26,11 @@ const FINENESS: f64 = 4.0;
 /// that column's pull.
 pub fn scan(
     runs: &[Prepared],
-    views: &[RunView],
+    [lowest, highest]: [f64; 2],
     whitened: &Column,
     noise_m2: f64,
     joint: usize,
 ) -> Option<Best> {
-    let [lowest, highest] = waves_of(views, joint)?;
     let (low, high) = runs
         .iter()
         .filter_map(|run| run.view.arm.as_ref())

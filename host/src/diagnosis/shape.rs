@@ -186,14 +186,12 @@ impl<'a> Fit<'a> {
                     pitch::scan(&self.runs, &self.whitened, noise_m2, axis, finest)
                         .map(|found| (found.gain / share, vec![found.pitch_m]))
                 }
-                (Some(_), Site::One(joint)) => gear::scan(
-                    &self.runs,
-                    &self.views,
-                    &self.whitened,
-                    noise_m2,
-                    joint.index(),
-                )
-                .map(|found| (found.gain / share, vec![found.ratio])),
+                (Some(_), Site::One(joint)) => model
+                    .ratios(&self.views, joint.index())
+                    .and_then(|ratios| {
+                        gear::scan(&self.runs, ratios, &self.whitened, noise_m2, joint.index())
+                    })
+                    .map(|found| (found.gain / share, vec![found.ratio])),
                 _ => best_of(model.shapes(&self.views), &self.sample),
             };
             match best {
