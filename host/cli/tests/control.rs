@@ -3,6 +3,7 @@
 #![cfg(unix)]
 #![allow(
     clippy::unwrap_used,
+    clippy::panic,
     reason = "helpers of a test fail as the test does"
 )]
 use std::io::{BufRead, BufReader};
