@@ -2,6 +2,7 @@
 //! Needs the emulator: `.ci/setup` brings it.
 #![allow(
     clippy::unwrap_used,
+    clippy::panic,
     reason = "helpers of a test fail as the test does"
 )]
 use giotto_link::emulator::{Emulator, Pace};
