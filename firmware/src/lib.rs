@@ -4,9 +4,9 @@
 //! |---|---|---|
 //! | [`engine`] | programs in, set-points out, one a tick | links, flash |
 //! | [`control`] | the engine split between interrupt and background | registers |
+//! | [`pulses`] | step and direction, out and in | pins |
 //! | [`stm32_flash`] | the flash controller of a part, testable on the host | what is stored |
 //! | [`store`] | two slots of flash, confirmations, power cuts | what a table means |
-//! | [`engine`] | programs in, one set-point a tick out | flash, serial ports |
 //! | [`server`] | the protocol state machine: request in, reply out | registers, serial ports |
 #![no_std]
 #![forbid(unsafe_code)]
@@ -16,6 +16,7 @@ extern crate std;
 
 pub mod control;
 pub mod engine;
+pub mod pulses;
 pub mod server;
 pub mod stm32_flash;
 pub mod store;

@@ -4,7 +4,6 @@
 pub mod contour;
 pub mod elf;
 pub mod faults;
-pub mod instructions;
 pub mod link;
 pub mod linuxcnc;
 pub mod planes;

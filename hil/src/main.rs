@@ -3,7 +3,6 @@
 
 use clap::{Parser, Subcommand};
 use giotto_hil::faults;
-use giotto_hil::instructions::{self, CountError};
 use giotto_hil::linuxcnc::{self, LinuxCncError};
 use giotto_hil::scenarios::{self, Outcome};
 use giotto_hil::ticks::{self, Counts, TERMS};
@@ -24,11 +23,14 @@ struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Command {
-    /// Instructions of one engine tick on the M4F image under QEMU, and what the image takes.
+    /// Instructions of every kind of tick, and of the whole timer interrupt, on the M4F image under QEMU; and what the image takes.
     Ticks {
         /// One JSON document.
         #[arg(long)]
         json: bool,
+        /// Exit code 5 unless every bar is met.
+        #[arg(long)]
+        check: bool,
     },
     /// Runs every scenario on a controller. The machine on a real port moves: circles of up to 100 mm about the origin.
     Run {
@@ -78,12 +80,6 @@ enum Command {
         #[arg(long)]
         check: bool,
     },
-    /// Instructions of hot kernels (callgrind) and of the ticks (QEMU), held against the record in host/benches/instructions.toml.
-    Instructions {
-        /// Write the record instead.
-        #[arg(long)]
-        record: bool,
-    },
     /// What an image takes in flash and RAM, its deepest stack, and whether its tick can panic.
     Size {
         /// The board: `mps2_an386` or `stm32f405`; only the first one's stack can be measured.
@@ -116,7 +112,7 @@ enum Command {
 
 fn main() -> ExitCode {
     let done = match Cli::parse().command {
-        Command::Ticks { json } => run_ticks(json),
+        Command::Ticks { json, check } => run_ticks(json, check),
         Command::Run {
             port,
             baud,
@@ -125,7 +121,6 @@ fn main() -> ExitCode {
             json,
         } => run_scenarios(&port, &OpenOptions { image, baud }, worn_flash, json),
         Command::Link { json, check } => run_link(json, check),
-        Command::Instructions { record } => return run_instructions(record),
         Command::Linuxcnc {
             component,
             json,
@@ -163,10 +158,16 @@ fn range(counts: &Counts, name: &str) -> Value {
     }
 }
 
-fn run_ticks(as_json: bool) -> Result<ExitCode, ControllerError> {
+fn run_ticks(as_json: bool, check: bool) -> Result<ExitCode, ControllerError> {
     let mut note = |text: &str| eprintln!("{text}");
     let counts = ticks::count(&mut note)?;
     let image = ticks::image_size(&mut note)?;
+    let over = ticks::over(&counts);
+    let verdict = if check && !over.is_empty() {
+        ExitCode::from(5)
+    } else {
+        ExitCode::SUCCESS
+    };
     if as_json {
         let mut extended = range(&counts, "arc_extended");
         extended["terms"] = json!(TERMS);
@@ -183,17 +184,22 @@ fn run_ticks(as_json: bool) -> Result<ExitCode, ControllerError> {
             "image": { "text_bytes": image.text, "ram_bytes": image.ram, "stack_bytes": image.stack },
         });
         println!("{document:#}");
-        return Ok(ExitCode::SUCCESS);
+        return Ok(verdict);
     }
     println!("instructions of one tick, compute only (emulated Cortex-M4F)");
     for (name, (min, max)) in &counts {
-        println!("  {name:20} {min:5} to {max:5}");
+        let bar = match ticks::bar(name) {
+            Some(bar) if *max > bar => format!("   over the bar of {bar}"),
+            Some(bar) => format!("   bar {bar}"),
+            None => String::new(),
+        };
+        println!("  {name:20} {min:5} to {max:5}{bar}");
     }
     println!(
         "image: {} bytes text, {} RAM with a stack of {}",
         image.text, image.ram, image.stack
     );
-    Ok(ExitCode::SUCCESS)
+    Ok(verdict)
 }
 
 fn run_scenarios(
@@ -304,64 +310,6 @@ fn run_linuxcnc(component: Option<PathBuf>, as_json: bool, check: bool) -> ExitC
         }
     }
     ExitCode::from(if check && !report.meets_bars() { 5 } else { 0 })
-}
-
-fn run_instructions(record: bool) -> ExitCode {
-    match count_instructions(record) {
-        Ok(code) => code,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::from(4)
-        }
-    }
-}
-
-fn count_instructions(record: bool) -> Result<ExitCode, CountError> {
-    let failed = |e: std::io::Error| CountError::Other(format!("{}: {e}", instructions::RECORD));
-    let mut counts = instructions::of_ticks(&mut |text: &str| eprintln!("{text}"))?;
-    if instructions::has_valgrind() {
-        counts.extend(instructions::of_kernels()?);
-    } else {
-        println!("kernels: not counted, valgrind is not installed (apt-get install valgrind)");
-    }
-    let compiler = instructions::compiler();
-    if record {
-        std::fs::write(
-            instructions::RECORD,
-            instructions::write(&counts, &compiler),
-        )
-        .map_err(failed)?;
-        println!("{} counts recorded", counts.len());
-        return Ok(ExitCode::SUCCESS);
-    }
-    let text = std::fs::read_to_string(instructions::RECORD).map_err(failed)?;
-    let (recorded, with) = instructions::read(&text)?;
-    let mut grown = 0;
-    for (name, &now) in &counts {
-        let growth = instructions::growth_percent(now, recorded.get(name));
-        let too_much = growth.is_none_or(|percent| percent > instructions::TOLERANCE_PERCENT);
-        grown += u32::from(too_much);
-        let words = growth.map_or_else(
-            || "not recorded".to_owned(),
-            |percent| format!("{percent:+.2} %"),
-        );
-        println!(
-            "{} {name:28} {now:12} {words}",
-            if too_much { "GROWN" } else { "ok   " }
-        );
-    }
-    if grown > 0 {
-        println!(
-            "{grown} more than {} % above the record, which was made with {with}; here {compiler}",
-            instructions::TOLERANCE_PERCENT
-        );
-        println!("if that is meant, write it down: giotto-hil instructions --record");
-    }
-    Ok(if grown == 0 {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::from(5)
-    })
 }
 
 fn run_rate(as_json: bool, check: bool) -> Result<ExitCode, ControllerError> {

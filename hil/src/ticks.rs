@@ -32,6 +32,29 @@ pub struct ImageSize {
     pub stack: u32,
 }
 
+/// Most instructions that a kind of tick may take: β model, eight profile terms, stream, and all that the timer interrupt does,
+/// whatever it meets.
+const BARS: [(&str, u32); 4] = [
+    ("arc_beta", 300),
+    ("arc_extended", 450),
+    ("stream", 250),
+    ("interrupt", 1000),
+];
+
+/// The bar of a kind of tick, if it has one.
+pub fn bar(name: &str) -> Option<u32> {
+    BARS.iter()
+        .find(|(barred, _)| *barred == name)
+        .map(|(_, bar)| *bar)
+}
+
+/// Kinds of tick that are over their bar, or were not counted.
+pub fn over(counts: &Counts) -> Vec<&'static str> {
+    let over =
+        |(name, bar): &&(&'static str, u32)| counts.get(*name).is_none_or(|(_, most)| most > bar);
+    BARS.iter().filter(over).map(|(name, _)| *name).collect()
+}
+
 fn emulator(reason: impl ToString) -> ControllerError {
     ControllerError::Emulator {
         reason: reason.to_string(),

@@ -76,6 +76,7 @@ pub mod comparison;
 pub mod diagnosis;
 pub mod fit;
 pub mod history;
+pub mod kinematics;
 pub mod model_file;
 pub mod planning;
 pub mod simulation;

@@ -1,8 +1,9 @@
 //! `MODEL.toml`: what `fit` and `diagnose` write and what `simulate`, `table` and `flash` read.
 use crate::causes::{Effect, WrittenEffect};
+use crate::kinematics::{Fault as KinematicsFault, Kinematics, WrittenKinematics};
 use crate::toml_file::{TomlFileError, TomlProblem, TomlText};
 use giotto_shared::model::{Cumulants, Element, RadiusModel, Response};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 use std::path::Path;
 
 /// Version of the file format written by this build.
@@ -28,6 +29,9 @@ pub struct ModelFile {
     pub servo: Servo,
     /// Where it was fitted: the table's bounds.
     pub valid: Valid,
+    /// The arm, if the machine is one.
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "written")]
+    pub kinematics: Option<Kinematics>,
     /// What diagnosis added, in order of share.
     #[serde(rename = "effect", skip_serializing_if = "Vec::is_empty")]
     pub effects: Vec<Effect>,
@@ -43,6 +47,7 @@ struct Written {
     delay_s: Option<f64>,
     servo: Servo,
     valid: Valid,
+    kinematics: Option<WrittenKinematics>,
     #[serde(default, rename = "effect")]
     effects: Vec<WrittenEffect>,
 }
@@ -178,6 +183,11 @@ impl ModelFile {
                     .map_err(|fault| fault.at(text, index))?,
             );
         }
+        let kinematics = written
+            .kinematics
+            .map(|block| block.checked().map_err(|fault| refused(text, &fault)))
+            .transpose()?
+            .filter(|kinematics| *kinematics != Kinematics::Slides);
         let model = Self {
             format: FORMAT,
             campaign: written.campaign,
@@ -185,6 +195,7 @@ impl ModelFile {
             delay_s: written.delay_s,
             servo: written.servo,
             valid: written.valid,
+            kinematics,
             effects,
         };
         match model.fault() {
@@ -232,6 +243,34 @@ impl ModelFile {
                 let possible = (0.0..=LONGEST_DELAY_S).contains(&delay_s);
                 Fault::unless(possible, &["delay_s"], delay_s, "a delay of 0 to 1 s")
             })
+    }
+}
+
+fn written<S: Serializer>(
+    kinematics: &Option<Kinematics>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    kinematics
+        .as_ref()
+        .map(WrittenKinematics::from)
+        .serialize(serializer)
+}
+
+/// The refusal of a block at its key.
+fn refused(text: &TomlText, fault: &KinematicsFault) -> TomlFileError {
+    match fault {
+        KinematicsFault::Missing { key, expected } => {
+            let what = format!("`{key}` is missing");
+            text.missed(&["kinematics", key], what, (*expected).to_owned())
+        }
+        KinematicsFault::Range {
+            key,
+            found,
+            expected,
+        } => text.value_error(&["kinematics", key], found, expected),
+        KinematicsFault::Unused { key, expected } => {
+            text.value_error(&["kinematics", key], "of another model", expected)
+        }
     }
 }
 
@@ -486,9 +525,10 @@ phase_rad = 0.5
     /// A whole effect of a cause, as a file would hold it, and the names of its parameters that have to be there.
     fn whole(cause: Cause) -> (String, Vec<&'static str>) {
         let place = match cause.model().seat() {
-            Seat::Machine | Seat::MachineOrOne => "",
+            Seat::Machine | Seat::MachineOrOne | Seat::MachineOrJoint => "",
             Seat::One => "axis = \"z\"\n",
-            Seat::Pair => "plane = \"zx\"\n",
+            Seat::Pair | Seat::PairOrJoint => "plane = \"zx\"\n",
+            Seat::Joint => "axis = \"joint2\"\n",
             Seat::Across => "axis = \"z\"\nacross = \"y\"\n",
         };
         let inside = |[lowest, highest]: [f64; 2]| 0.9 * lowest + 0.1 * highest;

@@ -182,6 +182,7 @@ mod tests {
                 radius_mm: [100.0, 300.0],
                 feed_mm_s: [20.0, 700.0],
             },
+            kinematics: None,
             effects: Vec::new(),
             delay_s: None,
         }

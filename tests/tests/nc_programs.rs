@@ -49,3 +49,45 @@ fn a_small_controller_takes_what_it_took_before() {
     }
     assert!(compared > 10, "{compared}");
 }
+
+/// Highest memory of this process so far, MB; `None` where the system does not say.
+fn peak_mb() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
+    let kb: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kb / 1024.0)
+}
+
+/// 1e6 lines with 2.5e5 arcs of 200 sizes; alone, and optimised: `cargo test --release -p giotto-tests --test nc_programs --
+/// --ignored --nocapture a_million_lines`.
+#[test]
+#[ignore = "measures time and memory, which must not be shared"]
+fn a_million_lines() {
+    let mut program = String::from("G21 G17 G90 G94 F3000\nG0 X0 Y0\n");
+    for k in 0..250_000 {
+        let r = 3.0 + 0.1 * f64::from(k % 200);
+        let (x, y) = (20.0 + r, r);
+        program += &format!(
+            "G0 X0 Y0\nG1 X20\nG3 X{x:.3} Y{y:.3} J{r:.3}\nG1 Y{:.3}\n",
+            y + 20.0
+        );
+    }
+    let begin = std::time::Instant::now();
+    let options = giotto_nc::Options::default();
+    let mut out = std::io::sink();
+    let arcs = giotto_nc::compensate_to(program.as_bytes(), &model(), &options, None, &mut out);
+    let (seconds, peak) = (begin.elapsed().as_secs_f64(), peak_mb());
+    let arcs = arcs.expect("a sink takes everything");
+    let corrected = |a: &&giotto_nc::Report| matches!(a.fate, giotto_nc::Fate::Corrected { .. });
+    let count = arcs.iter().filter(corrected).count();
+    println!(
+        "{count} of {} arcs in {seconds:.2} s, {peak:?} MB at most",
+        arcs.len()
+    );
+    assert_eq!(arcs.len(), 250_000);
+    assert!(
+        count > 200_000 && seconds <= 5.0,
+        "{count} arcs, {seconds} s"
+    );
+    assert!(peak.is_none_or(|mb| mb <= 100.0), "{peak:?} MB");
+}

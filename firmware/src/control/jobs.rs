@@ -98,7 +98,7 @@ impl<I: Receiver<Job>> Inbox for Jobs<I> {
         let head = self.queue.look(|job| match job {
             Job::Segment(planned) => {
                 if !closed {
-                    *place = *planned;
+                    place.copy(planned);
                 }
                 Head::Segment
             }

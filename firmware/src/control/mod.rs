@@ -11,17 +11,19 @@
 //! Either end of a queue has one owner. The words of [`Shared`] are written by one side each; a table and a
 //! segment cross whole, inside the queue.
 mod alive;
+mod background;
 pub mod bench;
-mod desk;
 mod job;
 mod jobs;
+mod lines;
 mod ports;
 mod shared;
 mod tick;
 
 pub use alive::Alive;
-pub use desk::Desk;
+pub use background::Desk;
 pub use job::{BATCH, Job};
+pub use lines::Lines;
 pub use ports::{Receiver, Sender};
 pub use shared::Shared;
 pub use tick::Tick;

@@ -146,6 +146,11 @@ impl Shared {
         self.position.store(known, Relaxed);
     }
 
+    /// Whether it is known where the machine stands.
+    pub(super) fn known(&self) -> bool {
+        self.position.load(Relaxed) != UNKNOWN
+    }
+
     /// Asks the tick to forget a fault.
     pub(super) fn clear_fault(&self) {
         self.asked.fetch_or(CLEAR, Relaxed);
@@ -184,7 +189,7 @@ impl Shared {
         epoch: u8,
         fault: Option<Fault>,
         output: &Output,
-        counters: &Counters,
+        (counters, dropped): (&Counters, u32),
         stream: &StreamCounters,
     ) {
         let state = match state {
@@ -203,9 +208,13 @@ impl Shared {
             word.store(nm, Relaxed);
         }
         self.overruns.store(counters.overruns, Relaxed);
-        self.offset_cuts.store(counters.offset_cuts, Relaxed);
-        self.slew_cuts.store(counters.slew_cuts, Relaxed);
-        self.dropped_segments.store(counters.dropped, Relaxed);
+        // Executor and stream count for themselves, and so does the queue.
+        let sum =
+            |word: &AtomicU32, one: u32, other: u32| word.store(one.wrapping_add(other), Relaxed);
+        let bounds = &stream.bounds;
+        sum(&self.offset_cuts, counters.offset_cuts, bounds.offset_cuts);
+        sum(&self.slew_cuts, counters.slew_cuts, bounds.slew_cuts);
+        sum(&self.dropped_segments, counters.dropped, dropped);
         self.uncorrected.store(counters.uncorrected, Relaxed);
         self.stops.store(counters.stops, Relaxed);
         self.segments.store(counters.segments, Relaxed);
@@ -264,21 +273,41 @@ impl Shared {
 
     /// All words of one tick: read again if a tick came between.
     pub(super) fn snapshot(&self) -> Snapshot {
+        self.snapshot_between(&|| {})
+    }
+
+    /// The same, with what may happen before each word is read: on one core that is the tick's interrupt, and a test has all of its
+    /// places.
+    fn snapshot_between(&self, between: &impl Fn()) -> Snapshot {
         loop {
             let tick = self.tick.load(Relaxed);
             compiler_fence(Ordering::Acquire);
-            let snapshot = self.read(tick);
+            let snapshot = self.read(tick, between);
             compiler_fence(Ordering::Acquire);
+            between();
             if self.tick.load(Relaxed) == tick {
                 return snapshot;
             }
         }
     }
 
-    fn read(&self, tick: u32) -> Snapshot {
-        let place = |words: &[AtomicI32; 3]| words.each_ref().map(|word| word.load(Relaxed));
+    fn read(&self, tick: u32, between: &impl Fn()) -> Snapshot {
+        let count = |word: &AtomicU32| {
+            between();
+            word.load(Relaxed)
+        };
+        let byte = |word: &AtomicU8| {
+            between();
+            word.load(Relaxed)
+        };
+        let place = |words: &[AtomicI32; 3]| {
+            words.each_ref().map(|word| {
+                between();
+                word.load(Relaxed)
+            })
+        };
         Snapshot {
-            state: match self.state.load(Relaxed) {
+            state: match byte(&self.state) {
                 REST => MotionState::Idle,
                 RUNNING => MotionState::Running,
                 STOPPING => MotionState::Stopping,
@@ -288,31 +317,98 @@ impl Shared {
             tick,
             raw_nm: place(&self.raw_nm),
             corrected_nm: place(&self.corrected_nm),
-            tick_overruns: self.overruns.load(Relaxed),
-            offset_clamps: self.offset_cuts.load(Relaxed),
-            slew_clamps: self.slew_cuts.load(Relaxed),
-            dropped_set_points: self.dropped.load(Relaxed),
-            dropped_segments: self.dropped_segments.load(Relaxed),
-            uncorrected_segments: self.uncorrected.load(Relaxed),
-            stops: self.stops.load(Relaxed),
-            segments: self.segments.load(Relaxed),
-            missing_set_points: self.missing.load(Relaxed),
-            late_set_points: self.late.load(Relaxed),
-            rejected_set_points: self.rejected.load(Relaxed),
+            tick_overruns: count(&self.overruns),
+            offset_clamps: count(&self.offset_cuts),
+            slew_clamps: count(&self.slew_cuts),
+            dropped_set_points: count(&self.dropped),
+            dropped_segments: count(&self.dropped_segments),
+            uncorrected_segments: count(&self.uncorrected),
+            stops: count(&self.stops),
+            segments: count(&self.segments),
+            missing_set_points: count(&self.missing),
+            late_set_points: count(&self.late),
+            rejected_set_points: count(&self.rejected),
             queued: 0,
-            fault: match self.fault.load(Relaxed) {
+            fault: match byte(&self.fault) {
                 NO_FAULT => None,
                 OVERRUN => Some(FaultCause::Overrun),
                 DISCONTINUITY => Some(FaultCause::Discontinuity),
                 _ => Some(FaultCause::Starved),
             },
             stop_input: self.stop_input.load(Relaxed),
-            position: match self.position.load(Relaxed) {
+            position: match byte(&self.position) {
                 UNKNOWN => PositionState::Unknown,
                 KEPT => PositionState::Kept,
                 _ => PositionState::Known,
             },
-            override_percent: self.override_percent.load(Relaxed),
+            override_percent: byte(&self.override_percent),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::cell::Cell;
+
+    /// All words of tick `n` say `n`.
+    fn publish(shared: &Shared, n: u32) {
+        let nm = n as i32;
+        let (nominal_nm, corrected_nm) = ([nm, nm + 1, nm + 2], [nm, -nm, nm]);
+        let output = Output {
+            nominal_nm,
+            corrected_nm,
+            flags: 0,
+        };
+        let counters = Counters {
+            overruns: n,
+            offset_cuts: n,
+            slew_cuts: n,
+            dropped: n,
+            uncorrected: n,
+            stops: n,
+            segments: n,
+        };
+        let stream = StreamCounters {
+            missing: n,
+            late: n,
+            rejected: n,
+            ..StreamCounters::default()
+        };
+        let (state, fault) = if n.is_multiple_of(2) {
+            (MotionState::Running, None)
+        } else {
+            (MotionState::Fault, Some(Fault::Starved))
+        };
+        shared.publish(n, state, n as u8, fault, &output, (&counters, 0), &stream);
+    }
+
+    /// An interrupt may come before any word is read, once or again and again: what is read is one tick's, whole.
+    #[test]
+    fn a_snapshot_is_one_tick_s_wherever_the_interrupt_comes() {
+        let shared = Shared::new();
+        let mut places = 0;
+        for at in 0..200 {
+            for ticks in 1..4 {
+                publish(&shared, 7);
+                let (reads, now) = (Cell::new(0), Cell::new(7));
+                let interrupt = || {
+                    reads.set(reads.get() + 1);
+                    // So often in a row, as of a background that is slow.
+                    if (at..at + ticks).contains(&reads.get()) {
+                        now.set(now.get() + 1);
+                        publish(&shared, now.get());
+                    }
+                };
+                let seen = shared.snapshot_between(&interrupt);
+                let whole = Shared::new();
+                publish(&whole, seen.tick);
+                assert_eq!(seen, whole.snapshot(), "interrupted at {at}");
+                assert!(seen.tick >= 7 && seen.tick <= now.get());
+                places = places.max(if seen.tick > 7 { at } else { 0 });
+            }
+        }
+        // All places of a reading were tried.
+        assert!((20..150).contains(&places), "{places}");
     }
 }

@@ -4,7 +4,7 @@ use super::job::Job;
 use super::jobs::Jobs;
 use super::ports::{Receiver, Sender};
 use super::shared::{CLEAR, DECLARE, Shared};
-use crate::engine::{Counters, Executor, Fault, Output, Stream, StreamState};
+use crate::engine::{Executor, Fault, Output, Stream, StreamState};
 use crate::server::TimedSetPoint;
 use core::ops::Deref;
 use core::sync::atomic::Ordering::Relaxed;
@@ -28,6 +28,8 @@ pub struct Tick<S, I, O> {
     /// Ticks to the next set-point of the record; 0: none is being made.
     until_next: u16,
     recording: bool,
+    /// In this tick the machine was said to stand elsewhere.
+    placed: bool,
 }
 
 impl<S, I, O> Tick<S, I, O>
@@ -52,6 +54,7 @@ where
             stop_input: false,
             until_next: 1,
             recording: false,
+            placed: false,
         }
     }
 
@@ -83,19 +86,10 @@ where
             epoch,
             fault,
             &output,
-            &self.counters(),
+            (self.executor.counters(), self.jobs.dropped()),
             self.stream.counters(),
         );
         output
-    }
-
-    fn counters(&self) -> Counters {
-        let mut counters = *self.executor.counters();
-        let bounds = &self.stream.counters().bounds;
-        counters.dropped = counters.dropped.wrapping_add(self.jobs.dropped());
-        counters.offset_cuts = counters.offset_cuts.wrapping_add(bounds.offset_cuts);
-        counters.slew_cuts = counters.slew_cuts.wrapping_add(bounds.slew_cuts);
-        counters
     }
 
     /// One set-point of the stream from the queue, if it has come.
@@ -198,11 +192,26 @@ where
         }
         if asked & DECLARE != 0 {
             self.executor.set_position(self.shared.declared_nm());
+            self.placed = true;
         }
     }
 
+    /// Whether the set-point of this tick is where the machine was said to stand, which is not a way to go: asked once by whoever
+    /// turns ways into pulses.
+    pub fn placed(&mut self) -> bool {
+        core::mem::take(&mut self.placed)
+    }
+
+    pub(super) fn shared(&self) -> &Shared {
+        &self.shared
+    }
+
+    pub(super) const fn faulty(&self) -> bool {
+        self.executor.fault().is_some()
+    }
+
     /// Neither executor nor stream move anything.
-    fn at_rest(&self) -> bool {
+    pub(super) fn at_rest(&self) -> bool {
         self.executor.idle() && !self.streaming
     }
 

@@ -34,12 +34,12 @@ pub mod bench;
 mod config;
 mod engage;
 mod executor;
-mod extra;
 mod guard;
+mod hysteresis;
 mod planned;
 mod planner;
+mod profile_terms;
 mod ramp;
-mod sides;
 mod stream;
 mod zones;
 

@@ -53,6 +53,8 @@ pub struct Board {
     pub clock: ClockSource,
     /// Why it started.
     pub reset: ResetCause,
+    /// Fastest that its outputs let an axis be, m/s: feed, and rate of the offset; infinite where they do not mind.
+    pub fastest_m_s: f32,
 }
 
 /// Memory of a server that is too large for a stack: a board keeps it in a static, the host on the heap.
@@ -249,13 +251,16 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
         match self.session.turn(head, opens) {
             Turn::Repeated => {}
             Turn::Late => return None,
-            // Not remembered: a stranger does not disturb whoever has the session.
+            // Not remembered: a stranger does not disturb whoever has the session. But whoever sees the need may stop, hold, and
+            // slow down.
             Turn::Unknown => {
-                return session::frame(
-                    head,
-                    Reply::Refused(Refusal::NoSession),
-                    &mut self.buffers.frame,
-                );
+                let reply = match command {
+                    Ok(command) if session::from_anyone(&command) => {
+                        self.execute(&command).unwrap_or_else(Reply::Refused)
+                    }
+                    _ => Reply::Refused(Refusal::NoSession),
+                };
+                return session::frame(head, reply, &mut self.buffers.frame);
             }
             Turn::New => {
                 let reply = match command {

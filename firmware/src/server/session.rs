@@ -35,6 +35,14 @@ pub(super) fn number(payload: &[u8]) -> u8 {
     number().map_or(u8::MAX, |(number, _)| number.min(255) as u8)
 }
 
+/// Obeyed whoever has the session.
+pub(super) const fn from_anyone(command: &Command) -> bool {
+    matches!(
+        command,
+        Command::Stop | Command::Pause | Command::Resume | Command::Override { .. }
+    )
+}
+
 /// What to do with a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Turn {

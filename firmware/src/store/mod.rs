@@ -23,6 +23,8 @@
 //! No word is programmed twice between erasures (parts with ECC forbid it): the image goes once into a
 //! slot just erased, each confirmation into a place still blank. `sequential-storage` was considered; its map
 //! moves items between pages and erases on its own accord, and costs four times the text for two items.
+#[cfg(test)]
+mod bit_rot;
 mod config;
 mod key;
 mod record;

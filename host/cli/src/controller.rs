@@ -40,11 +40,12 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         Kind::Qemu => {
             let mut note = |text: &str| out.note(text);
             let emulator = Emulator::start(args.image.as_deref(), Pace::Stepped, &mut note)?;
-            let set_points = emulator.stream_path();
+            let (set_points, log) = (emulator.stream_path(), emulator.log_path());
             // Its ticks are granted by the clock: a busy computer delays them, and none of them is ever late.
             let mut ready = |path: &str| {
                 announce(path);
                 out.note(format_args!("set-points: {}", set_points.display()));
+                out.note(format_args!("log: {}", log.display()));
             };
             match serve(emulator.into_link()?, &mut ready)? {}
         }

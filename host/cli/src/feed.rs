@@ -1,6 +1,7 @@
 //! `giotto feed`: feed hold, and the override of what is accepted from now on.
 use super::port::PortArgs;
 use super::{Failure, Output};
+use giotto_link::{ControllerError, outside};
 use giotto_shared::wire::{Command, OVERRIDE_PERCENT};
 use serde_json::json;
 
@@ -35,7 +36,6 @@ fn wish(text: &str) -> Result<Wish, String> {
 
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
-    let mut controller = args.port.open(out)?;
     let (command, words) = match args.wish {
         Wish::Hold => (Command::Pause, "feed hold".to_owned()),
         Wish::Resume => (Command::Resume, "goes on".to_owned()),
@@ -44,11 +44,21 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
             format!("{percent} % of the programmed feed from the next segment on"),
         ),
     };
-    controller.command(command)?;
-    let port = controller.port();
+    let (port, asked) = match args.port.connect(out) {
+        Ok(mut controller) => {
+            controller.command(command)?;
+            (controller.port().to_owned(), "")
+        }
+        // The answer is for the program that has the port.
+        Err(ControllerError::InUse { port }) => {
+            outside::say(&port, args.port.baud(), &command)?;
+            (port, "asked for: ")
+        }
+        Err(error) => return Err(error.into()),
+    };
     if out.json {
         return out.document(&json!({ "port": port, "feed": words }));
     }
-    out.say(format_args!("{port}: {words}"));
+    out.say(format_args!("{port}: {asked}{words}"));
     Ok(())
 }

@@ -242,6 +242,7 @@ fn model_file(fit: &RadiusFit, runs: &[Observation], campaign: &str, machine: &s
             radius_mm: range(|o| o.radius_m),
             feed_mm_s: range(|o| o.feed_m_s),
         },
+        kinematics: None,
         effects: Vec::new(),
         delay_s: None,
     }

@@ -1,8 +1,14 @@
 //! `giotto log`: what has happened on a controller, in words.
 use super::port::PortArgs;
 use super::{Failure, Output};
+use giotto_link::Board;
+use giotto_link::image;
+use giotto_link::log::{Line, Words};
+use giotto_link::port::BAUD;
 use giotto_shared::wire::{Event, What};
 use serde_json::{Value, json};
+use std::io::Read;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Between two questions for more.
@@ -14,8 +20,14 @@ pub struct Args {
     /// What the controller remembers, and no more; otherwise what comes is shown until interrupted.
     #[arg(long)]
     once: bool,
+    /// The board's own log port instead (or a socket, or a file): what comes there in defmt's encoding, in the image's words.
+    #[arg(long, value_name = "PATH", conflicts_with = "port")]
+    encoded: Option<PathBuf>,
+    /// The image whose words they are, an ELF file; without it the one of this workspace for QEMU.
+    #[arg(long, value_name = "IMAGE", requires = "encoded")]
+    elf: Option<PathBuf>,
     #[command(flatten)]
-    port: PortArgs,
+    port: Option<PortArgs>,
 }
 
 /// Requests by their numbers in the protocol.
@@ -106,9 +118,60 @@ fn document(number: u32, event: &Event, tick_hz: u32) -> Value {
     json!({ "number": number, "time_s": time_s, "event": words(&event.what) })
 }
 
+/// Where a board's log comes from: a socket of the emulator, a serial device, or what was kept of either in a file.
+fn source(path: &Path) -> std::io::Result<Box<dyn Read>> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt;
+        let kind = path.metadata()?.file_type();
+        if kind.is_socket() {
+            return Ok(Box::new(std::os::unix::net::UnixStream::connect(path)?));
+        }
+        if kind.is_char_device() {
+            let path = path.to_string_lossy();
+            return Ok(Box::new(giotto_link::serial::listen(&path, BAUD)?));
+        }
+    }
+    Ok(Box::new(std::fs::File::open(path)?))
+}
+
+/// Shows a board's log to its end.
+fn encoded(path: &Path, elf: Option<PathBuf>, out: Output) -> Result<(), Failure> {
+    let image = elf.unwrap_or_else(|| image::path(Board::Mps2An386));
+    let words = Words::of(&image)?;
+    let fail = |error: std::io::Error| Failure::input(format_args!("{}: {error}", path.display()));
+    let from = source(path).map_err(fail)?;
+    let mut all = Vec::new();
+    let disturbed = words
+        .read(from, &mut |Line { time, level, words }| {
+            if out.json {
+                all.push(json!({ "time_s": time, "level": level, "event": words }));
+            } else {
+                let time = time.unwrap_or_default();
+                out.say(format_args!("{time:>12} s  {level:<5} {words}"));
+            }
+        })
+        .map_err(fail)?;
+    if out.json {
+        return out.document(&json!({ "events": all, "disturbed": disturbed }));
+    }
+    if disturbed > 0 {
+        out.note(format_args!(
+            "{disturbed} pieces were disturbed, or are another image's"
+        ));
+    }
+    Ok(())
+}
+
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
-    let mut controller = args.port.open(out)?;
+    let (mut controller, once) = match (args.port, args.encoded) {
+        (_, Some(path)) => return encoded(&path, args.elf, out),
+        (Some(port), None) => (port.open(out)?, args.once),
+        (None, None) => {
+            return Err(Failure::usage("whose log?").help("--port PORT, or --encoded PATH"));
+        }
+    };
     let tick_hz = controller.identity().tick_hz;
     if out.json {
         let events = controller.events(0)?;
@@ -125,7 +188,7 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
             out.say(format_args!("{time_s:>12.3} s  {}", words(&event.what)));
             next = number.wrapping_add(1);
         }
-        if args.once {
+        if once {
             return Ok(());
         }
         controller.listen(ASK_AFTER)?;

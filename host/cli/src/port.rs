@@ -25,6 +25,11 @@ impl PortArgs {
         Ok(self.connect(out)?)
     }
 
+    /// Baud rate of a serial device.
+    pub(super) const fn baud(&self) -> u32 {
+        self.baud
+    }
+
     /// As [`Self::open`], for those who look at the error.
     pub(super) fn connect(&self, out: Output) -> Result<Controller, ControllerError> {
         let Ok(port) = self.port.parse::<Port>();

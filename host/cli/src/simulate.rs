@@ -8,8 +8,15 @@ use std::path::PathBuf;
 #[derive(clap::Args, Debug)]
 pub struct Args {
     /// The plan: machine (or model), instrument and runs; also what `giotto plan` writes.
-    #[arg(value_name = "PLAN.toml")]
-    plan: PathBuf,
+    #[arg(
+        value_name = "PLAN.toml",
+        required_unless_present = "preset",
+        conflicts_with = "preset"
+    )]
+    plan: Option<PathBuf>,
+    /// A plan that comes with giotto: `paper`, the plan of Slamani, Nubiola and Bonev (2012) on a simulated IRB 1600.
+    #[arg(long, value_name = "NAME", value_parser = clap::builder::PossibleValuesParser::new(simulation::PRESETS))]
+    preset: Option<String>,
     /// Directory of the campaign to be written.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
@@ -28,9 +35,18 @@ struct Document<'a> {
     spread_um: f64,
 }
 
+/// The plan of the file, or the preset.
+fn plan(args: &Args) -> Result<Plan, Failure> {
+    if let Some(file) = &args.plan {
+        return Ok(Plan::load(file)?);
+    }
+    let name = args.preset.as_deref().unwrap_or_default();
+    Plan::preset(name)?.ok_or_else(|| Failure::input(format!("no preset \"{name}\"")))
+}
+
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
-    let plan = Plan::load(&args.plan)?;
+    let plan = plan(&args)?;
     if args.output.join("campaign.toml").exists() {
         let message = format!("{}: holds a campaign already", args.output.display());
         return Err(

@@ -1,6 +1,8 @@
 //! `giotto stop`: what runs comes to rest within the limits, on its path.
 use super::port::PortArgs;
 use super::{Failure, Output};
+use giotto_link::ControllerError;
+use giotto_link::outside;
 use giotto_shared::wire::Command;
 use serde_json::json;
 use std::time::Duration;
@@ -17,7 +19,21 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
-    let mut controller = args.port.open(out)?;
+    let mut controller = match args.port.connect(out) {
+        Ok(controller) => controller,
+        Err(ControllerError::InUse { port }) => {
+            // Whoever has the port says where the machine stands.
+            outside::say(&port, args.port.baud(), &Command::Stop)?;
+            if out.json {
+                return out.document(&json!({ "port": port, "ran": null, "place_mm": null }));
+            }
+            out.say(format_args!(
+                "{port}: asked to stop; the program that has the port says where it stands"
+            ));
+            return Ok(());
+        }
+        Err(error) => return Err(error.into()),
+    };
     let ran = controller.status()?.motion.is_run();
     controller.command(Command::Stop)?;
     let mut status = controller.status()?;

@@ -56,6 +56,7 @@ fn campaign() -> Campaign {
         machine: "ABB IRB 1600-6/1.45, simulated".into(),
         repeatability_m: None,
         table: None,
+        kinematics: None,
         runs,
     }
 }

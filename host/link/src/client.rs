@@ -35,6 +35,8 @@ pub struct Controller {
     pub(super) wish: Option<Arc<AtomicBool>>,
     /// It was.
     pub(super) stopped: bool,
+    /// Stops that the controller had counted when recording began.
+    pub(super) stops_before: u32,
 }
 
 impl std::fmt::Debug for Controller {
@@ -82,6 +84,7 @@ impl Controller {
             supervise_ms: SUPERVISE_MS,
             wish: None,
             stopped: false,
+            stops_before: 0,
         };
         controller.hello()?;
         Ok(controller)

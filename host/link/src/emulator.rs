@@ -163,12 +163,17 @@ impl Emulator {
         UnixStream::connect(self.stream_path())
     }
 
-    /// Connects to where the log goes in defmt's encoding.
+    /// Path of the socket where the log goes in defmt's encoding.
+    pub fn log_path(&self) -> PathBuf {
+        self.folder.path().join("log")
+    }
+
+    /// Connects to it.
     ///
     /// # Errors
     /// Those of the socket.
     pub fn log(&self) -> io::Result<UnixStream> {
-        UnixStream::connect(self.folder.path().join("log"))
+        UnixStream::connect(self.log_path())
     }
 
     /// Opens the link; the emulator ends with it.

@@ -55,8 +55,15 @@ impl Board {
         use SerialPort::{Link, Nowhere, Socket};
         match self {
             Self::Mps2An386 | Self::Ticks => &[Link, Socket("stream"), Socket("log")],
-            // USART3 and USART6.
-            Self::Stm32f405 => &[Nowhere, Nowhere, Link, Nowhere, Nowhere, Socket("log")],
+            // USART1, USART3 and USART6.
+            Self::Stm32f405 => &[
+                Socket("stream"),
+                Nowhere,
+                Link,
+                Nowhere,
+                Nowhere,
+                Socket("log"),
+            ],
         }
     }
 

@@ -8,6 +8,8 @@
 //! | [`flash`] | a table onto a controller, and the proof that it is there |
 //! | [`recording`] | circles run, set-points received |
 //! | [`program`], [`streaming`] | programs and set-points, sent ahead of the machine |
+//! | [`outside`] | stop, hold and override on a port that another program has |
+//! | [`log`] | a board's log, out of defmt's encoding |
 //! | [`settings`] | stored limits, and the log of events |
 //! | [`port`] | what `--port` may name, and opening it |
 //! | [`serial`] | a serial device |
@@ -42,6 +44,8 @@ pub mod flash;
 pub mod image;
 pub mod link;
 pub mod linuxcnc;
+pub mod log;
+pub mod outside;
 mod pipelined;
 pub mod port;
 pub mod program;

@@ -120,5 +120,7 @@ fn session() -> u16 {
     let now = SystemTime::now()
         .duration_since(UNIX_EPOCH)
         .unwrap_or_default();
-    (now.as_millis() as u16) ^ (std::process::id() as u16).rotate_left(8)
+    let number = (now.as_millis() as u16) ^ (std::process::id() as u16).rotate_left(8);
+    // 0 is that of a word from outside.
+    number.max(1)
 }

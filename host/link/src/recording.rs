@@ -44,7 +44,7 @@ pub struct Recording {
     pub dt_s: f64,
     /// The set-points.
     pub points: Vec<SetPointRecord>,
-    /// The person here stopped the run before its end.
+    /// The run was stopped before its end, whoever asked for it.
     pub stopped: bool,
 }
 
@@ -103,6 +103,7 @@ impl Controller {
         })?;
         self.set_points.clear();
         self.stopped = false;
+        self.stops_before = self.status()?.counters.stops;
         Ok(())
     }
 
@@ -135,6 +136,8 @@ impl Controller {
             every: 0,
             on_link: true,
         })?;
+        // By the person here, by the stop input, or by another program.
+        self.stopped |= self.status()?.counters.stops != self.stops_before;
         self.recording(every)
     }
 

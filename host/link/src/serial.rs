@@ -12,16 +12,13 @@ pub struct SerialLink {
 }
 
 impl SerialLink {
-    /// Opens a device by its path, for this program alone.
+    /// Opens a device by its path, for this program alone but for a word from [outside](super::outside).
     ///
     /// # Errors
     /// [`ControllerError::NoPort`], [`ControllerError::InUse`], [`ControllerError::CannotOpen`].
     pub fn open(path: &str, baud: u32) -> Result<Self, ControllerError> {
         let port = path.to_owned();
-        match serialport::new(path, baud)
-            .timeout(Duration::from_millis(100))
-            .open()
-        {
+        match open(path, baud) {
             Ok(port) => Ok(Self {
                 port,
                 opened: Instant::now(),
@@ -38,6 +35,34 @@ impl SerialLink {
             }),
         }
     }
+}
+
+/// A device that is only listened to, such as a log port.
+///
+/// # Errors
+/// It cannot be opened.
+pub fn listen(path: &str, baud: u32) -> io::Result<Box<dyn Read>> {
+    let port = serialport::new(path, baud)
+        .timeout(Duration::from_secs(1))
+        .open()?;
+    Ok(Box::new(port))
+}
+
+/// Nobody else has it; from then on a lock keeps out those who want it alone, and lets in a word from outside.
+#[cfg(unix)]
+fn open(path: &str, baud: u32) -> serialport::Result<Box<dyn SerialPort>> {
+    let mut port = serialport::new(path, baud)
+        .timeout(Duration::from_millis(100))
+        .open_native()?;
+    port.set_exclusive(false)?;
+    Ok(Box::new(port))
+}
+
+#[cfg(not(unix))]
+fn open(path: &str, baud: u32) -> serialport::Result<Box<dyn SerialPort>> {
+    serialport::new(path, baud)
+        .timeout(Duration::from_millis(100))
+        .open()
 }
 
 impl Link for SerialLink {

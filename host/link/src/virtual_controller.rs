@@ -28,6 +28,7 @@ const BOARD: Board = Board {
     tick_hz: TICK_HZ,
     clock: ClockSource::Crystal,
     reset: ResetCause::Power,
+    fastest_m_s: f32::INFINITY,
 };
 
 /// Flash of a virtual controller.

@@ -71,8 +71,8 @@ impl<'a> Engine<'a> {
         } else {
             let plans = decide(&mut self.window, &self.law);
             let mut text = Vec::new();
-            for at in self.gone..keep {
-                let (visit, plan) = (&self.window[at], &plans[at]);
+            let planned = self.window.iter().zip(&plans).enumerate();
+            for (at, (visit, plan)) in planned.take(keep).skip(self.gone) {
                 match (&visit.action, plan) {
                     (Action::Arc(arc), Some(Ok(plan))) => {
                         let arc = from_its_start(arc);

@@ -48,17 +48,12 @@ fn weighted(parts: &[Vec<f64>], target: &[f64], weights: &[f64]) -> Option<[f64;
     let n = parts.len().min(MOST_UNKNOWNS);
     let mut rows = [[0.0; MOST_UNKNOWNS + 1]; MOST_UNKNOWNS];
     for (k, (w, t)) in weights.iter().zip(target).enumerate() {
-        for i in 0..n {
-            let wi = w * parts[i][k];
-            rows[i][MOST_UNKNOWNS] += wi * t;
-            for j in i..n {
-                rows[i][j] += wi * parts[j][k];
+        for (row, part) in rows.iter_mut().zip(parts) {
+            let weighted = w * part[k];
+            row[MOST_UNKNOWNS] += weighted * t;
+            for (sum, other) in row.iter_mut().zip(parts) {
+                *sum += weighted * other[k];
             }
-        }
-    }
-    for i in 0..n {
-        for j in i + 1..n {
-            rows[j][i] = rows[i][j];
         }
     }
     solve(&mut rows, n)

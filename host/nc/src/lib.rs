@@ -174,7 +174,7 @@ pub fn is_program(program: &[u8]) -> bool {
 /// let Fate::Corrected { radius_mm, delta_mm, .. } = corrected.arcs[0].fate else {
 ///     unreachable!("{:?}", corrected.arcs)
 /// };
-/// // The machine draws it 333 µm too small: it is programmed larger.
+/// // The machine draws it 328 µm too small: it is programmed larger.
 /// assert_eq!(radius_mm, 50.0);
 /// assert!(delta_mm > 0.3 && delta_mm < 0.4, "{delta_mm}");
 /// // Everything but the arc is copied to the letter.

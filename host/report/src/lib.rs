@@ -62,7 +62,7 @@ pub struct ReportError(#[from] minijinja::Error);
 /// let campaign = simulation::campaign(&plan, 1);
 /// let page = giotto_report::html(&campaign, &diagnosis::diagnose(&campaign, &Default::default())?)?;
 /// // One file: nothing is fetched, and the data's hash says what it was made of.
-/// assert!(page.starts_with("<!DOCTYPE html>") && !page.contains("src=\"http"));
+/// assert!(page.starts_with("<!doctype html>") && !page.contains("src=\"http"));
 /// assert!(page.contains(&giotto_report::data_hash(&campaign)[..12]));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

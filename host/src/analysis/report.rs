@@ -128,7 +128,7 @@ pub fn of_files(manifest: &Manifest, progress: impl Fn() + Sync) -> Result<Repor
             .map(|r| (r.radius_m, r.feed_m_s, r.direction)),
     );
     let pairs: Vec<[Option<usize>; 2]> = groups.concat();
-    let one = |index: usize| {
+    let one = |index: usize| -> Result<Done, (usize, CampaignError)> {
         let done = read_and_analyse(manifest, index)?;
         progress();
         Ok(done)

@@ -194,6 +194,7 @@ fn iso_figures_of_a_pair() {
         machine: "m".into(),
         repeatability_m: None,
         table: None,
+        kinematics: None,
         runs: vec![cw, lone, ccw],
     };
     let report = of_campaign(&campaign).unwrap();
@@ -253,6 +254,7 @@ fn files_and_memory_give_the_same_figures() {
         machine: "m".into(),
         repeatability_m: None,
         table: None,
+        kinematics: None,
         runs: vec![make("a.csv", Direction::Cw), make("b.csv", Direction::Ccw)],
     };
     write(&campaign, dir.path()).unwrap();

@@ -1,4 +1,5 @@
 //! What can be wrong with a campaign: one place (file, line, column), one problem, one thing to do next.
+use crate::kinematics::ReachError;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -123,6 +124,16 @@ pub enum Problem {
     OtherPlane {
         declared: &'static str,
         normal: [f64; 3],
+    },
+    #[error(
+        "a circle of radius {radius_mm} mm about [{}, {}, {}] mm, at {angle_deg}°: {reason}",
+        centre_mm[0], centre_mm[1], centre_mm[2]
+    )]
+    OutOfReach {
+        radius_mm: f64,
+        centre_mm: [f64; 3],
+        angle_deg: f64,
+        reason: ReachError,
     },
     #[error("no run \"{file}\"; expected one of {}", runs.join(", "))]
     UnknownRun { file: String, runs: Vec<String> },
@@ -410,6 +421,9 @@ impl CampaignError {
             | P::OutOfRange { .. }
             | P::OtherPlane { .. }
             | P::UnknownDirection { .. } => "correct this line of campaign.toml",
+            P::OutOfReach { .. } => {
+                "correct `centre_mm` (in the robot's base), the tool, the orientation or the branch in campaign.toml"
+            }
             P::MissingKey { .. } | P::UnknownKey { .. } => "correct the key in campaign.toml",
             P::UnknownRun { .. } => "see `giotto campaign list CAMPAIGN`",
             P::NoRuns => "add a run with `giotto import`",

@@ -2,11 +2,14 @@
 use super::error::{CampaignError, Place, Problem};
 use super::import::Slice;
 use super::{Direction, Frame, Note, Plane};
+use crate::kinematics::Kinematics;
 use std::collections::HashMap;
 use std::ops::Range;
 use std::path::{Component, Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
+
+mod kinematics;
 
 /// What a run may say of itself.
 const RUN_KEYS: [&str; 11] = [
@@ -44,6 +47,8 @@ pub struct Manifest {
     pub repeatability_m: Option<f64>,
     /// SHA-256 of the correction table that was at work.
     pub table: Option<String>,
+    /// The arm, if the machine is one.
+    pub kinematics: Option<Kinematics>,
     /// What it says of each run, in file order.
     pub runs: Vec<Entry>,
     /// What the reader should know (unknown keys).
@@ -132,6 +137,12 @@ impl Manifest {
 }
 
 impl Entry {
+    /// Where `campaign.toml` lists the run.
+    pub(super) fn listed(&self) -> Place {
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        Place::at(folder.join("campaign.toml"), self.line, 1)
+    }
+
     /// How the circle lies: as its points say, else as the campaign says, else in XY.
     pub(super) fn frame_of(&self, measured: Option<Frame>) -> Result<Frame, CampaignError> {
         let declared = self.plane.map(Frame::of);
@@ -190,7 +201,7 @@ impl Source<'_> {
             )
         })?;
         let root = document.get_ref();
-        self.known_keys(root, &["campaign", "run"])?;
+        self.known_keys(root, &["campaign", "kinematics", "run"])?;
         let mut head = match root.get("campaign") {
             None => {
                 let problem = Problem::MissingKey {
@@ -209,6 +220,10 @@ impl Source<'_> {
                 .and_then(|p| Some(p.parent()?.file_name()?.to_owned()));
             head.name = folder.map_or_else(String::new, |f| f.to_string_lossy().into_owned());
         }
+        let kinematics = match root.get("kinematics") {
+            Some(value) => self.kinematics(value)?,
+            None => None,
+        };
         let list = match root.get("run") {
             None => return Err(self.error(0..0, Problem::NoRuns)),
             Some(v) => match v.get_ref() {
@@ -226,10 +241,33 @@ impl Source<'_> {
                 }
             },
         };
+        let runs = self.entries(list, &head, kinematics.is_some())?;
+        Ok(Manifest {
+            path: self.file.to_path_buf(),
+            name: head.name,
+            machine: head.machine,
+            repeatability_m: head.repeatability_m,
+            table: head.table,
+            kinematics,
+            runs,
+            notes: self.notes,
+        })
+    }
+
+    /// The runs of the list; those of an arm say where they are.
+    fn entries(
+        &mut self,
+        list: &[Value<'_>],
+        head: &Head,
+        of_arm: bool,
+    ) -> Result<Vec<Entry>, CampaignError> {
         let mut runs = Vec::with_capacity(list.len());
         let mut seen: HashMap<PathBuf, usize> = HashMap::new();
         for value in list {
             let (entry, span) = self.entry(value, head.plane)?;
+            if of_arm {
+                self.with_centre(&entry, span.clone())?;
+            }
             let plain: PathBuf = entry
                 .path
                 .components()
@@ -247,15 +285,7 @@ impl Source<'_> {
             seen.insert(plain, entry.line);
             runs.push(entry);
         }
-        Ok(Manifest {
-            path: self.file.to_path_buf(),
-            name: head.name,
-            machine: head.machine,
-            repeatability_m: head.repeatability_m,
-            table: head.table,
-            runs,
-            notes: self.notes,
-        })
+        Ok(runs)
     }
 
     fn head(&mut self, value: &Value<'_>) -> Result<Head, CampaignError> {

@@ -49,6 +49,7 @@ pub(crate) use table::is_contract_header;
 pub use write::replace;
 pub use write::write;
 
+use crate::kinematics::Kinematics;
 use std::f64::consts::TAU;
 use std::fmt;
 
@@ -78,6 +79,8 @@ pub struct Campaign {
     pub repeatability_m: Option<f64>,
     /// SHA-256 of the correction table that was at work, if one was.
     pub table: Option<String>,
+    /// The arm, if the machine is one: without it the axes are slides.
+    pub kinematics: Option<Kinematics>,
     /// The runs in file order; the order of time is that of `started_s`.
     pub runs: Vec<Run>,
 }

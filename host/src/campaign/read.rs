@@ -3,11 +3,15 @@ use super::check;
 use super::error::{CampaignError, Problem};
 use super::manifest::Manifest;
 use super::samples::{self, Loaded};
-use super::{Campaign, Note};
+use super::{Campaign, Frame, Note, Run};
+use crate::kinematics;
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::path::Path;
+
+/// Angles at which a circle of an arm is looked at: every 2°.
+const CHECKED: usize = 180;
 
 /// Reads a campaign: its directory, or its `campaign.toml`.
 ///
@@ -109,17 +113,47 @@ impl Manifest {
             runs.push(loaded.run);
         }
         together.check()?;
+        self.reached(&runs)?;
         Ok((
             Campaign {
                 name: self.name.clone(),
                 machine: self.machine.clone(),
                 repeatability_m: self.repeatability_m,
                 table: self.table.clone(),
+                kinematics: self.kinematics,
                 runs,
             },
             notes,
             left_out,
         ))
+    }
+
+    /// Refuses a circle on which the arm cannot stand; runs of one circle are looked at once.
+    fn reached(&self, runs: &[Run]) -> Result<(), CampaignError> {
+        let Some(kinematics) = &self.kinematics else {
+            return Ok(());
+        };
+        let mut seen: Vec<([f64; 3], Frame, f64)> = Vec::new();
+        for (entry, run) in self.runs.iter().zip(runs) {
+            let circle = (run.centre_m.unwrap_or_default(), run.frame, run.radius_m);
+            if seen.contains(&circle) {
+                continue;
+            }
+            let (centre_m, frame, radius_m) = circle;
+            kinematics::walk(kinematics, centre_m, frame, radius_m, CHECKED).map_err(
+                |(angle_rad, reason)| {
+                    let problem = Problem::OutOfReach {
+                        radius_mm: radius_m * 1e3,
+                        centre_mm: centre_m.map(|c| c * 1e3),
+                        angle_deg: angle_rad.to_degrees().round(),
+                        reason,
+                    };
+                    CampaignError::new(entry.listed(), problem)
+                },
+            )?;
+            seen.push(circle);
+        }
+        Ok(())
     }
 
     /// Reads and checks run `index` without keeping its time stamps. What only shows across runs is for

@@ -53,6 +53,7 @@ fn what_is_written_is_read_back() {
         machine: "m".into(),
         repeatability_m: None,
         table: None,
+        kinematics: None,
         runs: vec![
             ballbar("run000.csv", Direction::Ccw, 500, turn),
             ballbar("b/run1.csv", Direction::Cw, 999, turn),
@@ -106,6 +107,7 @@ fn measured_angles_and_points_survive_a_round_trip() {
         machine: "m".into(),
         repeatability_m: None,
         table: None,
+        kinematics: None,
         runs: vec![polar, points],
     };
     write(&campaign, dir.path()).unwrap();
@@ -296,6 +298,7 @@ fn a_circle_keeps_its_plane_from_the_file_to_the_run() {
             machine: "m".into(),
             repeatability_m: Some(3e-6),
             table: Some("ab".repeat(32)),
+            kinematics: None,
             runs: vec![bar, polar],
         };
         write(&campaign, dir.path()).unwrap();
@@ -335,5 +338,109 @@ fn a_plane_that_the_points_contradict_is_refused() {
         write_raw(dir.path(), &toml, &[("a.csv", &file)]);
         let refused = read(dir.path()).unwrap_err().to_string();
         assert!(refused.contains(words), "{refused}");
+    }
+}
+
+/// A campaign of an arm: one circle by time, with this block and these lines of its run.
+fn arm(block: &str, run: &str) -> (tempfile::TempDir, Result<Campaign, CampaignError>) {
+    let dir = tempfile::tempdir().unwrap();
+    let mut csv = "time_s,deviation_um\n".to_owned();
+    for k in 0..200 {
+        csv += &format!("{:.5},{:.1}\n", 0.031_416 * f64::from(k), (k * 37) % 11);
+    }
+    std::fs::write(dir.path().join("r.csv"), csv).unwrap();
+    let toml = format!(
+        "[campaign]\nname = \"arm\"\n{block}\n[[run]]\nfile = \"r.csv\"\nradius_mm = 100.0\nfeed_mm_s = 100.0\n\
+         direction = \"ccw\"\n{run}\n"
+    );
+    std::fs::write(dir.path().join("campaign.toml"), toml).unwrap();
+    let read = read(dir.path());
+    (dir, read)
+}
+
+const SIX: &str = "[kinematics]\nrobot = \"abb-irb1600-6-1.45\"\ntool_mm = [0, 65, 149]\norientation = [0, 0, 1, 0]\nbranch = \"elbow-up\"";
+const TWO: &str =
+    "[kinematics]\nmodel = \"scara\"\nl1_mm = 475.0\nl2_mm = 720.0\nelbow = \"positive\"";
+
+#[test]
+fn an_arm_is_read_and_written_again() {
+    for (block, centre) in [
+        (SIX, "centre_mm = [-290, 987, 615]"),
+        (TWO, "centre_mm = [760, 250, 600]"),
+    ] {
+        let (_dir, read_back) = arm(block, centre);
+        let campaign = read_back.unwrap();
+        let kinematics = campaign.kinematics.unwrap();
+        let other = tempfile::tempdir().unwrap();
+        write(&campaign, other.path()).unwrap();
+        let again = read(other.path()).unwrap();
+        assert_eq!(again.kinematics, Some(kinematics));
+        assert_eq!(again.runs[0].centre_m, campaign.runs[0].centre_m);
+    }
+    let (_dir, slides) = arm("[kinematics]\nmodel = \"slides\"", "");
+    assert_eq!(slides.unwrap().kinematics, None);
+}
+
+/// Each refusal names the place and what was expected.
+#[test]
+fn an_arm_that_cannot_be_is_refused_with_its_place() {
+    let centre = "centre_mm = [-290, 987, 615]";
+    let cases = [
+        (SIX.to_owned(), "", "9:8: `centre_mm` is missing"),
+        (
+            SIX.to_owned(),
+            "centre_mm = [-290, 1987, 615]",
+            "9:1: a circle of radius 100 mm about [-290, 1987, 615] mm, at 0°: the arm does not reach there",
+        ),
+        (
+            TWO.to_owned(),
+            "centre_mm = [0, 50, 0]",
+            "9:1: a circle of radius 100 mm about [0, 50, 0] mm, at 0°: the arm does not reach there",
+        ),
+        (
+            TWO.replace("positive", "up"),
+            centre,
+            "7:9: `elbow` is \"up\"; expected \"positive\" or \"negative\"",
+        ),
+        (
+            SIX.replace("irb1600", "irb1700"),
+            centre,
+            "4:9: `robot` is \"abb-irb1700-6-1.45\"; expected one of abb-irb1600-6-1.45",
+        ),
+        (
+            SIX.replace("[0, 0, 1, 0]", "[0, 0, 2, 0]"),
+            centre,
+            "6:15: `orientation` is [0.0, 0.0, 2.0, 0.0], of length 2.0000; expected a unit quaternion",
+        ),
+        (
+            SIX.replace("branch = \"elbow-up\"", "branch = \"up\""),
+            centre,
+            "7:10: `branch` is \"up\"; expected \"elbow-up\"",
+        ),
+        (
+            SIX.replace("branch = \"elbow-up\"", "l1_mm = 3.0"),
+            centre,
+            "7:9: `l1_mm` is of another model",
+        ),
+        (
+            TWO.replace("l2_mm = 720.0", ""),
+            centre,
+            "`l2_mm` is missing; expected a length",
+        ),
+        (
+            TWO.replace("l2_mm = 720.0", "l2_mm = -3.0"),
+            centre,
+            "6:9: `l2_mm` is -3; expected a length above 0",
+        ),
+        (
+            "[kinematics]\nmodel = \"delta\"".to_owned(),
+            centre,
+            "4:9: `model` is \"delta\"; expected \"opw\"",
+        ),
+    ];
+    for (block, run, want) in cases {
+        let (_dir, read) = arm(&block, run);
+        let said = read.unwrap_err().to_string();
+        assert!(said.contains(want), "{said}\nwanted: {want}");
     }
 }

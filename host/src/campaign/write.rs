@@ -1,6 +1,7 @@
 //! Writing campaigns in the contract's files.
 use super::error::{CampaignError, Place, Problem};
 use super::{Campaign, Direction, Frame, Plane, Run};
+use crate::kinematics::{Kinematics, WrittenKinematics};
 use crate::whole_file;
 pub(crate) use crate::whole_file::make_public;
 use std::collections::HashSet;
@@ -71,6 +72,9 @@ pub fn write(campaign: &Campaign, dir: &Path) -> Result<(), CampaignError> {
         head["table"] = value(table);
     }
     document["campaign"] = Item::Table(head);
+    if let Some(kinematics) = &campaign.kinematics {
+        document["kinematics"] = Item::Table(block(kinematics));
+    }
     let mut list = ArrayOfTables::new();
     for run in &campaign.runs {
         list.push(entry(run));
@@ -88,6 +92,39 @@ fn make_dir(dir: &Path) -> Result<(), CampaignError> {
 pub fn replace(path: &Path, text: &str) -> Result<(), CampaignError> {
     whole_file::write(path, text.as_bytes())
         .map_err(|e| CampaignError::io(path, "written", "a place for a file", &e))
+}
+
+/// The `[kinematics]` table of an arm.
+fn block(kinematics: &Kinematics) -> Table {
+    let written = WrittenKinematics::from(kinematics);
+    let mut table = Table::new();
+    let list = |numbers: &[f64]| value(numbers.iter().copied().collect::<toml_edit::Array>());
+    let mut put = |key: &str, item: Option<Item>| {
+        if let Some(item) = item {
+            table[key] = item;
+        }
+    };
+    put("model", written.model.map(value));
+    put("robot", written.robot.map(value));
+    let lengths = [
+        ("a1_mm", written.a1_mm),
+        ("a2_mm", written.a2_mm),
+        ("b_mm", written.b_mm),
+        ("c1_mm", written.c1_mm),
+        ("c2_mm", written.c2_mm),
+        ("c3_mm", written.c3_mm),
+        ("c4_mm", written.c4_mm),
+        ("l1_mm", written.l1_mm),
+        ("l2_mm", written.l2_mm),
+    ];
+    for (key, length) in lengths {
+        put(key, length.map(value));
+    }
+    put("tool_mm", written.tool_mm.map(|v| list(&v)));
+    put("orientation", written.orientation.map(|v| list(&v)));
+    put("branch", written.branch.map(value));
+    put("elbow", written.elbow.map(value));
+    table
 }
 
 /// The `[[run]]` table of a run.

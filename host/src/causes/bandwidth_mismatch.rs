@@ -1,4 +1,5 @@
-//! Unequal second cumulants: `r = −(Δκ2/4)(f²/R)·|G|·cos2ψ`, the same both ways: a filter before or behind the servo.
+//! Unequal second cumulants: `r = −(Δκ2/4)(f²/R)·|G|·cos2ψ`, the same both ways: a filter before or behind the servo. Of a
+//! joint `δq = ½Δκ2·q̈`.
 use super::{Cause, CauseModel, Effect, Harmonics, Parameter, RunView, Seat, Site, Words};
 use crate::simulation::machine::Machine;
 use giotto_shared::term::Term;
@@ -41,19 +42,33 @@ impl CauseModel for BandwidthMismatch {
     }
 
     fn seat(&self) -> Seat {
-        Seat::Pair
+        Seat::PairOrJoint
     }
 
     fn harmonics(&self, site: Site, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
+        if let (Site::One(joint), Some(arm)) = (site, &view.arm) {
+            // δq = ½Δκ2·q̈ of the joint.
+            let rates = arm.rates(view);
+            let answers = std::array::from_fn(|n| arm.answers[n] * rates[n] * rates[n] * 0.5);
+            return Some(arm.seen(joint.index(), &answers));
+        }
         let Site::Pair(plane) = site else { return None };
         let size = -0.25 * view.radius_m * view.omega_rad_s.powi(2) * view.gain;
         let [first, second] = plane.axes().map(|axis| view.cosine(axis).squared());
         Some(first.minus(&second).times(size))
     }
 
+    fn is_mutual(&self) -> bool {
+        true
+    }
+
     fn apply(&self, effect: &Effect, machine: &mut Machine) {
-        if let Site::Pair(plane) = effect.site() {
-            machine.split_bandwidth(plane, effect.value());
+        match (effect.site(), &mut machine.arm) {
+            (Site::Pair(plane), _) => machine.split_bandwidth(plane, effect.value()),
+            (Site::One(joint), Some(arm)) => {
+                arm.joints[joint.index()].kappa2_s2 += effect.value();
+            }
+            _ => {}
         }
     }
 

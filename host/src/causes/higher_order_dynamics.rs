@@ -41,6 +41,9 @@ impl CauseModel for HigherOrderDynamics {
     }
 
     fn harmonics(&self, _site: Site, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
+        if let Some(arm) = &view.arm {
+            return Some(arm.per_beta2);
+        }
         let (r, w) = (view.radius_m, view.omega_rad_s);
         Some(Harmonics::mean(r * w.powi(4) * view.gain.powi(3)))
     }

@@ -2,6 +2,7 @@
 //! simulation, its inverse if it has one, and the words for a person. Causes know nothing of each other.
 //!
 //! To add a cause: write its file, name its module and add one line to the list of `register`.
+pub mod arm;
 mod backlash;
 mod bandwidth_mismatch;
 mod cyclic_error;
@@ -9,9 +10,13 @@ mod feed_clamp;
 mod harmonics;
 mod higher_order_dynamics;
 mod interpolation_chord;
+mod joint_backlash;
+mod joint_cyclic_error;
 mod joint_lag_mismatch;
 mod joint_reversal;
+mod joint_zero;
 mod lateral_play;
+mod link_length;
 mod motion;
 mod parameter;
 mod radius_offset;
@@ -75,6 +80,10 @@ register! {
     stick_slip::StickSlip,
     joint_lag_mismatch::JointLagMismatch,
     joint_reversal::JointReversal,
+    joint_backlash::JointBacklash,
+    joint_cyclic_error::JointCyclicError,
+    joint_zero::JointZero,
+    link_length::LinkLength,
 }
 
 impl Cause {
@@ -139,8 +148,6 @@ pub enum Evidence {
     Duration,
     /// Power near reversals without a fixed phase.
     Roughness,
-    /// Not looked for in two-axis data.
-    NotLooked,
 }
 
 /// How a shape parameter moves.
@@ -216,6 +223,21 @@ pub trait CauseModel: Sync {
     /// Whether it can take on the form of other things: beside much that is unexplained it needs to be larger.
     fn flexible(&self) -> bool {
         !self.shape_names().is_empty()
+    }
+
+    /// The class of causes that circles at one place cannot tell from each other: one of it is stated, the others beside it.
+    fn class(&self) -> Option<&'static str> {
+        None
+    }
+
+    /// Whether it is how one joint differs from the mean of all: of two joints, what is one's is the other's as well.
+    fn is_mutual(&self) -> bool {
+        false
+    }
+
+    /// Where it is periodic in the turn of a joint: the lowest and highest ratio that these runs can show.
+    fn ratios(&self, _views: &[RunView], _joint: usize) -> Option<[f64; 2]> {
+        None
     }
 
     /// Number of linear columns: 2 where the phase of the signature is free.
@@ -294,6 +316,8 @@ pub trait CauseModel: Sync {
 /// What a fit says of a cause beside its size.
 #[derive(Clone, Copy, Debug)]
 pub struct Fitted<'a> {
+    /// Where it sits.
+    pub site: Site,
     /// Shape parameters, in the order of the cause's names.
     pub shape: &'a [f64],
     /// Amount of each of its columns.

@@ -1,5 +1,6 @@
 //! What a signature may know of a run: where the machine was at each sample, not what was measured.
 use super::Harmonics;
+use super::arm::ArmView;
 use giotto_shared::{Actuator, Frame};
 use std::sync::Arc;
 
@@ -50,6 +51,8 @@ pub struct RunView {
     pub gain: f64,
     /// Phase lag φ(ω) of the servo, rad, ≥ 0.
     pub lag_rad: f64,
+    /// The joints, where the machine is an arm whose kinematics are known: then no slide moves.
+    pub arm: Option<Arc<ArmView>>,
 }
 
 impl RunView {
@@ -94,7 +97,7 @@ impl RunView {
 
     /// Whether a slide moves along this circle.
     pub fn moves(&self, slide: Actuator) -> bool {
-        slide.is_slide() && self.swing(slide) > STANDS
+        self.arm.is_none() && slide.is_slide() && self.swing(slide) > STANDS
     }
 
     /// Largest direction cosine of a slide: it swings R times that to either side.

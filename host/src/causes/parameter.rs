@@ -219,6 +219,9 @@ impl Effect {
                     super::Seat::MachineOrOne => "an axis or none",
                     super::Seat::Pair => "a plane",
                     super::Seat::Across => "an axis and the one that shifts",
+                    super::Seat::Joint => "a joint",
+                    super::Seat::MachineOrJoint => "a joint or no axis",
+                    super::Seat::PairOrJoint => "a plane or a joint",
                 },
             });
         }

@@ -172,13 +172,18 @@ impl CauseModel for ReversalSpike {
     }
 }
 
+/// Time after which a pulse is over, s: the loop's answer, and the time to slide five presliding lengths, x = ½(f²/R)t².
+fn ending_s(decay_s: f64, presliding_m: f64, reach_m: f64, omega_rad_s: f64) -> f64 {
+    14.0 * decay_s + (10.0 * presliding_m / reach_m).sqrt() / omega_rad_s
+}
+
 /// Steps of the tabulated pulse.
 const STEPS: usize = 300;
 /// Presliding lengths after which the friction has turned to the last bit.
 const SLID: f64 = 38.0;
 
 /// The pulse after a reversal of one run, tabulated; it changes sign from one reversal to the next.
-struct Pulse {
+pub(super) struct Pulse {
     step_s: f64,
     values: [f64; STEPS + 1],
 }
@@ -189,9 +194,41 @@ impl Pulse {
         let rise_s = rise_s.abs().clamp(1e-5, 0.95 * decay_s);
         let presliding_m = presliding_m.abs().max(1e-8);
         let half_turn_s = view.half_turn_s();
-        // Time to slide five presliding lengths: x = ½(f²/R)t².
-        let slide_s = (10.0 * presliding_m / reach_m).sqrt() / view.omega_rad_s;
-        let end_s = (14.0 * decay_s + slide_s).min(half_turn_s);
+        let end_s = ending_s(decay_s, presliding_m, reach_m, view.omega_rad_s).min(half_turn_s);
+        // Where pulses overlap, the one before is still dying away with the other sign.
+        let passes = if end_s < half_turn_s { 1 } else { 3 };
+        let times = [decay_s, rise_s];
+        Self::tabulated(
+            times,
+            [presliding_m, reach_m],
+            view.omega_rad_s,
+            end_s,
+            passes,
+        )
+    }
+
+    /// The pulse after one reversal, to its end; `reach` is the travel's second derivative over ω² there, in the unit of the
+    /// presliding travel.
+    pub(super) fn alone([decay_s, rise_s, presliding]: [f64; 3], reach: f64, omega: f64) -> Self {
+        let decay_s = decay_s.abs().max(1e-4);
+        let rise_s = rise_s.abs().clamp(1e-5, 0.95 * decay_s);
+        let presliding = presliding.abs().max(1e-8);
+        let end_s = ending_s(decay_s, presliding, reach, omega);
+        Self::tabulated([decay_s, rise_s], [presliding, reach], omega, end_s, 1)
+    }
+
+    /// Value so many seconds after the reversal.
+    pub(super) fn at(&self, since_s: f64) -> f64 {
+        self.after(since_s / self.step_s)
+    }
+
+    fn tabulated(
+        [decay_s, rise_s]: [f64; 2],
+        [presliding_m, reach_m]: [f64; 2],
+        omega_rad_s: f64,
+        end_s: f64,
+        passes: usize,
+    ) -> Self {
         let step_s = end_s / STEPS as f64;
         let peak_s = (decay_s / rise_s).ln() * decay_s * rise_s / (decay_s - rise_s);
         let peak = (-peak_s / decay_s).exp() - (-peak_s / rise_s).exp();
@@ -200,7 +237,7 @@ impl Pulse {
         let take = [decay_s, rise_s].map(|tau| tau / step_s * (1.0 - (-step_s / tau).exp()));
         let mut friction_steps = [0.0; STEPS];
         let mut before = -1.0;
-        let (turn_sin, turn_cos) = (view.omega_rad_s * step_s).sin_cos();
+        let (turn_sin, turn_cos) = (omega_rad_s * step_s).sin_cos();
         let (mut sin, mut cos) = (0.0, 1.0);
         for slot in &mut friction_steps {
             (cos, sin) = (
@@ -218,8 +255,6 @@ impl Pulse {
         }
         let mut values = [0.0; STEPS + 1];
         let mut state = [0.0; 2];
-        // Where pulses overlap, the one before is still dying away with the other sign.
-        let passes = if end_s < half_turn_s { 1 } else { 3 };
         for _ in 0..passes {
             state = state.map(|x: f64| -x);
             values[0] = 0.5 * (state[0] - state[1]) / peak;

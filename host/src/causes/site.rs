@@ -28,6 +28,12 @@ pub enum Seat {
     Pair,
     /// [`Site::Across`].
     Across,
+    /// [`Site::One`] on a joint: needs kinematics.
+    Joint,
+    /// [`Site::One`] on a joint where the kinematics are known, else [`Site::Machine`].
+    MachineOrJoint,
+    /// [`Site::One`] on a joint where the kinematics are known, else [`Site::Pair`].
+    PairOrJoint,
 }
 
 impl Site {
@@ -55,15 +61,37 @@ impl Seat {
     pub fn takes(self, site: Site) -> bool {
         match self {
             Self::Machine => site == Site::Machine,
-            Self::One => matches!(site, Site::One(_)),
-            Self::MachineOrOne => matches!(site, Site::Machine | Site::One(_)),
+            Self::One => is_slide(site),
+            Self::MachineOrOne => site == Site::Machine || is_slide(site),
             Self::Pair => matches!(site, Site::Pair(_)),
             Self::Across => matches!(site, Site::Across(..)),
+            Self::Joint => is_joint(site),
+            Self::MachineOrJoint => site == Site::Machine || is_joint(site),
+            Self::PairOrJoint => matches!(site, Site::Pair(_)) || is_joint(site),
         }
     }
 
     /// The sites that these runs can say anything about: what they did not move is not among them.
     pub fn sites(self, views: &[RunView]) -> Vec<Site> {
+        let arm = views.iter().find_map(|view| view.arm.as_ref());
+        match (self, arm) {
+            (Self::Joint, None) => return Vec::new(),
+            (Self::MachineOrJoint, None) => return vec![Site::Machine],
+            (Self::PairOrJoint, None) => return Self::Pair.sites(views),
+            // Of two joints each is what the other is not: what all do alike is no mismatch.
+            (Self::MachineOrJoint | Self::PairOrJoint, Some(arm)) if arm.joints() == 2 => {
+                return vec![Site::One(Actuator::Joint1)];
+            }
+            (Self::Joint | Self::MachineOrJoint | Self::PairOrJoint, Some(_)) => {
+                let moves = |joint: &Actuator| {
+                    let mut arms = views.iter().filter_map(|view| view.arm.as_ref());
+                    arms.any(|arm| arm.moving().any(|moving| moving == *joint))
+                };
+                let joints = Actuator::JOINTS.into_iter().filter(moves);
+                return joints.map(Site::One).collect();
+            }
+            _ => {}
+        }
         let slides = || {
             Actuator::SLIDES
                 .into_iter()
@@ -92,8 +120,19 @@ impl Seat {
                 .filter(|(a, b)| together(*a, *b))
                 .map(|(a, b)| Site::Across(a, b))
                 .collect(),
+            Self::Joint | Self::MachineOrJoint | Self::PairOrJoint => Vec::new(),
         }
     }
+}
+
+/// Whether it is on a slide.
+const fn is_slide(site: Site) -> bool {
+    matches!(site, Site::One(actuator) if actuator.is_slide())
+}
+
+/// Whether it is on a joint.
+const fn is_joint(site: Site) -> bool {
+    matches!(site, Site::One(actuator) if !actuator.is_slide())
 }
 
 /// Whether all circles move the same slides.

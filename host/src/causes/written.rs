@@ -127,6 +127,7 @@ impl WrittenEffect {
 
     fn site(&self, flat: bool) -> Result<Site, EffectFault> {
         const SLIDES: &str = "\"x\", \"y\" or \"z\"";
+        const JOINTS: &str = "\"joint1\" to \"joint6\"";
         let seat = self.cause.model().seat();
         let unused = |key: &'static str, there: bool, takes: bool| {
             let words = format!("not for {}", self.cause.id());
@@ -135,10 +136,14 @@ impl WrittenEffect {
                 false => Ok(()),
             }
         };
-        let named = matches!(seat, Seat::One | Seat::MachineOrOne | Seat::Across);
+        let named = !matches!(seat, Seat::Machine | Seat::Pair);
         unused("axis", self.axis.is_some(), named)?;
         unused("across", self.across.is_some(), seat == Seat::Across)?;
-        unused("plane", self.plane.is_some(), seat == Seat::Pair)?;
+        unused(
+            "plane",
+            self.plane.is_some(),
+            matches!(seat, Seat::Pair | Seat::PairOrJoint),
+        )?;
         let axis = || {
             let missing = || EffectFault::missing("axis", self.cause, SLIDES);
             self.axis.ok_or_else(missing)
@@ -146,8 +151,13 @@ impl WrittenEffect {
         Ok(match seat {
             Seat::Machine => Site::Machine,
             Seat::One => Site::One(axis()?),
-            Seat::MachineOrOne => self.axis.map_or(Site::Machine, Site::One),
-            Seat::Pair => match (self.plane, flat) {
+            Seat::MachineOrOne | Seat::MachineOrJoint => self.axis.map_or(Site::Machine, Site::One),
+            Seat::Joint => match self.axis {
+                Some(joint) => Site::One(joint),
+                None => return Err(EffectFault::missing("axis", self.cause, JOINTS)),
+            },
+            Seat::PairOrJoint if self.axis.is_some() => self.axis.map_or(Site::Machine, Site::One),
+            Seat::Pair | Seat::PairOrJoint => match (self.plane, flat) {
                 (Some(plane), _) => Site::Pair(plane),
                 (None, true) => Site::Pair(Plane::Xy),
                 (None, false) => {

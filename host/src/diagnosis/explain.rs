@@ -271,6 +271,9 @@ fn enter(found: &mut Explained, start: &Start, kinds: &[Kind]) {
     let views = shape::views(&runs);
     // ∂ΔR/∂a about the response.
     let own = |run: &Prepared| {
+        if let Some(arm) = &run.view.arm {
+            return run.low_of(&arm.per_kappa2);
+        }
         let (w, g) = (run.view.omega_rad_s, run.view.gain);
         run.low_of(&Harmonics::mean(
             -0.5 * run.view.radius_m * w * w * g.powi(3),
@@ -378,6 +381,9 @@ fn bar_impossible(found: &mut Explained, weights: &[f64], barred: &mut Vec<usize
 /// order exactly as its column would take it.
 fn restore_fourth_order(found: &mut Explained) {
     let shift = |run: &Prepared| {
+        if let Some(arm) = &run.view.arm {
+            return run.low_of(&arm.per_beta2.times(-0.5 * found.response.b_s4));
+        }
         let (w, g) = (run.view.omega_rad_s, run.view.gain);
         run.low_of(&Harmonics::mean(
             -0.5 * found.response.b_s4 * run.view.radius_m * w.powi(4) * g.powi(3),

@@ -3,6 +3,7 @@
 //! Each radius is left out once, then each speed. The causes stated are fitted again on the runs that are left; the
 //! shapes (pitch, time constants) are those found on all runs. The machine with the causes
 //! built in runs the circles left out, in the time domain, and what is measured there is compared.
+use super::arm::beyond_slides_m;
 use super::baseline::{Size, fit_lag};
 use super::duration::Clamp;
 use super::explained::Explained;
@@ -14,9 +15,10 @@ use super::vector::dot;
 use super::veto;
 use crate::campaign::{Campaign, Run};
 use crate::causes::Effect;
+use crate::kinematics::Kinematics;
 use crate::model_file::{ModelFile, Servo};
 use crate::simulation::machine::Machine;
-use crate::simulation::{CircleTest, SAMPLES_PER_TURN, circle};
+use crate::simulation::{Arm, CircleTest, SAMPLES_PER_TURN, circle};
 use giotto_shared::model::{Element, RadiusModel};
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
@@ -50,7 +52,12 @@ pub struct Gain {
 const RESAMPLES: usize = 1000;
 
 /// Response and effects as a machine.
-pub fn machine(response: &Response, effects: &[Effect], lag_s: Option<f64>) -> Machine {
+pub fn machine(
+    response: &Response,
+    effects: &[Effect],
+    lag_s: Option<f64>,
+    kinematics: Option<Kinematics>,
+) -> Machine {
     let mut machine = Machine::default();
     if response.a_s2 > 0.0 {
         let lag = Response {
@@ -69,6 +76,7 @@ pub fn machine(response: &Response, effects: &[Effect], lag_s: Option<f64>) -> M
     if let Some(lag_s) = lag_s {
         machine.set_delay(lag_s);
     }
+    machine.arm = kinematics.map(Arm::sound);
     for effect in effects {
         // Already in the response.
         if !effect.cause().model().is_response() {
@@ -260,18 +268,21 @@ fn fold(
     let training: Vec<usize> = (0..runs.len()).filter(|&i| weights[i] > 0.0).collect();
     let programmed: Vec<Size> = training
         .iter()
-        .map(|&i| Size::of(&runs[i], runs[i].feed_m_s))
+        .map(|&i| sized(found, i, &runs[i]))
         .collect();
     let lag_only = fit_lag(&programmed);
-    let baseline = given
-        .cloned()
-        .unwrap_or_else(|| machine(&lag_only, &[], None));
+    let baseline = given.cloned().unwrap_or_else(|| {
+        // Of an arm the simulation has a pattern of its own, and the delay turns it.
+        let delay = campaign.kinematics.map(|_| found.lag.tau_s);
+        machine(&lag_only, &[], delay, campaign.kinematics)
+    });
     let nothing_new = clamp.is_none() && found.teeth.is_empty() && !found.stated().any(|_| true);
     let extended =
         fitted(found, &weights, set)
             .filter(|_| !nothing_new)
             .map(|(response, effects)| {
-                let mut machine = machine(&response, &effects, Some(found.lag.tau_s));
+                let delay = Some(found.lag.tau_s);
+                let mut machine = machine(&response, &effects, delay, campaign.kinematics);
                 if let Some(clamp) = clamp {
                     machine.centripetal_limit_m_s2 = Some(clamp.limit_m_s2);
                 }
@@ -316,6 +327,17 @@ fn fold(
             }
         })
         .collect()
+}
+
+/// Size of a run; of an arm without what its kinematics add to it, as far as the common response tells.
+fn sized(found: &Explained, index: usize, run: &Run) -> Size {
+    let size = Size::of(run, run.feed_m_s);
+    let arm = found.runs.get(index).and_then(|run| run.view.arm.as_ref());
+    let extra_m = arm.map_or(0.0, |arm| beyond_slides_m(arm, &found.response, &size));
+    Size {
+        error_m: size.error_m - extra_m,
+        ..size
+    }
 }
 
 /// Mean square of what a prediction leaves of a run, m². The centre is the operator's, and what the search hid from itself is
@@ -456,6 +478,7 @@ pub fn extended_model(
             radius_mm: range(&|r| r.radius_m),
             feed_mm_s: range(&|r| r.feed_m_s),
         },
+        kinematics: campaign.kinematics,
         effects: effects
             .into_iter()
             .filter(|e| !e.cause().model().is_response())

@@ -8,6 +8,7 @@
 //! What is left must be noise ([`omnibus`]). Before all this come what a session brings along: an override for all runs
 //! ([`feed_override`]), a spoilt run ([`influence`]), a delay that is not known ([`delay`]).
 pub mod angular_bins;
+pub mod arm;
 pub mod baseline;
 pub mod delay;
 pub mod design_column;
@@ -17,9 +18,11 @@ pub mod explained;
 pub mod feed_override;
 pub mod finding;
 pub mod gain;
+pub mod gear;
 pub mod gram;
 pub mod hypothesis;
 pub mod influence;
+pub mod like_arm;
 pub mod linear;
 pub mod low_orders;
 pub mod material;
@@ -57,8 +60,9 @@ pub use status::Status;
 use crate::campaign::{Campaign, Run};
 use crate::causes::{Effect, Evidence};
 use crate::model_file::{ModelFile, Servo};
+use crate::simulation::Arm;
 use crate::simulation::machine::{Machine, MachineError};
-use baseline::{Size, fit_lag};
+use baseline::Size;
 use delay::{Explanation, explain_all};
 use duration::{Clamp, Durations};
 use explain::Start;
@@ -213,16 +217,20 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
     } else {
         Survey::new(&seen)
     };
-    let clamp = match durations {
-        Durations::Clamped(clamp) if !knows_clamp(&baseline.known) => Some(clamp),
-        _ => None,
-    };
     let ground = Footing::of(
         &session.campaign,
         &durations,
         baseline.start.repeatability_m,
     );
     let mut explanation = explain_all(&survey, &baseline.start, baseline.delay_s);
+    let like_arm = like_arm::is_like_arm(&explanation.found);
+    if like_arm {
+        like_arm::take_out_slides(&mut explanation.found);
+    }
+    let clamp = match durations {
+        Durations::Clamped(clamp) if !like_arm && !knows_clamp(&baseline.known) => Some(clamp),
+        _ => None,
+    };
     let ties = verdict::ties(&explanation.found);
     explanation.found.tied = ties.iter().map(|(item, _)| *item).collect();
     let proof = prove(
@@ -242,12 +250,7 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
         &ground,
         proof.as_ref(),
     );
-    let mut cannot_tell = ground.cannot_tell;
-    cannot_tell.extend(explanation.words());
-    cannot_tell.extend(
-        ties.iter()
-            .map(|(item, other)| tie_words(found, *item, *other)),
-    );
+    let cannot_tell = open_questions(ground.cannot_tell, &explanation, &ties, like_arm);
     let model = extended_model(&session.campaign, &survey, found, &baseline, &stated);
     let picture = pictured(&session.campaign, &session.places, &seen, found);
     // Where no run can be left out, what the search leaves of the runs it saw.
@@ -279,8 +282,35 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
         model,
         findings: stated.findings,
     };
-    diagnosis.recommendation = recommendation::of(&diagnosis);
+    recommend(&mut diagnosis, like_arm);
     Ok(diagnosis)
+}
+
+/// Adds the one thing to do.
+fn recommend(diagnosis: &mut Diagnosis, like_arm: bool) {
+    diagnosis.recommendation = recommendation::of(diagnosis);
+    if like_arm {
+        diagnosis.unexplained.present = true;
+        diagnosis.recommendation = like_arm::recommendation();
+    }
+}
+
+/// What these runs leave open, the weightiest first.
+fn open_questions(
+    poverty: Vec<String>,
+    explanation: &Explanation,
+    ties: &[(usize, crate::causes::Cause)],
+    like_arm: bool,
+) -> Vec<String> {
+    let of_tie = |(item, other): &(usize, crate::causes::Cause)| {
+        tie_words(&explanation.found, *item, *other)
+    };
+    let arm = like_arm.then(|| like_arm::WORDS.to_owned());
+    arm.into_iter()
+        .chain(poverty)
+        .chain(explanation.words())
+        .chain(ties.iter().map(of_tie))
+        .collect()
 }
 
 /// What the plots of a report draw, run by run; `places` are those of the runs in the given campaign.
@@ -369,7 +399,7 @@ impl Session {
 fn spoilt_of(campaign: &Campaign, survey: &Survey, options: &Options) -> Option<influence::Spoilt> {
     let response = match &options.model {
         Some(model) => model.servo.response(),
-        None => fit_lag(&sizes(campaign, believed_feed_m_s)),
+        None => arm::fit_lag_of(campaign),
     };
     let (runs, _) = survey.prepare(&response, 0.0);
     let data = survey::misfit(&runs);
@@ -380,14 +410,6 @@ fn spoilt_of(campaign: &Campaign, survey: &Survey, options: &Options) -> Option<
         .map(|(run, low)| low[0] / (run.visible().max(1) as f64).sqrt())
         .collect();
     influence::find(&runs, &profiles, &means)
-}
-
-fn sizes(campaign: &Campaign, feed_m_s: impl Fn(&Run) -> f64) -> Vec<Size> {
-    campaign
-        .runs
-        .iter()
-        .map(|run| Size::of(run, feed_m_s(run)))
-        .collect()
 }
 
 /// What was known and what was found, as one model with the delay with which its gain was proven.
@@ -425,7 +447,7 @@ impl Simulation {
         let assumed = (campaign.runs.len() < FEWEST_RUNS).then_some(ASSUMED_REPEATABILITY_M);
         let repeatability_m = stated.or(assumed).unwrap_or(0.0);
         let Some(model) = &options.model else {
-            let response = fit_lag(&sizes(campaign, believed_feed_m_s));
+            let response = arm::fit_lag_of(campaign);
             let name = if response.a_s2 > 0.0 {
                 format!("one servo lag, kv = {:.1} /s", response.a_s2.powf(-0.5))
             } else if response.a_s2 < 0.0 {
@@ -460,7 +482,10 @@ impl Simulation {
                 more_lag_s: 0.0,
             },
             name: format!("the given model of {}", model.machine),
-            given: Some(Machine::from_model(&bare)?),
+            given: Some(Machine {
+                arm: model.kinematics.or(campaign.kinematics).map(Arm::sound),
+                ..Machine::from_model(&bare)?
+            }),
             known: model.effects.clone(),
             delay_s: model.delay_s,
         })
@@ -570,6 +595,7 @@ fn state(
         clamp.map(|clamp| (clamp, clamp_energy_m2(campaign, found))),
     );
     explanation.doubt(&mut findings);
+    arm::name_both(&mut findings, campaign.kinematics.as_ref());
     status::settle(
         &mut findings,
         Ground {
@@ -621,8 +647,11 @@ fn without_known(campaign: &Campaign, baseline: &Simulation) -> Option<Campaign>
     if baseline.known.is_empty() {
         return None;
     }
-    let plain = gain::machine(&baseline.start.response, &[], baseline.delay_s);
-    let with = gain::machine(&baseline.start.response, &baseline.known, baseline.delay_s);
+    let machine = |effects: &[Effect]| {
+        let response = &baseline.start.response;
+        gain::machine(response, effects, baseline.delay_s, campaign.kinematics)
+    };
+    let (plain, with) = (machine(&[]), machine(&baseline.known));
     let mut out = campaign.clone();
     for run in &mut out.runs {
         let test = crate::simulation::CircleTest::of(run);
@@ -658,8 +687,9 @@ fn poverty(campaign: &Campaign, repeatability_m: f64) -> Vec<String> {
         ));
     }
     if distinct(&|run| run.feed_m_s) < 2 {
-        let sizes = sizes(campaign, |run| run.feed_m_s);
-        let mean_m = sizes.iter().map(|size| size.error_m).sum::<f64>() / sizes.len().max(1) as f64;
+        let size = |run: &Run| Size::of(run, run.feed_m_s).error_m;
+        let mean_m =
+            campaign.runs.iter().map(size).sum::<f64>() / campaign.runs.len().max(1) as f64;
         out.push(format!(
             "the circles are {:.0} µm too {}, and at one speed a servo that lags, an offset of the radius and a scale look alike",
             (mean_m * 1e6).abs(),

@@ -4,6 +4,7 @@
 //! slope; each trial costs one column, not one refit of everything.
 use super::design_column::Column;
 use super::explained::{Explained, residual};
+use super::gear;
 use super::gram::kept;
 use super::hypothesis::Kind;
 use super::linear::{Factor, solve};
@@ -179,15 +180,18 @@ impl<'a> Fit<'a> {
         } else {
             // A scan of a part of the runs sees that part of the gain.
             let share = self.runs.len() as f64 / self.sample.len().max(1) as f64;
+            let noise_m2 = self.found.spread.noise_m2;
             let best = match (model.finest_wave_per_m(&self.views), task.site) {
-                (Some(finest), Site::One(axis)) => pitch::scan(
-                    &self.runs,
-                    &self.whitened,
-                    self.found.spread.noise_m2,
-                    axis,
-                    finest,
-                )
-                .map(|found| (found.gain / share, vec![found.pitch_m])),
+                (Some(finest), Site::One(axis)) if axis.is_slide() => {
+                    pitch::scan(&self.runs, &self.whitened, noise_m2, axis, finest)
+                        .map(|found| (found.gain / share, vec![found.pitch_m]))
+                }
+                (Some(_), Site::One(joint)) => model
+                    .ratios(&self.views, joint.index())
+                    .and_then(|ratios| {
+                        gear::scan(&self.runs, ratios, &self.whitened, noise_m2, joint.index())
+                    })
+                    .map(|found| (found.gain / share, vec![found.ratio])),
                 _ => best_of(model.shapes(&self.views), &self.sample),
             };
             match best {

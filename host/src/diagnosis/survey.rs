@@ -2,6 +2,7 @@
 //!
 //! A ballbar gives time, not angle: the recorded pattern is turned by the lag φ(ω) of the machine. The
 //! set-up offset does not move between runs, so the turn of the first harmonic with speed measures φ.
+use super::arm::Arms;
 use super::design_column::Column;
 use super::low_orders::{Basis, Low};
 use crate::campaign::{Campaign, Run};
@@ -143,6 +144,8 @@ pub struct Survey {
     firsts: Vec<[f64; 2]>,
     /// Whether the angles follow from the time, and so hold the lag.
     inferred: bool,
+    /// The joints, where the machine is an arm.
+    arms: Arms,
 }
 
 /// When the runs of a campaign were measured.
@@ -256,6 +259,7 @@ impl Survey {
                         time_s,
                         gain: 1.0,
                         lag_rad: 0.0,
+                        arm: None,
                     },
                 };
                 (prepared, first)
@@ -266,6 +270,7 @@ impl Survey {
             runs,
             firsts,
             inferred,
+            arms: Arms::new(campaign),
         }
     }
 
@@ -301,6 +306,7 @@ impl Survey {
             let mut run = run.clone();
             let omega = run.view.omega_rad_s;
             run.view.gain = response.gain(omega);
+            run.view.arm = self.arms.view(run.index, response, omega, run.view.sign);
             if self.inferred {
                 run.turn_to(lag.phase(omega));
             } else {
@@ -317,6 +323,13 @@ impl Survey {
 /// What the baseline leaves of the runs, where it is seen.
 pub fn misfit(runs: &[Prepared]) -> Column {
     let left = |run: &Prepared, out: &mut [&mut [f64]]| {
+        if let (Some(arm), [out]) = (&run.view.arm, &mut *out) {
+            let samples = run.deviation_m.iter().zip(run.view.psi_rad.iter());
+            for (out, (deviation, psi)) in out.iter_mut().zip(samples) {
+                *out = deviation - arm.common.at(*psi);
+            }
+            return;
+        }
         let shrink = run.view.radius_m * (run.view.gain - 1.0);
         for (out, deviation) in out
             .iter_mut()
@@ -340,31 +353,34 @@ const SMALLEST_OFFSET_M: f64 = 3e-6;
 impl Survey {
     /// Fits z = E·e^{idφ(ω)} to the first harmonics z = c + is of all runs.
     fn measure_lag(&self, response: &Response) -> Lag {
-        let points: Vec<(f64, f64, [f64; 2])> = self
+        // What the joints of an arm shift the circle by is not of the set-up.
+        let joints = |run: &Prepared| {
+            let arm = self
+                .arms
+                .view(run.index, response, run.view.omega_rad_s, run.view.sign);
+            arm.map_or([0.0; 2], |arm| arm.common.0[1])
+        };
+        let points: Vec<(f64, f64, [f64; 2], [f64; 2])> = self
             .runs
             .iter()
             .zip(&self.firsts)
-            .map(|(run, first)| (run.view.sign, run.view.omega_rad_s, *first))
+            .map(|(run, first)| (run.view.sign, run.view.omega_rad_s, *first, joints(run)))
             .collect();
         let unmeasured = Lag::of(response);
         let guess = unmeasured.tau_s;
         let cost = |tau: f64, tau3: f64| -> (f64, f64) {
-            let (mut re, mut im) = (0.0, 0.0);
-            for (sign, omega, [c, s]) in &points {
+            let (mut re, mut im, mut energy) = (0.0, 0.0, 0.0);
+            for (sign, omega, [c, s], [own_c, own_s]) in &points {
                 let phase = -sign * omega * (tau - tau3 * omega * omega);
                 let (sin, cos) = phase.sin_cos();
-                re += c * cos - s * sin;
-                im += c * sin + s * cos;
+                let (c, s) = (c * cos - s * sin - own_c, c * sin + s * cos - own_s);
+                re += c;
+                im += s;
+                energy += c * c + s * s;
             }
             let n = points.len() as f64;
             let (re, im) = (re / n, im / n);
-            let left = points
-                .iter()
-                .map(|(_, _, [c, s])| c * c + s * s)
-                .sum::<f64>()
-                / n
-                - re * re
-                - im * im;
+            let left = energy / n - re * re - im * im;
             (left.max(0.0), re.hypot(im))
         };
         let fastest = points.iter().map(|p| p.1).fold(0.0, f64::max);
@@ -405,6 +421,10 @@ fn lowest_by_parabolas(
     mut steps: [f64; 2],
     cost: &dyn Fn([f64; 2]) -> f64,
 ) -> [f64; 2] {
+    #[allow(
+        clippy::needless_range_loop,
+        reason = "the number is a choice of parameter"
+    )]
     for _ in 0..60 {
         for which in 0..2 {
             let moved = |delta: f64| {

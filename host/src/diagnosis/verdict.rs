@@ -364,6 +364,12 @@ fn probability(found: &Explained, weights: &[f64], at: usize) -> f64 {
     }
 }
 
+/// Whether circles at one place cannot tell two causes from each other at all.
+fn same_class(one: Cause, other: Cause) -> bool {
+    let class = one.model().class();
+    class.is_some() && class == other.model().class()
+}
+
 /// Chosen causes in whose place another cause does as well to the last digit, and its name: even odds are no finding.
 pub fn ties(found: &Explained) -> Vec<(usize, Cause)> {
     let products = found.gram.white(&found.all());
@@ -382,6 +388,7 @@ pub fn ties(found: &Explained) -> Vec<(usize, Cause)> {
             let mut swapped = found.chosen.clone();
             swapped[at] = index;
             other != cause
+                && !same_class(cause, other)
                 && !found.chosen.contains(&index)
                 && worth(&swapped).is_some_and(|worth| worth > best - EVEN)
         })?;
@@ -453,6 +460,7 @@ pub fn effect_with(
         return None;
     };
     let fit = Fitted {
+        site: *site,
         shape,
         amounts,
         first_view: &found.runs.first()?.view,

@@ -57,6 +57,7 @@ pub fn views(circles: &[Circle], response: &Response, elapsed: &[f64]) -> Vec<Ru
                 strokes: Default::default(),
                 time_s: (0..VIEW).map(|i| angle(i) / omega).collect(),
                 gain: response.gain(omega),
+                arm: None,
                 lag_rad: (response.a_s2.max(0.0).sqrt() * omega).atan(),
             };
             view.place((0..VIEW).map(|i| sign * angle(i)).collect());

@@ -1,4 +1,5 @@
 //! A circular test on the simulated machine: one lap in the steady state.
+use super::arm;
 use super::axis::{self, AxisPoint, Grid};
 use super::chain::{Chain, Discrete};
 use super::command::Knots;
@@ -167,6 +168,14 @@ pub fn circle(machine: &Machine, test: &CircleTest) -> Trace {
         return Trace::new(test, turn_s, vec![[f64::NAN; 2]; samples]);
     }
     let omega = f64::from(test.direction.sign()) * feed / test.radius_m;
+    if let Some(arm) = &machine.arm {
+        let lap = arm::lap(machine, arm, test, omega, samples);
+        return Trace::new(
+            test,
+            turn_s,
+            lap.unwrap_or_else(|| vec![[f64::NAN; 2]; samples]),
+        );
+    }
     let lap = Lap {
         machine,
         test,

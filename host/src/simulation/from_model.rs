@@ -1,4 +1,5 @@
 //! A machine from a model file: elements whose cumulants are those of the fitted radius law.
+use super::arm::Arm;
 use super::machine::{Machine, MachineError, PositionLoop, SecondOrder};
 use crate::model_file::{ModelFile, Servo};
 use giotto_shared::model::{Cumulants, Element};
@@ -19,6 +20,7 @@ impl Machine {
         if let Some(delay_s) = model.delay_s {
             machine.set_delay(delay_s);
         }
+        machine.arm = model.kinematics.map(Arm::sound);
         for effect in &model.effects {
             effect.cause().model().apply(effect, &mut machine);
         }

@@ -34,6 +34,7 @@ fn view(test: &CircleTest) -> RunView {
         time_s: (0..SAMPLES).map(|i| angle(i) / omega_rad_s).collect(),
         gain: 1.0,
         lag_rad: 0.0,
+        arm: None,
     };
     view.place((0..SAMPLES).map(|i| sign * angle(i)).collect());
     view

@@ -1,5 +1,7 @@
 //! What a simulated machine is made of. [`Machine::default`] is a perfect one.
 
+use super::arm::Arm;
+
 /// A machine of three slides, X, Y and Z in this order. Every element is off in the default.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Machine {
@@ -40,6 +42,8 @@ pub struct Machine {
     pub cross_lag_s: f64,
     /// Constant error of the radius (ball, bar), m.
     pub radius_offset_m: f64,
+    /// The joints, where the machine is an arm; all of them have the loop, mechanics and dead time of X.
+    pub arm: Option<Arm>,
 }
 
 /// Acceleration/deceleration control.
@@ -244,6 +248,9 @@ impl Machine {
         }
         finite("thermal_per_s", self.thermal_per_s)?;
         finite("thermal_settling_s", self.thermal_settling_s)?;
+        if let Some((name, value)) = self.arm.as_ref().and_then(Arm::fault) {
+            return fail(name, value, "finite numbers, a decay above 0");
+        }
         finite("cross_lag_s", self.cross_lag_s)?;
         finite("radius_offset_m", self.radius_offset_m)
     }

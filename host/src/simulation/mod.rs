@@ -12,6 +12,7 @@
 //! state that these very steps reproduce, where a run-in from rest would end; only chords and set-points need one.
 //! Backlash and friction follow the axis through its turning points, from a reversal before the lap on. Everything is
 //! deterministic; noise comes from the instrument and its seed.
+pub mod arm;
 mod axis;
 mod chain;
 mod circle;
@@ -26,19 +27,24 @@ pub mod machine;
 mod machine_spec;
 mod plan;
 pub mod plan_file;
+mod preset;
 mod steady_circle;
 mod wave;
 
+pub use arm::Arm;
 pub use circle::{CircleTest, MAX_RATE_HZ, SAMPLES_PER_TURN, Trace, ballbar_samples, circle};
 pub use drive::{Hold, Path, SetPoints, drive};
 pub use instrument::Instrument;
 pub use machine::{Machine, MachineError};
 pub use machine_spec::{AxisSpec, MachineSpec, VibrationSpec};
 pub use plan::{Plan, PlannedTest, campaign};
+pub use preset::PRESETS;
 
 #[cfg(test)]
 mod closed_forms;
 #[cfg(test)]
 mod in_every_plane;
+#[cfg(test)]
+mod of_joints;
 #[cfg(test)]
 mod plan_tests;

@@ -102,6 +102,7 @@ pub fn campaign(plan: &Plan, seed: u64) -> Campaign {
         machine: plan.machine_name.clone(),
         repeatability_m: None,
         table: None,
+        kinematics: plan.machine.arm.as_ref().map(|arm| arm.kinematics),
         runs: tests.par_iter().enumerate().map(run).collect(),
     }
 }

@@ -27,6 +27,7 @@ const BOARD: Board = Board {
     tick_hz: 250,
     clock: ClockSource::Crystal,
     reset: ResetCause::Power,
+    fastest_m_s: f32::INFINITY,
 };
 
 /// Its flash.

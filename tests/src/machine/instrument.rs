@@ -139,6 +139,7 @@ impl Instrument {
             machine: "machine under test".into(),
             repeatability_m: None,
             table: None,
+            kinematics: None,
             runs,
         }
     }

@@ -22,6 +22,7 @@ pub fn model() -> ModelFile {
             radius_mm: [0.01, 1000.0],
             feed_mm_s: [0.1, 5000.0],
         },
+        kinematics: None,
         effects: Vec::new(),
         delay_s: None,
     }

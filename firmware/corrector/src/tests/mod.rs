@@ -1,4 +1,8 @@
 //! A machine and a planner of our own around the corrector.
+#![allow(
+    clippy::needless_range_loop,
+    reason = "a joint is a number into several arrays at once"
+)]
 mod circles;
 mod sessions;
 mod through;

@@ -238,10 +238,8 @@ fn session(seed: u64, correct: bool, wired: bool) -> Shown {
         for joint in 0..3 {
             let [first, before, last] = out.map(|places| places[joint]);
             shown.speed = shown.speed.max((last - before).abs() / TICK_S);
-            let a = (last - 2.0 * before + first).abs() / (TICK_S * TICK_S);
-            shown.acceleration = shown
-                .acceleration
-                .max((last - 2.0 * before + first).abs() / (TICK_S * TICK_S));
+            let acceleration = (last - 2.0 * before + first).abs() / (TICK_S * TICK_S);
+            shown.acceleration = shown.acceleration.max(acceleration);
             let error = (command[joint] - now.feedback[joint]).abs();
             shown.following = shown.following.max(error);
             let beyond = (SOFT[0] - last).max(last - SOFT[1]);

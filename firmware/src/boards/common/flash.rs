@@ -2,6 +2,7 @@
 use embedded_storage::nor_flash::{NorFlashError, NorFlashErrorKind};
 
 /// Why a flash operation failed.
+#[allow(dead_code, reason = "the STM32's is the library's")]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FlashError {
     /// Place or alignment.

@@ -94,14 +94,24 @@ fn SysTick() {
         return;
     }
     SHARED.set_stop_input(super::stop::active());
-    kept::keep(tick.tick(*LATE).corrected_nm);
+    let output = tick.tick(*LATE);
+    kept::keep(output.corrected_nm);
+    let (lines, placed) = (tick.lines(&output), tick.placed());
+    let went_out = super::outputs::set(lines, output.corrected_nm, placed);
     // SysTick counts down from the moment that this tick was due.
     let used = SYST::get_reload().saturating_sub(SYST::get_current());
     if used > WORST_TICK.load(Relaxed) {
         WORST_TICK.store(used, Relaxed);
     }
-    *LATE = SCB::is_pendst_pending();
+    // What cannot go out ends the run as a tick that came late does.
+    *LATE = SCB::is_pendst_pending() || !went_out;
     ALIVE.ticked();
+}
+
+/// Where the machine stands by what was kept, or at the origin.
+#[allow(dead_code, reason = "not every board makes pulses")]
+pub fn kept_place_nm() -> [i32; 3] {
+    kept::kept().unwrap_or_default()
 }
 
 /// So many ticks fell due in which the core stood still; with interrupts masked.

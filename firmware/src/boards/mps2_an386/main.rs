@@ -22,6 +22,8 @@ mod common;
 #[cfg(target_os = "none")]
 mod flash;
 #[cfg(target_os = "none")]
+mod outputs;
+#[cfg(target_os = "none")]
 mod stop;
 #[cfg(target_os = "none")]
 mod uart;
@@ -48,6 +50,7 @@ mod image {
         clock: ClockSource::Crystal,
         // The emulator does not say.
         reset: ResetCause::Unknown,
+        fastest_m_s: f32::INFINITY,
     };
 
     /// Sends back what comes, byte for byte: what the line itself carries (feature `echo`, for `giotto-hil link`).

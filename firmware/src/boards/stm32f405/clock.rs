@@ -45,7 +45,7 @@ pub struct Clock {
     pub core_hz: u32,
     /// USART3.
     pub apb1_hz: u32,
-    /// USART6.
+    /// USART1, USART6.
     pub apb2_hz: u32,
     /// The crystal did not start.
     pub fell_back: bool,
@@ -76,9 +76,9 @@ pub fn start() -> Clock {
         CFGR.change(SWITCH, 0);
         CR.change(HSE_ON | PLL_ON, 0);
     }
-    AHB1ENR.change(0, 0b110); // GPIOB, GPIOC
+    AHB1ENR.change(0, 0b110 | 1 << 22); // GPIOB, GPIOC, DMA2
     APB1ENR.change(0, 1 << 18); // USART3
-    APB2ENR.change(0, 1 << 5); // USART6
+    APB2ENR.change(0, 1 | 1 << 4 | 1 << 5); // TIM1, USART1, USART6
     if crystal {
         Clock {
             core_hz: CORE_HZ,

@@ -4,7 +4,10 @@
 //! | pins | use |
 //! |---|---|
 //! | PB10, PB11 (TX, RX) | USART3, the host's link |
+//! | PB6 (SCL) | USART1, set-points while a run is in progress, in the frames of the link |
 //! | PC6 (D6) | USART6, the log, in defmt's encoding |
+//! | PB13, PB15; PB14, PB9; PB8, PB7 | step and direction of X, Y, Z (`pulses`) |
+//! | PC2 (D12), PC1 (D13), PC7 (D5) | enable, in position, fault (`outputs`) |
 //! | PC3 (D11) | stop input: a closed contact to ground lets it run; open, or a broken wire, stops |
 //!
 //! Tables and key are in sectors 1 to 3 of the flash, between the vectors and the code. While one is erased the core stands still for
@@ -28,6 +31,10 @@ mod common;
 #[cfg(target_os = "none")]
 mod flash;
 #[cfg(target_os = "none")]
+mod outputs;
+#[cfg(target_os = "none")]
+mod pulses;
+#[cfg(target_os = "none")]
 mod register;
 #[cfg(target_os = "none")]
 mod stop;
@@ -40,18 +47,19 @@ mod watchdog;
 
 #[cfg(target_os = "none")]
 mod image {
-    use super::{clock, common, flash, stop, usart, vectors, watchdog};
+    use super::{clock, common, flash, outputs, pulses, stop, usart, vectors, watchdog};
     use cortex_m_rt::entry;
     use giotto_firmware::server::Board;
     use giotto_shared::wire::{ClockSource, PositionState, ResetCause};
 
-    const fn board(clock: ClockSource, reset: ResetCause) -> Board {
+    const fn board(clock: ClockSource, reset: ResetCause, fastest_m_s: f32) -> Board {
         Board {
             name: "stm32f405",
             build: env!("GIOTTO_BUILD"),
             tick_hz: common::TICK_HZ,
             clock,
             reset,
+            fastest_m_s,
         }
     }
 
@@ -65,6 +73,13 @@ mod image {
             ClockSource::Crystal
         };
         stop::prepare();
+        let pulses = pulses::Pulses::new(clock.core_hz, common::TICK_HZ, common::kept_place_nm());
+        let fastest_m_s = if pulses.is_some() {
+            pulses::fastest_m_s(common::TICK_HZ)
+        } else {
+            f32::INFINITY
+        };
+        outputs::prepare(pulses);
         let started = cortex_m::Peripherals::take().and_then(|mut core| {
             core.DCB.enable_trace();
             core.DWT.enable_cycle_counter();
@@ -87,7 +102,7 @@ mod image {
         watchdog::start();
         let ports = common::Ports {
             link,
-            stream: None::<common::port::Port<usart::Usart>>,
+            stream: Some(usart::Usart::stream(&clock)),
             log: usart::Usart::log(&clock),
             feed: watchdog::feed,
             // The emulator has no watchdog of this part.
@@ -96,7 +111,7 @@ mod image {
             lost: common::port::lost,
         };
         common::background(
-            board(source, reset),
+            board(source, reset, fastest_m_s),
             flash::Flash::new(),
             flash::LAYOUT,
             (desk, buffers, syst),

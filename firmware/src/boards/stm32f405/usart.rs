@@ -1,8 +1,9 @@
-//! USART3 (link) and USART6 (log) (RM0090 30): polled out, interrupt in.
+//! USART3 (link), USART1 (set-points) and USART6 (log) (RM0090 30): polled out, interrupt in.
 use super::clock::Clock;
 use super::common::port::{self, Port, Transmitter};
 use super::register::Register;
 
+const USART1: usize = 0x4001_1000;
 const USART3: usize = 0x4000_4800;
 const USART6: usize = 0x4001_1400;
 const GPIOB: usize = 0x4002_0400;
@@ -54,6 +55,12 @@ impl Usart {
             Self::open(USART3, clock.apb1_hz, TX | RX | RX_INTERRUPT),
             PATIENCE,
         )
+    }
+
+    /// USART1, out only.
+    pub fn stream(clock: &Clock) -> Port<Self> {
+        connect(GPIOB, 6, 7);
+        Port::out(Self::open(USART1, clock.apb2_hz, TX), PATIENCE)
     }
 
     /// USART6, out only.

@@ -238,6 +238,32 @@ fn time_in_which_the_core_stood_still_has_passed() {
 }
 
 #[test]
+fn lines_tell_what_the_tick_does() {
+    let mut bench = bench();
+    bench
+        .shared
+        .stands([5, 6, 7], giotto_shared::wire::PositionState::Unknown);
+    let tick = |bench: &mut Bench, late: bool| {
+        let output = bench.tick.tick(late);
+        let lines = bench.tick.lines(&output);
+        (lines.enable, lines.in_position, lines.fault)
+    };
+    assert_eq!(tick(&mut bench, false), (false, true, false));
+    bench.desk.declare([0; 3]).unwrap();
+    assert!(!bench.tick.placed());
+    assert_eq!(tick(&mut bench, false), (true, true, false));
+    assert!(bench.tick.placed() && !bench.tick.placed());
+    bench.circle(0.1).unwrap();
+    bench.ticks(500);
+    assert_eq!(tick(&mut bench, false), (true, false, false));
+    assert_eq!(tick(&mut bench, true), (true, false, true));
+    bench.until_at_rest();
+    assert_eq!(tick(&mut bench, false), (true, true, true));
+    bench.desk.clear_fault().unwrap();
+    assert_eq!(tick(&mut bench, false), (true, true, false));
+}
+
+#[test]
 fn counts_are_those_of_the_tick() {
     let mut bench = bench();
     bench.desk.subscribe(1);

@@ -1,7 +1,7 @@
 //! Arcs and helices of a program. Whoever asks for one has worked out its vectors; here they are looked at: a plane that
 //! is none, or a start elsewhere, must not move a machine, wherever it comes from.
+use super::circular::{MAX_GAIN, Round};
 use super::numbers::{arm, dot, inside, is_counter_clockwise, length, positive, to_m};
-use super::round::{MAX_GAIN, Round};
 use super::timing::{TURNS_PER_UNIT, Way};
 use super::{Planner, Refused};
 use crate::engine::planned::Planned;

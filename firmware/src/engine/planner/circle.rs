@@ -1,6 +1,6 @@
 //! Full circles at the feed that was asked for, with an entry before and an exit behind.
+use super::circular::{MAX_GAIN, Round};
 use super::numbers::{inside, positive};
-use super::round::{MAX_GAIN, Round};
 use super::timing::{Way, at_rate};
 use super::{Planner, Refused};
 use crate::engine::config::whole_above;

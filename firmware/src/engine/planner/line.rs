@@ -64,18 +64,7 @@ impl Planner {
             }
         };
         self.blank(segment);
-        segment.kind = Kind::Line;
-        for (((axis, from), span_nm), span) in
-            segment.axes.iter_mut().zip(from).zip(span_nm).zip(span)
-        {
-            *axis = Axis {
-                base: from,
-                u: span_nm,
-                v: single_to_fixed(span / whole, 31),
-                a: 0,
-                b: 0,
-            };
-        }
+        lay(segment, (from, span_nm), span, whole);
         if let (Some(zone), Some(law)) = (&zone, law) {
             self.bound(segment, &bounds);
             segment.rise = law.rounded();
@@ -97,5 +86,20 @@ impl Planner {
         segment.end_nm = to;
         self.position_nm = to;
         Ok(())
+    }
+}
+
+/// The axes of a straight segment: from a place by a span, and its unit direction.
+fn lay(segment: &mut Planned, (from, span_nm): ([i32; 3], [i32; 3]), span: [f32; 3], whole: f32) {
+    segment.kind = Kind::Line;
+    let spans = from.into_iter().zip(span_nm).zip(span);
+    for (axis, ((base, u), span)) in segment.axes.iter_mut().zip(spans) {
+        *axis = Axis {
+            base,
+            u,
+            v: single_to_fixed(span / whole, 31),
+            a: 0,
+            b: 0,
+        };
     }
 }

@@ -7,7 +7,7 @@
 //! |---|---|
 //! | here | what is asked for, dwells, streams, the choice of feed |
 //! | `circle`, `arc`, `line` | each its geometry and timing |
-//! | `round` | what circles and arcs have in common |
+//! | `circular` | what circles and arcs have in common |
 //! | `law`, `terms` | the correction, from the numbers of a zone to those of the tick |
 //! | `soft` | the soft limits |
 //! | `worst`, `demand` | what a path asks for at most, and the ramp that keeps it within the bounds |
@@ -15,12 +15,12 @@
 //! | `timing`, `numbers` | phases, ticks; numbers at the border, vectors |
 mod arc;
 mod circle;
+mod circular;
 mod demand;
 mod law;
 mod line;
 mod machine;
 mod numbers;
-mod round;
 mod soft;
 mod terms;
 mod timing;

@@ -1,9 +1,9 @@
 //! Profile terms: from the numbers of a zone to those of the tick, and how much they ask for.
 use super::numbers::{dot, length};
 use super::timing::Motion;
-use crate::engine::extra::{Cyclic, Extra, Linear, Rising, Turning};
+use crate::engine::hysteresis::FINE;
+use crate::engine::profile_terms::{Cyclic, Extra, Linear, Rising, Turning};
 use crate::engine::ramp::FIRST;
-use crate::engine::sides::FINE;
 use core::f32::consts::TAU;
 use core::num::NonZeroU64;
 use giotto_shared::angle::{RAD_PER_UNIT, sincos};

@@ -24,6 +24,7 @@ const BOARD: Board = Board {
     tick_hz: 1000,
     clock: ClockSource::Crystal,
     reset: ResetCause::Power,
+    fastest_m_s: 2.0,
 };
 
 type Cells = RamFlash<CELLS, ERASE>;

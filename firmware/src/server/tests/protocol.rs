@@ -1,7 +1,7 @@
 //! Requests in and out of order, uploads good and bad, probation.
 use super::*;
 use giotto_shared::table::TableError;
-use giotto_shared::wire::SlotState;
+use giotto_shared::wire::{ConfigField, MachineConfig, MotionState, SlotState};
 use proptest::prelude::*;
 
 fn fresh() -> Desk {
@@ -270,6 +270,37 @@ fn strangers_and_newer_hosts_are_told() {
         .unwrap()
         .to_vec();
     assert_eq!(refused(desk.send(&unknown)), Refusal::NotUnderstood);
+}
+
+/// Whoever sees the need may stop; the session of whoever runs it goes on.
+#[test]
+fn a_stranger_may_stop_and_nothing_else() {
+    let mut desk = fresh();
+    assert!(desk.done(circle()));
+    assert_eq!(desk.status().motion, MotionState::Running);
+    for command in [Command::Status, Command::Reset, Command::Begin] {
+        let said = desk.send(&frame(0, 1, command));
+        assert_eq!(refused(said), Refusal::NoSession);
+    }
+    assert_eq!(desk.status().motion, MotionState::Running);
+    let said = desk.send(&frame(0, 1, Command::Stop));
+    assert_eq!(said, Some(Reply::Done));
+    assert_ne!(desk.status().motion, MotionState::Running);
+}
+
+/// A feed that the outputs could not follow is no limit to be set.
+#[test]
+fn limits_beyond_the_outputs_are_refused() {
+    let mut desk = fresh();
+    let Some(Reply::Config { config, .. }) = desk.ask(Command::Config) else {
+        panic!("no limits");
+    };
+    let fast = |feed_m_s: f32| Command::Configure(MachineConfig { feed_m_s, ..config });
+    assert!(desk.done(fast(1.75)));
+    assert_eq!(
+        refused(desk.ask(fast(1.85))),
+        Refusal::Config(ConfigField::Feed)
+    );
 }
 
 #[test]

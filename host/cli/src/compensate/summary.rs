@@ -72,6 +72,7 @@ impl Summary<'_> {
                 delta_mm,
                 blocks,
                 joint_share,
+                ..
             } = report.fate
             {
                 out.say(format_args!(

@@ -10,6 +10,11 @@ fn block(model: &dyn CauseModel) -> String {
         Seat::MachineOrOne => "the machine as a whole, or x, y or z",
         Seat::Pair => "x and y, y and z, or z and x",
         Seat::Across => "x, y or z, and the one that shifts",
+        Seat::Joint => "a joint",
+        Seat::MachineOrJoint => {
+            "a joint where the kinematics are known, else the machine as a whole"
+        }
+        Seat::PairOrJoint => "x and y, y and z, or z and x; a joint where the kinematics are known",
     };
     let corrected = words
         .not_compensable

@@ -53,6 +53,8 @@ impl LinuxCncLink {
             tick_hz: (1_000_000_000 / period_ns.max(1)).max(1),
             clock: ClockSource::Crystal,
             reset: ResetCause::Power,
+            // LinuxCNC's own joints keep their limits.
+            fastest_m_s: f32::INFINITY,
         };
         let motion = PageMotion::new(page);
         let mut server = Box::new(Server::boot(board, flash, LAYOUT, motion, Box::default()));

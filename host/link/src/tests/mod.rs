@@ -25,6 +25,7 @@ fn image(scale: f64) -> Vec<u8> {
             radius_mm: [50.0, 300.0],
             feed_mm_s: [20.0, 700.0],
         },
+        kinematics: None,
         effects: Vec::new(),
         delay_s: None,
     };

@@ -395,6 +395,7 @@ pub fn open(
             machine,
             repeatability_m: None,
             table: None,
+            kinematics: None,
             runs,
             notes: Vec::new(),
         },

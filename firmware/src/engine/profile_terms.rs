@@ -34,7 +34,7 @@ pub(crate) struct Cyclic {
     pub(crate) phase: u32,
 }
 
-/// What the sides of X, Y and Z are made of. Offsets in [`FINE`](super::sides::FINE) nm.
+/// What the sides of X, Y and Z are made of. Offsets in [`FINE`](super::hysteresis::FINE) nm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub(crate) struct Turning {
     /// Ticks of a take-up, at least 3, and their distance in x (Q31).
@@ -62,7 +62,7 @@ pub(crate) struct Extra {
     /// Indicator of the sense of X, Y and Z: `[0]·cosφ + [1]·sinφ + [2]`, a little ahead of the phase.
     pub(crate) ahead: [[i32; 3]; 3],
     pub(crate) turning: Turning,
-    /// Offset of X, Y and Z that nothing changes, in [`FINE`](super::sides::FINE) nm.
+    /// Offset of X, Y and Z that nothing changes, in [`FINE`](super::hysteresis::FINE) nm.
     pub(crate) constant_fine: [i32; 3],
     pub(crate) cyclic: [Cyclic; MAX_CYCLIC],
     /// Opposite of the bow, Q31 for u²/2³² in nm, by the slide of travel and the slide that is off.
@@ -75,6 +75,36 @@ pub(crate) struct Extra {
 }
 
 impl Extra {
+    /// Becomes another one, as far as that one says anything; `rises`: it is of a helix.
+    #[inline(always)]
+    pub(crate) fn copy(&mut self, from: &Self, rises: bool) {
+        for (to, from) in self.linear.iter_mut().zip(&from.linear) {
+            *to = *from;
+        }
+        if rises {
+            for (to, from) in self.rising.iter_mut().zip(&from.rising) {
+                *to = *from;
+            }
+        }
+        self.sided = from.sided;
+        self.ahead = from.ahead;
+        self.turning = from.turning;
+        self.constant_fine = from.constant_fine;
+        self.periodic = from.periodic;
+        for (to, from) in self
+            .cyclic
+            .iter_mut()
+            .zip(&from.cyclic)
+            .take(usize::from(from.periodic))
+        {
+            *to = *from;
+        }
+        self.bowed = from.bowed;
+        if from.bowed {
+            self.bow = from.bow;
+        }
+    }
+
     /// Whether sides and constants are within the 8 mm of their numbers, with room for their sum.
     pub(crate) fn within_numbers(&self) -> bool {
         let sides = self.turning.side.iter().flatten();

@@ -40,6 +40,26 @@ impl Round {
     }
 }
 
+/// The axes of a segment on a circle, or a helix.
+fn lay(segment: &mut Planned, round: &Round) {
+    segment.kind = if round.rise_nm == [0; 3] {
+        Kind::Arc
+    } else {
+        Kind::Helix
+    };
+    segment.rise_nm = round.rise_nm;
+    let vectors = round.centre_nm.into_iter().zip(round.u).zip(round.v);
+    for (axis, ((base, u), v)) in segment.axes.iter_mut().zip(vectors) {
+        *axis = Axis {
+            base,
+            u,
+            v,
+            a: 0,
+            b: 0,
+        };
+    }
+}
+
 impl Planner {
     /// All but where it starts and ends, with the shortest ramp in which acceleration, offset and slew keep their bounds; `timing` makes it from a factor on
     /// the quickest. Where constant rate alone is beyond the bounds of the table, no ramp can help: the tick cuts and counts.
@@ -102,22 +122,8 @@ impl Planner {
             }
         };
         self.blank(segment);
-        segment.kind = if round.rise_nm == [0; 3] {
-            Kind::Arc
-        } else {
-            Kind::Helix
-        };
-        (segment.rise_nm, segment.timing) = (round.rise_nm, timing);
-        let vectors = round.centre_nm.into_iter().zip(round.u).zip(round.v);
-        for (axis, ((base, u), v)) in segment.axes.iter_mut().zip(vectors) {
-            *axis = Axis {
-                base,
-                u,
-                v,
-                a: 0,
-                b: 0,
-            };
-        }
+        lay(segment, round);
+        segment.timing = timing;
         if let (Some(zone), Some(law)) = (zone, law) {
             self.bound(segment, &bounds);
             segment.rise = law.rounded();

@@ -4,7 +4,7 @@
 //! the other by the smoothstep of degree 5, S′ = (15/8)·w² with w = 1 − x², added up tick by tick at the middle of each
 //! tick; what the sum leaves (2e-4 of the way at 8 ticks, with the fourth power of their number) is set right when no
 //! slide turns any more. The friction pulse rises with it and then decays. In a tilted plane two slides may turn at once.
-use super::extra::Extra;
+use super::profile_terms::Extra;
 use giotto_shared::fixed::{mulh, mulh_add};
 
 /// Fraction bits of offsets here, of nm.

@@ -78,33 +78,44 @@ impl Executor {
                 self.counters.dropped = self.counters.dropped.wrapping_add(1);
                 self.fail(Fault::Discontinuity);
             } else {
-                self.begin_settle();
+                self.mode = Mode::Taken;
                 return self.finish(self.rest_nm, self.rest_offset_nm, flag::SETTLING);
             }
         }
         self.finish(self.rest_nm, self.rest_offset_nm, 0)
     }
 
-    fn begin_settle(&mut self) {
+    /// The tick after a segment was taken: in one with that and with what follows it would be the longest of all.
+    #[inline(never)]
+    pub(super) fn begin_sides(&mut self) -> Output {
+        self.mode = Mode::Sided;
         self.guard.set(self.segment.offset_nm, self.segment.slew_nm);
         self.guard.watch(!self.engage.full());
         let uncorrected = u32::from(!self.segment.corrected);
         self.counters.uncorrected = self.counters.uncorrected.wrapping_add(uncorrected);
         self.fall = self.segment.rise.turned_round();
+        if self.segment.extended && self.segment.kind != Kind::Dwell {
+            let (c, s) = self.weights((self.segment.timing.start >> 32) as u32);
+            let extra = &self.segment.extra;
+            self.sides.begin(extra, extra.ahead_at(c, s));
+        }
+        self.finish(self.rest_nm, self.rest_offset_nm, flag::SETTLING)
+    }
+
+    #[inline(never)]
+    pub(super) fn begin_settle(&mut self) -> Output {
         self.mode = Mode::Settle;
         self.clock = Clock::rising(self.segment.settle_step);
-        self.target_nm = self.rest_offset_nm;
-        if self.segment.kind == Kind::Clear {
-            self.target_nm = [0; 3];
-        } else if self.segment.kind != Kind::Dwell {
-            let (c, s) = self.weights((self.segment.timing.start >> 32) as u32);
-            if self.segment.extended {
-                let extra = &self.segment.extra;
-                self.sides.begin(extra, extra.ahead_at(c, s));
+        self.target_nm = match self.segment.kind {
+            Kind::Clear => [0; 3],
+            Kind::Dwell => self.rest_offset_nm,
+            Kind::Line | Kind::Arc | Kind::Helix => {
+                let (c, s) = self.weights((self.segment.timing.start >> 32) as u32);
+                self.standing_offset(c, s)
             }
-            self.target_nm = self.standing_offset(c, s);
-        }
+        };
         (self.from, self.from_turns) = (self.segment.timing.start, 0);
+        self.finish(self.rest_nm, self.rest_offset_nm, flag::SETTLING)
     }
 
     /// Moves the offset from what it is to what the segment starts with, then lets the segment begin.

@@ -1,0 +1,72 @@
+//! A joint that stands at another angle than its controller reads: `r = n̂ᵀJe·δ`, the same at every speed, both ways: over a
+//! circle a change of size and an oval, ∝ R, that depend on the place. From one place it looks as a link of another length does.
+use super::arm::has_shape;
+use super::{Cause, CauseModel, Effect, Harmonics, Parameter, RunView, Seat, Site, Words};
+use crate::simulation::machine::Machine;
+
+/// See the module.
+pub struct JointZero;
+
+const WORDS: Words = Words {
+    id: "joint_zero",
+    name: "joint zero",
+    unit: "mrad",
+    what: "size and oval of circles depend on the place, at every speed alike: a joint's zero is off",
+    usual: "a calibration mark or revolution counter set wrong after a repair or a collision",
+    adjust: "calibrate that joint's zero again",
+    positive: "{a} stands {size} further than its controller reads: set its zero again, {size} less",
+    negative: "{a} stands {size} less far than its controller reads: set its zero again, {size} more",
+    never_told_from: &[],
+    next: "the same circle at three more places of the work space",
+    not_compensable: Some("the table has no model of the arm"),
+};
+
+/// In the contract's unit.
+const SIZE: Parameter = Parameter::needed("value", [-100.0, 100.0], "mrad: about six degrees");
+
+impl CauseModel for JointZero {
+    fn cause(&self) -> Cause {
+        Cause::JointZero
+    }
+
+    fn words(&self) -> &'static Words {
+        &WORDS
+    }
+
+    fn size(&self) -> &'static Parameter {
+        &SIZE
+    }
+
+    fn seat(&self) -> Seat {
+        Seat::Joint
+    }
+
+    /// A turn of the base turns and shifts the circle, which no circle shows.
+    fn sites(&self, views: &[RunView]) -> Vec<Site> {
+        let mut sites = self.seat().sites(views);
+        sites.retain(|site| {
+            views.iter().any(|view| {
+                let waves = self.harmonics(*site, &[], view).unwrap_or_default();
+                has_shape(&waves, 1e-3 * view.radius_m)
+            })
+        });
+        sites
+    }
+
+    fn class(&self) -> Option<&'static str> {
+        Some("geometry of an arm")
+    }
+
+    fn harmonics(&self, site: Site, _shape: &[f64], view: &RunView) -> Option<Harmonics> {
+        let (Site::One(joint), Some(arm)) = (site, &view.arm) else {
+            return None;
+        };
+        Some(arm.seen_constant(joint.index()).times(1e-3))
+    }
+
+    fn apply(&self, effect: &Effect, machine: &mut Machine) {
+        if let (Site::One(joint), Some(arm)) = (effect.site(), &mut machine.arm) {
+            arm.joints[joint.index()].zero_rad += effect.value() * 1e-3;
+        }
+    }
+}
