@@ -194,19 +194,18 @@ fn measure(
     campaign: &Path,
 ) -> Result<(), LinuxCncError> {
     let recording = samples::run(session, name, program, 240)?;
-    let runs = recording.runs();
+    let recorded = recording.runs();
     // A plan begins with a warm-up.
-    let Some(runs) = runs
-        .len()
-        .checked_sub(circles.len())
-        .and_then(|from| runs.get(from..))
-    else {
+    let warm_up = usize::from(name == "plan");
+    let runs = recorded.get(warm_up..).unwrap_or_default();
+    if runs.len() != circles.len() {
+        let lengths: Vec<usize> = recorded.iter().map(|rows| rows.len()).collect();
         return Err(failed(format!(
-            "{name}: {} runs recorded, {} expected",
+            "{name}: {} runs recorded, {} expected; rows: {lengths:?}",
             runs.len(),
             circles.len()
         )));
-    };
+    }
     for (k, (rows, (radius_mm, feed_mm_s, direction))) in runs.iter().zip(circles).enumerate() {
         let file = samples::write(rows, session.folder.path(), &format!("{name}{k:02}.txt"))?;
         import(file, campaign, *radius_mm, *feed_mm_s, *direction).map_err(|error| {
@@ -378,7 +377,9 @@ fn planned(
         most_runs: 1,
         seed: 1,
     };
-    let plan = propose(&campaign, &diagnosis, &options);
+    let mut plan = propose(&campaign, &diagnosis, &options);
+    // There is nothing to warm up in this machine.
+    plan.warm_up_turns = 1;
     note(&format!("{} planned runs", plan.runs.len()));
     if plan.runs.is_empty() {
         return Ok(());
