@@ -16,6 +16,9 @@ use crate::voice::Place;
 use crate::watch::Watch;
 use giotto_shared::table::Table;
 
+/// So long no zone may hold before the correction fades, s.
+const OUTSIDE_S: f64 = 0.1;
+
 /// What comes in with a tick. Places in machine units.
 #[derive(Clone, Copy, Debug)]
 pub struct Input {
@@ -86,6 +89,8 @@ pub struct Corrector {
     /// What the output is beside the input after a correction ended at once, machine units, and how much of it is taken out.
     left: [f64; JOINTS],
     left_done: f64,
+    /// Ticks since a zone held.
+    outside: usize,
     /// Ticks until a correction may begin again.
     quiet: usize,
     last: [f64; JOINTS],
@@ -117,6 +122,7 @@ impl Corrector {
             delayed: false,
             left: [0.0; JOINTS],
             left_done: 1.0,
+            outside: 0,
             quiet: 0,
             last: [0.0; JOINTS],
             started: false,
@@ -332,15 +338,20 @@ impl Corrector {
             ccw: place.turn.ccw,
         };
         let law = self.law & 1;
-        let part = self.laws.get(law).and_then(|laws| {
-            let zone = if wanted { laws.choose(&here) } else { None };
-            self.bounds = if wanted {
-                [laws.offset_m, laws.slew_m_s]
-            } else {
-                self.bounds
-            };
-            zone.map(|zone| Part { law, zone })
-        });
+        let mut part = None;
+        if let Some(laws) = self.laws.get(law).filter(|_| wanted) {
+            self.bounds = [laws.offset_m, laws.slew_m_s];
+            part = laws.choose(&here).map(|zone| Part { law, zone });
+        }
+        if part.is_some() || !wanted {
+            self.outside = 0;
+        } else {
+            self.outside = self.outside.saturating_add(1);
+            // A corner at the feed of a rapid is over before anything could fade.
+            if (self.outside as f64) * self.history.tick_s() < OUTSIDE_S {
+                part = self.fade.heading().filter(|part| part.law == law);
+            }
+        }
         let offset = self
             .fade
             .tick(part, &self.laws, &place, &self.history, &self.settings);

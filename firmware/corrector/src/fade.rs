@@ -43,6 +43,11 @@ impl Fade {
             .any(|(part, _)| part.law == law)
     }
 
+    /// What acts, or is on its way to.
+    pub(crate) fn heading(&self) -> Option<Part> {
+        self.to.map(|(part, _)| part)
+    }
+
     /// Nothing acts and nothing is on its way to.
     pub(crate) const fn is_silent(&self) -> bool {
         self.from.is_none() && self.to.is_none()

@@ -41,7 +41,7 @@ pub(crate) struct Here {
 
 /// Below this acceleration across the path it is straight, m/s².
 pub(crate) const STRAIGHT_M_S2: f64 = 1e-3;
-/// What feeds and radii may be beyond a zone's and still count as meant, share.
+/// What feeds may be beyond a zone's and still count as meant, share.
 const SLACK: f64 = 0.02;
 
 impl ZoneLaw {
@@ -75,8 +75,9 @@ impl ZoneLaw {
             .map(|place| place.map(|[low, high]| 0.5 * (low + high)))
     }
 
-    /// Whether the zone holds here. A stream has no segments, so that nobody says which circle is meant: feed and radius
-    /// are judged by what the path does, and only where it turns.
+    /// Whether the zone holds here. A stream has no segments, so that nobody says which circle is meant: as in the engine's
+    /// stream mode place and feed choose, the feed where the path turns. How hard it turns is the guard's to bound: corners
+    /// are sharper than any circle that was measured, and need the correction most.
     fn fits(&self, here: &Here) -> bool {
         let inside = |(value, [low, high]): (f64, [f64; 2])| {
             let slack = 1e-6 * value.abs();
@@ -93,11 +94,7 @@ impl ZoneLaw {
             (Travel::Ccw, Some(ccw)) => ccw,
             (Travel::Cw, Some(ccw)) => !ccw,
         };
-        let most = 1.0 + SLACK;
-        let [smallest_m, _] = self.radius_m;
-        travel
-            && here.speed_m_s <= self.feed_m_s * most
-            && here.centripetal_m_s2 * smallest_m <= self.feed_m_s * self.feed_m_s * most
+        travel && here.speed_m_s <= self.feed_m_s * (1.0 + SLACK)
     }
 }
 
