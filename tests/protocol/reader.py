@@ -185,7 +185,8 @@ class Controller:
 
 
 def circle(radius_nm, feed, laps):
-    return zigzag(0) * 3 + zigzag(2 * radius_nm) + f32(feed) + varint(0) + varint(laps) + varint(0)
+    # Centre, radius, feed, plane XY, counter-clockwise, laps, start.
+    return zigzag(0) * 3 + zigzag(2 * radius_nm) + f32(feed) + varint(0) + varint(0) + varint(laps) + varint(0)
 
 
 def main():

@@ -36,7 +36,7 @@ pub fn write(case: &Hidden, dir: &Path) -> std::io::Result<()> {
         if let Some(centre) = run.centre_m {
             let _ = writeln!(toml, "centre_mm = {:?}", centre.map(|c| rounded(c * 1e3)));
         }
-        if let Some(arc) = run.samples.arc_rad() {
+        if let Some(arc) = run.samples.covered_rad() {
             let _ = writeln!(toml, "arc_deg = {:.1}", arc.to_degrees().round());
         }
         if let Some(setup) = &run.setup {

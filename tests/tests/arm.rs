@@ -211,14 +211,12 @@ fn wrong(settings: &[Setting], from: u64) -> Vec<String> {
 }
 
 #[test]
-#[ignore = "needs the kinematics in the reader and the simulation"]
 fn nothing_is_found_in_a_sound_arm() {
     let wrong = wrong(&[setting(false, &[], 1), setting(true, &[], 1)], 700);
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
 #[test]
-#[ignore = "needs the kinematics in the reader and the simulation"]
 fn single_effects_of_joints_are_named_with_their_joint() {
     let all: Vec<Setting> = [false, true]
         .iter()
@@ -229,7 +227,6 @@ fn single_effects_of_joints_are_named_with_their_joint() {
 }
 
 #[test]
-#[ignore = "needs the kinematics in the reader and the simulation"]
 fn four_places_tell_a_zero_from_a_link() {
     let all: Vec<Setting> = [false, true]
         .iter()
@@ -240,7 +237,6 @@ fn four_places_tell_a_zero_from_a_link() {
 }
 
 #[test]
-#[ignore = "needs the kinematics in the reader and the simulation"]
 fn pairs_of_joint_effects_are_taken_apart() {
     let all = [
         setting(false, &["joint_backlash", "joint_lag_mismatch"], 1),
@@ -251,7 +247,6 @@ fn pairs_of_joint_effects_are_taken_apart() {
 }
 
 #[test]
-#[ignore = "needs words for an arm without kinematics"]
 fn an_arm_without_kinematics_gets_no_slides_cause() {
     let all: Vec<Setting> = [false, true]
         .map(|six| Setting {

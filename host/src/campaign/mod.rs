@@ -171,17 +171,26 @@ impl Run {
 }
 
 impl Samples {
-    /// Angle covered, rad, counting one spacing for the last sample; `None` for a whole turn, of which measured angles may lack as
-    /// much at its seam as anywhere else.
+    /// Angle covered, rad, counting one spacing for the last sample; `None` for a whole turn.
+    pub fn covered_rad(&self) -> Option<f64> {
+        let (covered, spacing) = self.extent()?;
+        (covered < TAU - 2.0 * spacing - 1f64.to_radians()).then_some(covered)
+    }
+
+    /// The same where it is too little to stand for the turn: of measured angles as much may be missing at the seam as anywhere
+    /// else.
     pub fn arc_rad(&self) -> Option<f64> {
+        let covered = self.covered_rad()?;
+        let (_, spacing) = self.extent()?;
+        let hole = check::LARGEST_GAP_DEG.to_radians();
+        (self.angle_inferred || covered < TAU - 2.0 * spacing - hole).then_some(covered)
+    }
+
+    /// Angle covered with one spacing for the last sample, and the spacing, rad.
+    fn extent(&self) -> Option<(f64, f64)> {
         let n = self.angle_rad.len() as f64;
         let span = (self.angle_rad.last()? - self.angle_rad.first()?).abs();
         let spacing = span / (n - 1.0).max(1.0);
-        let seam = if self.angle_inferred {
-            1f64.to_radians()
-        } else {
-            check::LARGEST_GAP_DEG.to_radians()
-        };
-        (span + spacing < TAU - 2.0 * spacing - seam).then_some(span + spacing)
+        Some((span + spacing, spacing))
     }
 }

@@ -158,7 +158,7 @@ fn entry(run: &Run) -> Table {
     if let Some(setup) = &run.setup {
         table["setup"] = value(setup);
     }
-    if let Some(arc) = run.samples.arc_rad() {
+    if let Some(arc) = run.samples.covered_rad() {
         table["arc_deg"] = value((arc.to_degrees() * 1e3).round() / 1e3);
     }
     table

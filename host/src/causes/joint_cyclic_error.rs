@@ -61,6 +61,7 @@ fn swing_rad(views: &[RunView], joint: usize) -> f64 {
 fn waves_of(views: &[RunView], joint: usize) -> Option<[f64; 2]> {
     let swing = swing_rad(views, joint);
     let lowest = RATIOS[0].max(FEWEST_WAVES * TAU / swing.max(1e-9));
+    // The circle on which the joint is slowest shows the highest; on others a wave may fall between two samples.
     let highest = views
         .iter()
         .filter_map(|view| {
@@ -68,7 +69,8 @@ fn waves_of(views: &[RunView], joint: usize) -> Option<[f64; 2]> {
             let fastest = view.arm.as_ref()?.orbit.fastest(joint);
             Some(LARGEST_STEP_RAD * samples / (TAU * fastest.max(1e-9)))
         })
-        .fold(RATIOS[1], f64::min);
+        .fold(0.0, f64::max)
+        .min(RATIOS[1]);
     (highest > lowest).then_some([lowest, highest])
 }
 

@@ -5,16 +5,19 @@
 //! waves: a bowed guide grows with R² and not with the speed, what comes of the servo goes as f²/R and has two waves. Where they
 //! are there, no cause of a slide can be believed.
 use super::explained::{Explained, refit};
+use super::low_orders::Low;
 use super::recommendation::{Action, Recommendation};
 use super::spread::is_arc;
+use super::survey::Prepared;
 use super::veto;
-use crate::causes::Harmonics;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 /// Waves that an arm leaves beside the shift of the centre.
 const ORDER: usize = 3;
-/// Chance by noise below which they are there.
+/// Chance by noise below which they are there: alone, or beside a shift of the centre by the same law, and that of the shift.
 const CHANCE: f64 = 1e-5;
+const CHANCE_BESIDE_SHIFT: f64 = 1e-2;
+const CHANCE_OF_SHIFT: f64 = 1e-4;
 /// 2·ln of the odds by which another law of feed and radius may be better.
 const AS_GOOD: f64 = 6.0;
 /// Smallest amplitude on the fastest circles, as a share of the noise of a sample.
@@ -22,6 +25,8 @@ const OF_NOISE: f64 = 0.3;
 /// Laws of feed and radius that are held against each other.
 const FEEDS: [i32; 4] = [1, 2, 3, 4];
 const RADII: [i32; 5] = [-2, -1, 0, 1, 2];
+/// That of an arm.
+const OF_ARM: (i32, i32) = (2, 0);
 /// Degrees of freedom below which nothing is said.
 const FEWEST: usize = 8;
 
@@ -29,7 +34,7 @@ const FEWEST: usize = 8;
 pub const WORDS: &str = "three waves a turn, the same both ways, ∝ f² and whatever the radius: this looks like an arm: give its kinematics (`[kinematics]` in \
                          campaign.toml, with `centre_mm` of the runs); no cause of a slide is named";
 
-/// Third harmonic of a run, about the machine angle, with what it goes by.
+/// One harmonic of a run, about the machine angle, with what it goes by.
 struct Seen {
     radius_m: f64,
     feed: f64,
@@ -39,41 +44,23 @@ struct Seen {
 
 /// Whether the baseline's misfit has the mark of an arm. Of arcs, and of campaigns with kinematics, it is not asked.
 pub fn is_like_arm(found: &Explained) -> bool {
-    let runs = &found.runs;
-    if runs.iter().any(|run| run.view.arm.is_some() || is_arc(run)) {
+    let not_asked = |run: &Prepared| run.view.arm.is_some() || is_arc(run);
+    if found.runs.iter().any(not_asked) {
         return false;
     }
-    let data = found.gram.column(0);
-    let seen: Vec<Seen> = runs
-        .iter()
-        .zip(data.low())
-        .map(|(run, low)| {
-            let waves: Harmonics = run.basis.harmonics_of(low).seen_from(-run.turned_rad);
-            Seen {
-                radius_m: run.view.radius_m,
-                feed: run.view.feed_m_s / 0.3,
-                sign: run.view.sign,
-                wave: waves.0[ORDER],
-            }
-        })
-        .collect();
-    let Some(whole) = centred(&seen, None) else {
+    let seen = harmonic(found, ORDER);
+    let Some((chance, fit)) = follows(&seen) else {
         return false;
     };
-    let own = (2, 0);
-    let Some(of_arm) = centred(&seen, Some(own)) else {
-        return false;
+    let shifts = || {
+        let shift = follows(&harmonic(found, 1));
+        shift.is_some_and(|(chance, _)| chance < CHANCE_OF_SHIFT)
     };
-    let dof = of_arm.dof;
-    if dof < FEWEST {
+    if chance > CHANCE && !(chance < CHANCE_BESIDE_SHIFT && shifts()) {
         return false;
     }
-    let ratio =
-        0.5 * (whole.left - of_arm.left) / (of_arm.left / dof as f64).max(f64::MIN_POSITIVE);
-    let chance = FisherSnedecor::new(2.0, dof as f64).map_or(1.0, |law| law.sf(ratio));
     let fastest = seen.iter().map(|run| run.feed).fold(0.0, f64::max);
-    let amplitude_m = of_arm.amount * fastest * fastest;
-    if chance > CHANCE || amplitude_m < OF_NOISE * found.spread.noise_m() {
+    if fit.amount * fastest * fastest < OF_NOISE * found.spread.noise_m() {
         return false;
     }
     let best = FEEDS
@@ -82,7 +69,32 @@ pub fn is_like_arm(found: &Explained) -> bool {
         .filter_map(|law| centred(&seen, Some(law)))
         .map(|fit| fit.left)
         .fold(f64::INFINITY, f64::min);
-    (dof as f64) * (of_arm.left / best.max(f64::MIN_POSITIVE)).ln() < AS_GOOD
+    (fit.dof as f64) * (fit.left / best.max(f64::MIN_POSITIVE)).ln() < AS_GOOD
+}
+
+/// One order of what the baseline leaves of each run.
+fn harmonic(found: &Explained, order: usize) -> Vec<Seen> {
+    let data = found.gram.column(0);
+    let seen = |(run, low): (&Prepared, &Low)| {
+        let waves = run.basis.harmonics_of(low).seen_from(-run.turned_rad);
+        Seen {
+            radius_m: run.view.radius_m,
+            feed: run.view.feed_m_s / 0.3,
+            sign: run.view.sign,
+            wave: waves.0[order],
+        }
+    };
+    found.runs.iter().zip(data.low()).map(seen).collect()
+}
+
+/// Chance by noise that the waves follow the law of an arm so well, and the fit; `None`: too few runs to say.
+fn follows(seen: &[Seen]) -> Option<(f64, Fit)> {
+    let whole = centred(seen, None)?;
+    let fit = centred(seen, Some(OF_ARM)).filter(|fit| fit.dof >= FEWEST)?;
+    let mean_square = (fit.left / fit.dof as f64).max(f64::MIN_POSITIVE);
+    let ratio = 0.5 * (whole.left - fit.left) / mean_square;
+    let chance = FisherSnedecor::new(2.0, fit.dof as f64).map_or(1.0, |law| law.sf(ratio));
+    Some((chance, fit))
 }
 
 /// What a law leaves of the waves.

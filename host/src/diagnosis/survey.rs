@@ -235,11 +235,15 @@ impl Survey {
                 };
                 let basis = Basis::new(theta);
                 let [_, first, ..] = basis.harmonics(&run.samples.deviation_m).0;
+                let mut deviation_m = run.samples.deviation_m.clone();
+                if campaign.kinematics.is_some() {
+                    without_second_order(run, first, &mut deviation_m);
+                }
                 let prepared = Prepared {
                     index,
                     programmed_m_s: run.feed_m_s,
                     turned_rad: 0.0,
-                    deviation_m: run.samples.deviation_m.clone(),
+                    deviation_m,
                     hidden: Arc::default(),
                     basis: Arc::new(basis),
                     place: end - theta.len()..end,
@@ -317,6 +321,21 @@ impl Survey {
             run
         };
         (self.runs.par_iter().map(place).collect(), lag)
+    }
+}
+
+/// Takes out what a shift of the centre does to the radius in second order. Zeros and lengths of an arm shift circles by
+/// millimetres, where it is no longer small: (e×n̂)²/(2R), outward about the angle of the command, inward about the measured one.
+fn without_second_order(run: &Run, [shift_cos, shift_sin]: [f64; 2], deviation_m: &mut [f64]) {
+    let side = if run.samples.angle_inferred {
+        1.0
+    } else {
+        -1.0
+    };
+    for (deviation, angle) in deviation_m.iter_mut().zip(&run.samples.angle_rad) {
+        let (sin, cos) = angle.sin_cos();
+        let across = shift_cos * sin - shift_sin * cos;
+        *deviation -= side * across * across / (2.0 * run.radius_m);
     }
 }
 

@@ -114,8 +114,8 @@ impl Point {
 ///
 /// // Sizes as the paper's robot would have them, with half a micrometre that alternates for scatter.
 /// let mut runs = Vec::new();
-/// for radius_m in [0.1, 0.15, 0.3] {
-///     for (i, feed_m_s) in [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7].into_iter().enumerate() {
+/// for radius_m in [0.1_f64, 0.15, 0.3] {
+///     for (i, feed_m_s) in [0.1_f64, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7].into_iter().enumerate() {
 ///         let (x1, x2) = (feed_m_s * feed_m_s / radius_m, feed_m_s.powi(4) / radius_m.powi(3));
 ///         let scatter_m = if i % 2 == 0 { 0.5e-6 } else { -0.5e-6 };
 ///         runs.push(Observation {

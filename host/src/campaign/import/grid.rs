@@ -40,7 +40,14 @@ impl Grid {
             .into_iter()
             .filter_map(|separator| {
                 let from = (0..head.lines.len()).find(|&k| alike(head, k, separator))?;
-                Some(Self::at(head, from, separator))
+                // A row that is broken hides those before it: they are rows as well, and it is named when it is read.
+                let is_row = |k: &usize| shape(&head.lines[*k], separator).is_some();
+                let before = (from.saturating_sub(ALIKE)..from).rev().take_while(is_row);
+                let first = before.last().unwrap_or(from);
+                Some(Self {
+                    first,
+                    ..Self::at(head, from, separator)
+                })
             });
         // More columns of numbers say more; a row that begins earlier is no accident.
         candidates.reduce(|best, next| {
@@ -175,18 +182,21 @@ impl Grid {
     }
 }
 
+/// Fields of a line that mostly holds numbers.
+fn shape(line: &str, separator: u8) -> Option<usize> {
+    let fields = split(line, separator);
+    let numbers = fields.iter().filter(|f| number(f, separator)).count();
+    let stamps = fields.iter().filter(|f| is_stamp(f)).count();
+    let text = fields
+        .iter()
+        .filter(|f| !number(f, separator) && !is_stamp(f) && !is_missing(f))
+        .count();
+    (numbers > 0 && numbers + stamps >= text).then_some(fields.len())
+}
+
 /// Whether rows begin at a line.
 fn alike(head: &Head, from: usize, separator: u8) -> bool {
-    let shape = |line: &str| -> Option<usize> {
-        let fields = split(line, separator);
-        let numbers = fields.iter().filter(|f| number(f, separator)).count();
-        let stamps = fields.iter().filter(|f| is_stamp(f)).count();
-        let text = fields
-            .iter()
-            .filter(|f| !number(f, separator) && !is_stamp(f) && !is_missing(f))
-            .count();
-        (numbers > 0 && numbers + stamps >= text).then_some(fields.len())
-    };
+    let shape = |line: &str| shape(line, separator);
     let Some(width) = shape(&head.lines[from]) else {
         return false;
     };

@@ -151,6 +151,8 @@ pub(super) fn scan(
             false,
         )
     };
+    // Readings without angles look the same both ways.
+    let told = options.direction.is_some() || !(clocked || options.even_angles);
     let mut found = Vec::new();
     let mut places = Places::new(path, &all, &seen.marks);
     for (p, pass) in turns.passes.iter().enumerate() {
@@ -162,7 +164,7 @@ pub(super) fn scan(
             };
             found.push(FoundTurn {
                 slice,
-                sign: pass.sign,
+                sign: if told { pass.sign } else { 0.0 },
                 pass: (p + 1, turns.passes.len()),
                 lap: (k + 1, pass.turns.len()),
                 arc_rad: pass.arc_rad,
