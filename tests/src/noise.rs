@@ -18,7 +18,7 @@ impl Noise {
     pub fn new(target: &Target) -> Self {
         Self {
             seeds: (target.seeds)(),
-            talks: target.name == "server",
+            talks: matches!(target.name, "server" | "motion"),
         }
     }
 

@@ -13,7 +13,7 @@ use std::time::Instant;
 /// Fuzzes without coverage.
 #[derive(Parser, Debug)]
 struct Args {
-    /// `frame`, `server`, `table` or `boot`; all of them if not given.
+    /// `frame`, `server`, `motion`, `table` or `boot`; all of them if not given.
     #[arg(long)]
     target: Option<String>,
     /// Executions of each target.
@@ -68,7 +68,7 @@ fn main() -> ExitCode {
     let chosen = |target: &&Target| args.target.as_ref().is_none_or(|name| target.name == name);
     let targets: Vec<&Target> = TARGETS.iter().filter(chosen).collect();
     if targets.is_empty() {
-        eprintln!("error: no such target: there are frame, server, table and boot");
+        eprintln!("error: no such target: there are frame, server, motion, table and boot");
         return ExitCode::from(2);
     }
     let cores = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get);

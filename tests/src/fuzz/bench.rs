@@ -1,15 +1,17 @@
 //! A whole controller on the host: server, store, planner and tick, as on a board.
+use super::watch::Watch;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use giotto_firmware::control::{Desk, Job, Receiver, SEGMENTS, SET_POINTS, Sender, Shared, Tick};
 use giotto_firmware::engine::{Config, Executor, Output, Planner};
-use giotto_firmware::server::{Board, Buffers, Server, TimedSetPoint};
+use giotto_firmware::server::{Board, Buffers, Motion, Server, TimedSetPoint};
 use giotto_firmware::store::{
     Layout,
     ram::{RamFlash, RamFlashError},
 };
 use giotto_shared::table::{self, MAX_IMAGE_BYTES, bounds};
 use giotto_shared::wire::{
-    ClockSource, FromController, MAX_FRAME, MotionState, ResetCause, Status, crc32,
+    ClockSource, FromController, MAX_FRAME, MotionState, Pose, PositionState, ResetCause, Status,
+    crc32,
 };
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -21,10 +23,11 @@ const ERASE: usize = 512;
 pub const FLASH: usize = 2 * SLOT + ERASE;
 const LAYOUT: Layout = Layout::new([0, SLOT as u32], SLOT as u32).with_key(2 * SLOT as u32);
 /// Slow ticks: a move is as long in seconds, and takes a fourth of the ticks of the boards.
+pub const TICK_HZ: u32 = 250;
 const BOARD: Board = Board {
     name: "fuzz",
     build: "0",
-    tick_hz: 250,
+    tick_hz: TICK_HZ,
     clock: ClockSource::Crystal,
     reset: ResetCause::Power,
     fastest_m_s: f32::INFINITY,
@@ -169,18 +172,27 @@ pub struct Bench {
     pub thorough: bool,
     /// Slot and changes of the flash of the table looked at last.
     checked: Option<(u8, u32)>,
+    /// Set-points are looked at one by one, by the watch.
+    pub watched: bool,
+    watch: Watch,
 }
 
 impl Bench {
     /// Boots with what is in the flash.
     pub fn boot(flash: Flash) -> Self {
+        Self::boot_at(flash, [0; 3], PositionState::Known)
+    }
+
+    /// The same, its machine standing somewhere.
+    fn boot_at(flash: Flash, place_nm: Pose, known: PositionState) -> Self {
         let config = Config::robot(BOARD.tick_hz);
         let shared = Rc::new(Shared::new());
         let (segments_in, segments_out) = Queue::new(SEGMENTS);
         let (points_in, points_out) = Queue::new(SET_POINTS);
-        let planner = Box::new(Planner::new(&config, [0; 3]));
+        shared.stands(place_nm, known);
+        let planner = Box::new(Planner::new(&config, place_nm));
         let desk = Desk::new(planner, Rc::clone(&shared), segments_in, points_out);
-        let executor = Executor::new([0; 3], config.engage_ticks(), true);
+        let executor = Executor::new(place_nm, config.engage_ticks(), true);
         Self {
             server: Server::boot(BOARD, flash, LAYOUT, desk, Box::default()),
             tick: Tick::new(executor, Rc::clone(&shared), segments_out, points_in),
@@ -188,7 +200,19 @@ impl Bench {
             last_nm: None,
             thorough: false,
             checked: None,
+            watched: false,
+            watch: Watch::default(),
         }
+    }
+
+    /// Who looks at the set-points.
+    pub fn watch(&mut self) -> &mut Watch {
+        &mut self.watch
+    }
+
+    /// What it is doing.
+    pub fn state(&mut self) -> MotionState {
+        self.server.motion_mut().snapshot().state
     }
 
     /// Takes a byte from the link; the reply it completed, if any.
@@ -209,6 +233,10 @@ impl Bench {
         for at in 1..=count {
             let output = self.tick.tick(std::mem::take(&mut late));
             self.server.supervise();
+            if self.watched {
+                self.watch.look(&output);
+                continue;
+            }
             let still = self.look(&output) && output.flags == 0;
             if still && !self.thorough && self.tick.rest((count - at) as u32) {
                 return;
@@ -260,12 +288,18 @@ impl Bench {
         );
     }
 
-    /// As a reset leaves it.
+    /// As a reset leaves it: where it stands is kept.
     pub fn reset(self) -> Self {
-        let thorough = self.thorough;
+        let (thorough, watched, watch) = (self.thorough, self.watched, self.watch);
+        let last_nm = self.last_nm;
+        let (flash, desk) = self.server.into_parts();
+        let place_nm = desk.snapshot().corrected_nm;
         Self {
             thorough,
-            ..Self::boot(self.server.into_parts().0)
+            last_nm,
+            watched,
+            watch,
+            ..Self::boot_at(flash, place_nm, PositionState::Kept)
         }
     }
 }

@@ -5,6 +5,7 @@
 //! |---|---|
 //! | [`frame`] | bytes on the link |
 //! | [`server`] | a conversation: frames, raw bytes, time, resets |
+//! | [`motion`] | what a controller is driven with: requests, time, starvation, faults, resets |
 //! | [`table`] | a table, its header made right if the first byte says so |
 //! | [`boot`] | what the flash holds when the power comes |
 //!
@@ -24,8 +25,10 @@
 mod bench;
 pub mod boot;
 pub mod frame;
+pub mod motion;
 pub mod server;
 pub mod table;
+pub mod watch;
 
 /// A target: its name, what it does, and bytes to begin with.
 pub struct Target {
@@ -38,7 +41,7 @@ pub struct Target {
 }
 
 /// All targets.
-pub const TARGETS: [Target; 4] = [
+pub const TARGETS: [Target; 5] = [
     Target {
         name: "frame",
         run: frame::run,
@@ -48,6 +51,11 @@ pub const TARGETS: [Target; 4] = [
         name: "server",
         run: server::run,
         seeds: server::seeds,
+    },
+    Target {
+        name: "motion",
+        run: motion::run,
+        seeds: motion::seeds,
     },
     Target {
         name: "table",

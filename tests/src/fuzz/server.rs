@@ -7,10 +7,10 @@ use giotto_shared::wire::{
 };
 
 /// Reads a conversation.
-struct Script<'a>(&'a [u8]);
+pub(super) struct Script<'a>(pub(super) &'a [u8]);
 
 impl<'a> Script<'a> {
-    fn byte(&mut self) -> Option<u8> {
+    pub(super) fn byte(&mut self) -> Option<u8> {
         let (first, rest) = self.0.split_first()?;
         self.0 = rest;
         Some(*first)
@@ -23,8 +23,9 @@ impl<'a> Script<'a> {
     }
 }
 
-struct Talk {
-    bench: Bench,
+/// A client, and its controller.
+pub(super) struct Talk {
+    pub(super) bench: Bench,
     seq: u16,
     /// Set-points of a stream so far.
     steps: Steps,
@@ -33,7 +34,7 @@ struct Talk {
 }
 
 impl Talk {
-    fn new(thorough: bool) -> Self {
+    pub(super) fn new(thorough: bool) -> Self {
         let transcript = None;
         let mut talk = Self {
             bench: Bench::boot(Flash::new()),
@@ -46,7 +47,7 @@ impl Talk {
     }
 
     /// Takes the power away and opens the session again.
-    fn reset(self) -> Self {
+    pub(super) fn reset(self) -> Self {
         let mut talk = Self {
             bench: self.bench.reset(),
             seq: 0,
@@ -82,7 +83,7 @@ impl Talk {
         self.send(&frame)
     }
 
-    fn ask(&mut self, command: Command) -> Option<Reply> {
+    pub(super) fn ask(&mut self, command: Command) -> Option<Reply> {
         self.seq = self.seq.wrapping_add(1);
         let mut frame = [0; MAX_FRAME];
         let request = Request {
@@ -93,14 +94,14 @@ impl Talk {
         self.send(wire::encode(&request, &mut frame).expect("a request fits"))
     }
 
-    fn status(&mut self) -> Option<Status> {
+    pub(super) fn status(&mut self) -> Option<Status> {
         match self.ask(Command::Status) {
             Some(Reply::Status(status)) => Some(status),
             _ => None,
         }
     }
 
-    fn upload(&mut self, image: &[u8]) {
+    pub(super) fn upload(&mut self, image: &[u8]) {
         self.ask(Command::WriteBegin {
             length: image.len() as u16,
             crc: crc32(image),
@@ -150,7 +151,7 @@ impl Talk {
 }
 
 /// Ticks of a wait: as many lengths of a few ticks as of hundreds, up to 566, which is 2.3 s.
-fn wait(byte: u8) -> usize {
+pub(super) fn wait(byte: u8) -> usize {
     let (doublings, part) = (usize::from(byte) / 28, usize::from(byte) % 28);
     ((28 + part) << doublings) / 28
 }
