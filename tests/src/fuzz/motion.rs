@@ -224,7 +224,9 @@ impl Drive {
                 self.ask(Command::Commit);
                 self.ask(Command::Confirm);
             }
-            4..8 => drop(self.ask(Command::Bypass { on: how % 2 == 0 })),
+            4..8 => drop(self.ask(Command::Bypass {
+                on: how.is_multiple_of(2),
+            })),
             8 => drop(self.ask(Command::Rollback)),
             _ => {}
         }
