@@ -144,6 +144,33 @@ fn noise_is_measured_under_form_and_spikes() {
 }
 
 #[test]
+fn a_large_form_seen_nearly_evenly_does_not_pass_for_size() {
+    // A turn as a robot's log holds it: 187 rows, a wider step at the seam; an oval of 224 µm under noise of 10 µm.
+    let (sd, n) = (10e-6, 187);
+    let (mut inside, mut sum) = (0, 0.0);
+    for seed in 0..100 {
+        let mut log = run("a", Direction::Ccw, n, [0.0, 0.0], |_| 0.0);
+        for (k, a) in log.samples.angle_rad.iter_mut().enumerate() {
+            *a = 357.6f64.to_radians() * k as f64 / (n as f64 - 1.0);
+        }
+        let oval = |a: f64| 200e-6 * (2.0 * a).cos() + 100e-6 * (2.0 * a).sin();
+        log.samples.deviation_m = log
+            .samples
+            .angle_rad
+            .iter()
+            .zip(noise(seed, n))
+            .map(|(a, e)| oval(*a) - 100e-6 + sd * e)
+            .collect();
+        let found = of_run(&log, None).unwrap();
+        let off = found.radius_error_m + 100e-6;
+        inside += usize::from(off.abs() < 1.96 * found.radius_error_se_m);
+        sum += off / 100.0;
+    }
+    assert!(inside >= 90, "{inside} of 100");
+    near(sum, 0.0, 0.25e-6);
+}
+
+#[test]
 fn an_arc_gets_the_interval_it_deserves() {
     // 200 arcs of 200° with fresh noise: the radius must lie within ±1.96 standard errors in about 95 %.
     let (sd, n) = (2e-6, 300);
