@@ -140,18 +140,14 @@ pub fn of_run(run: &Run, turn_s: Option<f64>) -> Result<RunAnalysis, CircleError
     let turn_s = turn_s.or_else(|| run.turn_s());
     let noise_m = campaign::sample_noise(&samples.deviation_m);
     let se_m = radius_se(&fit, &seen, form.len(), samples.deviation_m.len() as f64);
-    // Form that was not seen evenly passes for size: a large one already where the points are nearly even.
-    let passed_m = form
-        .first()
-        .filter(|order| order.order == 0)
-        .map_or(0.0, |order| order.cos_m.abs());
-    let passes = passed_m > FORM_PASSES * se_m;
-    let unseen = if arc_rad.is_some() || passes || size::uneven(&samples.angle_rad) {
+    // Form that was not seen evenly passes for size.
+    let (shift_m, se_m) = if arc_rad.is_some() || size::uneven(&samples.angle_rad) {
         size::correction(&points, |a, v| distance(a, v) - radius, noise_m)
+            .map_or((0.0, se_m), |c| (c.value_m, c.se_m))
     } else {
-        None
+        // Nearly even points: the orders fitted together with the size tell what a large form adds to it.
+        (passed_for_size_m(&form), se_m)
     };
-    let (shift_m, se_m) = unseen.map_or((0.0, se_m), |c| (c.value_m, c.se_m));
     Ok(RunAnalysis {
         file: run.file.clone(),
         radius_m: run.radius_m,
@@ -171,8 +167,11 @@ pub fn of_run(run: &Run, turn_s: Option<f64>) -> Result<RunAnalysis, CircleError
     })
 }
 
-/// Standard errors of the radius that form, fitted together with it, may move it by before it is corrected for.
-const FORM_PASSES: f64 = 0.5;
+/// Mean distance from the least-squares circle of the orders that were fitted together, m: nothing for points that lie evenly.
+fn passed_for_size_m(form: &[Harmonic]) -> f64 {
+    let mean = form.first().filter(|harmonic| harmonic.order == 0);
+    mean.map_or(0.0, |harmonic| harmonic.cos_m)
+}
 
 /// Standard error of the radius: the covariance of the fit, with the scatter that is left when the form is
 /// taken out, and with fewer independent samples where neighbours are alike (AR(1): n(1−ρ)/(1+ρ)).

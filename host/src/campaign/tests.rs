@@ -260,6 +260,41 @@ fn keys_that_look_like_slips_are_refused_and_others_noted() {
 }
 
 #[test]
+fn one_wrong_label_in_twelve_is_named_and_two_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    // A turn of 100 mm at 200 mm/s takes π s.
+    let runs = (0..12).map(|k| ballbar(&format!("run{k}.csv"), Direction::Ccw, 200 + k, PI));
+    let campaign = Campaign {
+        name: "labels".into(),
+        machine: "bench".into(),
+        repeatability_m: None,
+        table: None,
+        kinematics: None,
+        runs: runs.collect(),
+    };
+    write(&campaign, dir.path()).unwrap();
+    let file = dir.path().join("campaign.toml");
+    let text = std::fs::read_to_string(&file).unwrap();
+    let mislabel = |text: &str, run: &str| {
+        let at = text.find(run).unwrap();
+        let (before, after) = text.split_at(at);
+        before.to_owned() + &after.replacen("feed_mm_s = 200.0", "feed_mm_s = 100.0", 1)
+    };
+    let one = mislabel(&text, "run4.csv");
+    std::fs::write(&file, &one).unwrap();
+    assert!(read(dir.path()).is_err());
+    let manifest = Manifest::open(dir.path()).unwrap();
+    let (labelled, _, left_out) = manifest.read_labelled().unwrap();
+    assert_eq!((labelled.runs.len(), left_out.len()), (11, 1));
+    assert_eq!(left_out[0].file, "run4.csv");
+    assert!(left_out[0].error.contradicts_its_label());
+    std::fs::write(&file, mislabel(&one, "run7.csv")).unwrap();
+    let manifest = Manifest::open(dir.path()).unwrap();
+    let refused = manifest.read_labelled().unwrap_err();
+    assert!(refused.to_string().contains("run7.csv"), "{refused}");
+}
+
+#[test]
 fn open_campaigns_are_read_without_a_note() {
     let Some(root) = std::env::var_os("GIOTTO_CAMPAIGNS") else {
         return;

@@ -1,5 +1,5 @@
 //! What a signature may know of an arm in one run: the circle as its joints see it, and how all joints answer.
-use super::{Harmonics, ORDERS, RunView};
+use super::{CauseModel, Harmonics, ORDERS, RunView, Site};
 use crate::kinematics::{COARSE, Cycle, Orbit, WAVES};
 use giotto_shared::Actuator;
 use rustfft::num_complex::Complex;
@@ -65,8 +65,24 @@ impl ArmView {
     }
 }
 
+/// Sites of a cause of the geometry that a circle shows: what only turns or shifts the circle, as the zero of a base does, is seen
+/// by none.
+pub fn sites_with_shape(model: &dyn CauseModel, views: &[RunView]) -> Vec<Site> {
+    /// Millimetres and milliradians.
+    const UNIT: f64 = 1e-3;
+    let shows = |site: &Site| {
+        views.iter().any(|view| {
+            let waves = model.harmonics(*site, &[], view).unwrap_or_default();
+            has_shape(&waves, UNIT * view.radius_m)
+        })
+    };
+    let mut sites = model.seat().sites(views);
+    sites.retain(shows);
+    sites
+}
+
 /// Whether waves are more than a shift of the centre: some share of the largest that they could be.
-pub fn has_shape(waves: &Harmonics, of: f64) -> bool {
+fn has_shape(waves: &Harmonics, of: f64) -> bool {
     let beyond = waves
         .0
         .iter()

@@ -1,6 +1,6 @@
 //! A joint that stands at another angle than its controller reads: `r = n̂ᵀJe·δ`, the same at every speed, both ways: over a
 //! circle a change of size and an oval, ∝ R, that depend on the place. From one place it looks as a link of another length does.
-use super::arm::has_shape;
+use super::arm::sites_with_shape;
 use super::{Cause, CauseModel, Effect, Harmonics, Parameter, RunView, Seat, Site, Words};
 use crate::simulation::machine::Machine;
 
@@ -41,16 +41,8 @@ impl CauseModel for JointZero {
         Seat::Joint
     }
 
-    /// A turn of the base turns and shifts the circle, which no circle shows.
     fn sites(&self, views: &[RunView]) -> Vec<Site> {
-        let mut sites = self.seat().sites(views);
-        sites.retain(|site| {
-            views.iter().any(|view| {
-                let waves = self.harmonics(*site, &[], view).unwrap_or_default();
-                has_shape(&waves, 1e-3 * view.radius_m)
-            })
-        });
-        sites
+        sites_with_shape(self, views)
     }
 
     fn class(&self) -> Option<&'static str> {

@@ -1,6 +1,6 @@
 //! A link that is longer or shorter than the controller computes with: `r = n̂·u·δ`, u the link's direction, the same at every
 //! speed, both ways: a change of size and an oval, ∝ R, that depend on the place. It is named by the joint before the link.
-use super::arm::has_shape;
+use super::arm::sites_with_shape;
 use super::{Cause, CauseModel, Effect, Harmonics, Parameter, RunView, Seat, Site, Words};
 use crate::simulation::machine::Machine;
 
@@ -42,14 +42,7 @@ impl CauseModel for LinkLength {
     }
 
     fn sites(&self, views: &[RunView]) -> Vec<Site> {
-        let mut sites = self.seat().sites(views);
-        sites.retain(|site| {
-            views.iter().any(|view| {
-                let waves = self.harmonics(*site, &[], view).unwrap_or_default();
-                has_shape(&waves, 1e-3 * view.radius_m)
-            })
-        });
-        sites
+        sites_with_shape(self, views)
     }
 
     fn class(&self) -> Option<&'static str> {
