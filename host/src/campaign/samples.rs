@@ -3,16 +3,15 @@ use super::clock::{Clock, Stamps};
 use super::error::{CampaignError, Place, Problem};
 use super::import::Quantity;
 use super::manifest::Entry;
-use super::outliers::Strays;
+use super::plane_view::{PlaneView, Tilt};
 use super::run_file::{Field, RunFile};
 use super::table::Batch;
 use super::thinned::Thinned;
-use super::{Direction, Frame, Note, Plane as NamedPlane, Run, Samples, check, steady};
+use super::{Direction, Frame, Note, Plane as NamedPlane, Run, Samples, check, left_out, steady};
 use crate::fit::fit_circle;
-use giotto_shared::circle::{Circle, CircleError, Merge, Plane, Scatter};
+use giotto_shared::circle::{Circle, CircleError, Merge, Scatter};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
-use std::ops::Range;
 
 /// Fewest samples of a run.
 pub(super) const FEWEST: usize = 8;
@@ -48,17 +47,6 @@ pub struct Location {
     pub origin_m: [f64; 3],
     /// Tilt of the plane against the nearest coordinate plane and flatness (peak to valley, m), for 3-D points.
     pub plane: Option<Tilt>,
-}
-
-/// How a circle in space lies.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tilt {
-    /// Unit normal of the plane; its largest component is positive, so CCW is seen from the positive axis.
-    pub normal: [f64; 3],
-    /// Angle between the normal and the nearest axis, rad.
-    pub tilt_rad: f64,
-    /// Highest minus lowest point over the plane, m.
-    pub flatness_m: f64,
 }
 
 /// What is kept of the rows while they go by.
@@ -245,7 +233,7 @@ fn gather(
                 if let (Some(view), Some(third)) = (view, third) {
                     let z = column(Some(third));
                     for ((x, y), z) in x.iter_mut().zip(&mut y).zip(&z) {
-                        let height = view.plane.height([*x, *y, *z]);
+                        let height = view.height([*x, *y, *z]);
                         heights = [heights[0].min(height), heights[1].max(height)];
                         [*x, *y] = view.project([*x, *y, *z]);
                     }
@@ -316,7 +304,7 @@ fn by_time(
             .for_each(|(k, t)| *t = angle(k, *t));
         run.samples.angle_rad = time;
     }
-    leave_out(entry, &mut run, &mut kept, noise_m, &mut notes)?;
+    left_out::strays(entry, &mut run, &mut kept, noise_m, &mut notes)?;
     let turn_s = Some(clock.turn_s);
     Ok(finish(run, None, turn_s, kept, notes, laps, noise_m))
 }
@@ -367,7 +355,7 @@ fn by_angle(
     let points: Vec<(f64, f64)> = timed
         .filter_map(|(row, t)| Some((*run.samples.angle_rad.get(row)?, t)))
         .collect();
-    leave_out(entry, &mut run, &mut kept, noise_m, &mut notes)?;
+    left_out::strays(entry, &mut run, &mut kept, noise_m, &mut notes)?;
     let turned = seen_from_behind(entry, &run, &mut notes);
     let entry = turned.as_ref().unwrap_or(entry);
     run.direction = entry.direction;
@@ -387,52 +375,9 @@ fn by_angle(
         let turn = steady.unwrap_or(mean);
         check::feed(entry, turn, &mut notes)?;
         turn_s = Some(turn);
-        keep_steady(entry, &points, &mut run, &mut kept, &mut notes);
+        left_out::keep_steady(entry, &points, &mut run, &mut kept, &mut notes);
     }
     Ok(finish(run, location, turn_s, kept, notes, None, noise_m))
-}
-
-/// Takes out the rows while the machine got up to speed and slowed down, and says so.
-fn keep_steady(
-    entry: &Entry,
-    points: &[(f64, f64)],
-    run: &mut Run,
-    time: &mut Option<Vec<f64>>,
-    notes: &mut Vec<Note>,
-) {
-    let Some([from, to]) = steady::window_rad(points) else {
-        return;
-    };
-    let sign = (to - from).signum();
-    let angle = &run.samples.angle_rad;
-    let first = angle.partition_point(|a| sign * (a - from) < 0.0);
-    let end = angle.partition_point(|a| sign * (a - to) <= 0.0);
-    if end < first + FEWEST {
-        return;
-    }
-    // A larger hole than any recording may have makes an arc of the turn: only where the slower part shows.
-    let lost = (TAU - (to - from).abs()).to_degrees();
-    if lost > check::LARGEST_GAP_DEG && !steady::shows(&run.samples, first..end) {
-        return;
-    }
-    notes.push(Note {
-        at: entry.row(0),
-        text: format!(
-            "{} rows left out: getting up to speed ({first}) and slowing down ({}), slower than the programmed feed",
-            first + angle.len() - end,
-            angle.len() - end,
-        ),
-    });
-    let cut = |column: &mut Vec<f64>| {
-        column.truncate(end);
-        column.drain(..first);
-    };
-    cut(&mut run.samples.angle_rad);
-    cut(&mut run.samples.deviation_m);
-    if let Some(time) = time {
-        cut(time);
-    }
-    run.start_angle_rad = run.samples.angle_rad[0];
 }
 
 /// Points in a plane other than XY go round as they do; which side of the plane was meant, a foreign file does not say.
@@ -462,63 +407,6 @@ fn seen_from_behind(entry: &Entry, run: &Run, notes: &mut Vec<Note>) -> Option<E
         direction,
         ..entry.clone()
     })
-}
-
-/// Takes out readings that are none of the machine's, and says so.
-fn leave_out(
-    entry: &Entry,
-    run: &mut Run,
-    time: &mut Option<Vec<f64>>,
-    noise_m: f64,
-    notes: &mut Vec<Note>,
-) -> Result<(), CampaignError> {
-    let strays = Strays::of(&run.samples.deviation_m, noise_m);
-    if strays.is_empty() {
-        return Ok(());
-    }
-    if let Some(held) = strays.held.iter().find(|held| {
-        let angle = &run.samples.angle_rad;
-        let after = held.end.min(angle.len() - 1);
-        (angle[after] - angle[held.start]).abs().to_degrees() > check::LARGEST_GAP_DEG
-    }) {
-        let value_um = (run.samples.deviation_m[held.start] * 1e9).round() / 1e3;
-        let problem = Problem::Held {
-            value_um,
-            rows: held.len() + 1,
-        };
-        return Err(CampaignError::new(entry.row(held.start), problem));
-    }
-    let lines = |ranges: &[Range<usize>]| {
-        let line = |row: usize| entry.row(row).line.unwrap_or(0).to_string();
-        let mut lines: Vec<String> = ranges.iter().take(8).map(|r| line(r.start)).collect();
-        if ranges.len() > lines.len() {
-            lines.push("…".to_owned());
-        }
-        lines.join(", ")
-    };
-    let count = |ranges: &[Range<usize>]| ranges.iter().map(Range::len).sum::<usize>();
-    let mut note = |ranges: &[Range<usize>], why: &str| {
-        if let Some(first) = ranges.first() {
-            let text = format!(
-                "{} rows left out: {why} (lines {})",
-                count(ranges),
-                lines(ranges)
-            );
-            let at = entry.row(first.start);
-            notes.push(Note { at, text });
-        }
-    };
-    note(
-        &strays.lone,
-        "lone readings far from their neighbours, a dirty ball?",
-    );
-    note(&strays.held, "a value held while the machine went on");
-    strays.remove(&mut run.samples.angle_rad);
-    strays.remove(&mut run.samples.deviation_m);
-    if let Some(time) = time {
-        strays.remove(time);
-    }
-    Ok(())
 }
 
 fn too_few(entry: &Entry, found: usize) -> CampaignError {
@@ -639,48 +527,6 @@ fn polar(
             plane: Some(view.tilt()),
         },
     })
-}
-
-/// A plane seen from the positive end of the axis nearest to its normal, so that CCW means what it means
-/// in G17, G18 and G19, and angles run from the first axis of that plane.
-struct PlaneView {
-    plane: Plane,
-    frame: Frame,
-}
-
-impl PlaneView {
-    fn through(scatter: &Scatter) -> Result<Self, CircleError> {
-        let plane = Plane::through(scatter)?;
-        let frame = Frame::across(plane.normal).ok_or(CircleError::NonFinite)?;
-        Ok(Self { plane, frame })
-    }
-
-    fn with_heights(mut self, [lowest, highest]: [f64; 2]) -> Self {
-        self.plane.flatness = highest - lowest;
-        self
-    }
-
-    fn project(&self, point: [f64; 3]) -> [f64; 2] {
-        let from = [0, 1, 2].map(|k| point[k] - self.plane.centroid[k]);
-        [self.frame.first(), self.frame.second()]
-            .map(|axis| axis[0] * from[0] + axis[1] * from[1] + axis[2] * from[2])
-    }
-
-    fn lift(&self, [u, v]: [f64; 2]) -> [f64; 3] {
-        let (first, second) = (self.frame.first(), self.frame.second());
-        [0, 1, 2].map(|k| self.plane.centroid[k] + u * first[k] + v * second[k])
-    }
-
-    fn tilt(&self) -> Tilt {
-        let normal = self.frame.normal();
-        let axis = normal.iter().copied().fold(0.0, f64::max);
-        let across = normal.iter().map(|c| c * c).sum::<f64>() - axis * axis;
-        Tilt {
-            normal,
-            tilt_rad: across.max(0.0).sqrt().atan2(axis),
-            flatness_m: self.plane.flatness,
-        }
-    }
 }
 
 fn unwrapped(angle: &[f64]) -> bool {
