@@ -198,6 +198,10 @@ impl ModelFile {
             kinematics,
             effects,
         };
+        if let Some((path, found, expected)) = model.joint_without_arm() {
+            let path: Vec<&str> = path.iter().map(String::as_str).collect();
+            return Err(text.value_error(&path, found, expected));
+        }
         match model.fault() {
             None => Ok(model),
             Some(fault) => {
@@ -232,6 +236,23 @@ impl ModelFile {
         })?;
         Self::parse(&text, file)?;
         Ok(text)
+    }
+
+    /// An effect on a joint that the machine does not have: without the arm it would do nothing, and nobody would know.
+    fn joint_without_arm(&self) -> Option<(Vec<String>, &'static str, String)> {
+        let joints = self.kinematics.as_ref().map_or(&[][..], Kinematics::joints);
+        self.effects.iter().enumerate().find_map(|(index, effect)| {
+            let actuators = effect.site().actuators();
+            let missing = actuators
+                .iter()
+                .find(|actuator| !actuator.is_slide() && !joints.contains(actuator))?;
+            let path = ["effect", &index.to_string(), "axis"].map(ToString::to_string);
+            let expected = match joints.last() {
+                None => "a model with `[kinematics]`, or an axis x, y, z".to_owned(),
+                Some(last) => format!("a joint up to {last}"),
+            };
+            Some((path.to_vec(), missing.name(), expected))
+        })
     }
 
     fn fault(&self) -> Option<Fault> {

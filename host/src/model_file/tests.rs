@@ -193,7 +193,47 @@ fn whole(cause: Cause) -> (String, Vec<&'static str>) {
 fn with_effect(effect: &str) -> Result<ModelFile, TomlFileError> {
     let head = TEXT.split("[[effect]]").next().unwrap();
     let head = head.replace("format = 1", "format = 2");
-    ModelFile::parse(&format!("{head}{effect}"), Path::new("M.toml"))
+    // Of joints there are those of an arm.
+    let arm = if effect.contains("joint") { ARM } else { "" };
+    ModelFile::parse(&format!("{head}{arm}{effect}"), Path::new("M.toml"))
+}
+
+const ARM: &str = "[kinematics]\nrobot = \"abb-irb1600-6-1.45\"\ntool_mm = [0, 65, 149]\norientation = [0, 0, 1, 0]\nbranch = \"elbow-up\"\n";
+
+#[test]
+fn an_effect_on_a_joint_needs_the_arm() {
+    let (text, _) = whole(Cause::JointBacklash);
+    let alone = |kinematics: &str| {
+        let head = TEXT
+            .split("[[effect]]")
+            .next()
+            .unwrap()
+            .replace("format = 1", "format = 2");
+        ModelFile::parse(&format!("{head}{kinematics}{text}"), Path::new("M.toml"))
+    };
+    assert!(alone(ARM).is_ok());
+    let error = alone("").unwrap_err().to_string();
+    assert!(
+        error.contains("joint2") && error.contains("[kinematics]"),
+        "{error}"
+    );
+    assert!(!error.starts_with("M.toml:1:"), "{error}");
+    let two =
+        "[kinematics]\nmodel = \"scara\"\nl1_mm = 475.0\nl2_mm = 720.0\nelbow = \"positive\"\n";
+    assert!(alone(two).is_ok());
+    let third = text.replace("joint2", "joint3");
+    let head = TEXT
+        .split("[[effect]]")
+        .next()
+        .unwrap()
+        .replace("format = 1", "format = 2");
+    let error = ModelFile::parse(&format!("{head}{two}{third}"), Path::new("M.toml"))
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("joint3") && error.contains("joint2"),
+        "{error}"
+    );
 }
 
 /// All causes, all parameters: missing, misspelt, of another unit, no number, beyond what can be.
