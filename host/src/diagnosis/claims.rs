@@ -6,7 +6,9 @@ use super::finding::{Finding, Unexplained};
 use super::footing::Footing;
 use super::status::{self, Ground};
 use super::survey::believed_feed_m_s;
-use super::{Gain, arm, hypothesis, like_arm, omnibus, statement, unexplained, verdict};
+use super::{
+    Gain, arm, hypothesis, like_arm, omnibus, statement, static_size, unexplained, verdict,
+};
 use crate::campaign::Campaign;
 use crate::causes::Cause;
 
@@ -36,6 +38,7 @@ pub(super) fn state(
         clamp.map(|clamp| (clamp, clamp_energy_m2(campaign, found))),
     );
     explanation.doubt(&mut findings);
+    static_size::doubt(&static_size::untested(found), &mut findings);
     arm::name_both(&mut findings, campaign.kinematics.as_ref());
     status::settle(
         &mut findings,
@@ -89,6 +92,9 @@ pub(super) fn open_questions(
     arm.into_iter()
         .chain(poverty)
         .chain(explanation.words())
+        .chain(static_size::words(&static_size::untested(
+            &explanation.found,
+        )))
         .chain(ties.iter().map(of_tie))
         .collect()
 }

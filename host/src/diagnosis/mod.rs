@@ -48,6 +48,7 @@ mod simplex;
 mod spectrum;
 pub mod spread;
 pub mod statement;
+mod static_size;
 pub mod status;
 pub mod survey;
 pub mod tangent;
@@ -232,6 +233,9 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
     let like_arm = like_arm::is_like_arm(&explanation.found);
     if like_arm {
         like_arm::take_out_slides(&mut explanation.found);
+    }
+    if ground.measured_scatter {
+        omnibus::take_out_pieces(&mut explanation.found);
     }
     let clamp = match durations {
         Durations::Clamped(clamp) if !like_arm && !known::knows_clamp(&baseline.known) => {

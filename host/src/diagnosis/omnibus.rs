@@ -6,11 +6,13 @@
 //! scatter, which may itself grow with feed and radius; the higher ones by the level of the orders beside them, which
 //! holds for noise that is correlated along the turn as well. The mean size is held against the order of the runs, and
 //! against the radius. Each family of tests shares out one chance of a false alarm.
-use super::explained::{Explained, residual};
+use super::explained::{Explained, energies, residual};
 use super::finding::Signature;
+use super::hypothesis::Kind;
 use super::low_orders::Low;
 use super::residual_waves::{self, Waves, median};
 use super::survey::Prepared;
+use super::veto;
 use crate::causes::ORDERS;
 use std::f64::consts::LN_2;
 
@@ -85,6 +87,38 @@ pub fn test(found: &Explained) -> Vec<Leftover> {
     out.extend(super::run_order::test(found, &sizes));
     out.sort_by(|a, b| a.chance.total_cmp(&b.chance));
     out
+}
+
+/// Against what is left of all orders, rms: below, a cause may be a piece of it. One with shape parameters fits more.
+const LARGER_THAN_LEFT: [f64; 2] = [0.6, 1.0];
+
+/// Takes out the causes that may be pieces of something unlisted: those that explain less than what is left in spite of them.
+pub fn take_out_pieces(found: &mut Explained) {
+    let squares: f64 = test(found)
+        .iter()
+        .filter(|left| left.signature.harmonic.is_some())
+        .map(|left| left.rms_um.powi(2))
+        .sum();
+    let samples: usize = found.runs.iter().map(|run| run.deviation_m.len()).sum();
+    let left_m2 = squares * 1e-12 * samples as f64;
+    let (each, _) = energies(found, &found.all());
+    let is_piece = |item: usize, energy_m2: f64| match &found.items[item].kind {
+        Kind::Cause { cause, .. } => {
+            let flexible = usize::from(cause.model().flexible());
+            energy_m2 < LARGER_THAN_LEFT[flexible].powi(2) * left_m2
+        }
+        Kind::Pattern(_) => false,
+    };
+    let pieces: Vec<usize> = found
+        .chosen
+        .iter()
+        .zip(each)
+        .filter(|(item, energy_m2)| is_piece(**item, *energy_m2))
+        .map(|(item, _)| *item)
+        .collect();
+    for item in pieces {
+        veto::take_out(found, item);
+    }
 }
 
 /// Mean square of what the chosen explanations with a form, that is more than a size, do in each run, m².

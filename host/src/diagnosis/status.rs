@@ -30,7 +30,7 @@ const LIKELY: f64 = 0.9;
 /// Highest probability where the scatter between runs is assumed.
 const HIGHEST_ASSUMED: f64 = 0.9;
 /// Highest probability of what the runs left out do not prove.
-const HIGHEST_UNPROVEN: f64 = 0.98;
+pub(super) const HIGHEST_UNPROVEN: f64 = 0.98;
 /// Even odds between two names are no finding.
 pub const TIE: f64 = 0.55;
 

@@ -46,6 +46,30 @@ const SIGNIFICANT: f64 = 8.0;
 /// Share of the runs that is nearly every one.
 const NEARLY_EVERY: f64 = 0.8;
 
+/// Power above which a run shows a tone, in units of χ²₂: 1/1000 of noise is louder.
+const LOUD: f64 = 14.0;
+/// Fewest turn times of runs that show a tone: waves of the machine's place, loud in the fastest runs alone, have one frequency
+/// for each radius.
+const FEWEST_TURN_TIMES: u32 = 4;
+/// Turn times that differ by less are one.
+const SAME_TURN: f64 = 0.02;
+
+/// Which of the different turn times each run has, as a bit; beyond 127 of them they share the last.
+struct TurnTimes(Vec<u128>);
+
+impl TurnTimes {
+    fn of(spectra: &[Spectrum]) -> Self {
+        let mut different: Vec<f64> = spectra.iter().map(|s| s.turn_s).collect();
+        different.sort_by(f64::total_cmp);
+        different.dedup_by(|longer, kept| *longer < *kept * (1.0 + SAME_TURN));
+        let bit = |s: &Spectrum| {
+            let longer = different.partition_point(|turn_s| *turn_s <= s.turn_s);
+            1 << longer.saturating_sub(1).min(127)
+        };
+        Self(spectra.iter().map(bit).collect())
+    }
+}
+
 /// What a run leaves outside its low orders.
 struct Clean<'a> {
     run: &'a Prepared,
@@ -87,22 +111,30 @@ pub fn find(runs: &[Prepared], residual: &Column, spread: &Spread) -> Option<Ton
     if spectra.len() < 4 || longest <= 0.0 {
         return None;
     }
+    let turns = TurnTimes::of(&spectra);
     let step = 0.25 / longest;
     let points = ((highest / step) as usize).min(200_000);
-    let grid: Vec<(f64, f64, usize, usize)> = (1..points)
+    let grid: Vec<(f64, f64, usize, bool)> = (1..points)
         .into_par_iter()
         .filter_map(|i| {
             let frequency = i as f64 * step;
             let (mut sum, mut count, mut loud) = (0.0, 0usize, 0usize);
-            for s in &spectra {
+            let (mut seeing, mut showing) = (0u128, 0u128);
+            for (s, kind) in spectra.iter().zip(&turns.0) {
                 if s.sees(frequency) {
                     let power = s.at(frequency);
                     sum += power.min(CAP);
                     count += 1;
-                    loud += usize::from(power > 14.0);
+                    seeing |= kind;
+                    if power > LOUD {
+                        loud += 1;
+                        showing |= kind;
+                    }
                 }
             }
-            (count >= 4).then(|| (frequency, sum / count as f64, count, loud))
+            let shared = loud >= 4.max(count / 6)
+                && showing.count_ones() >= FEWEST_TURN_TIMES.min(seeing.count_ones());
+            (count >= 4).then(|| (frequency, sum / count as f64, count, shared))
         })
         .collect();
     let mut levels: Vec<f64> = grid.iter().map(|g| g.1).collect();
@@ -122,10 +154,10 @@ pub fn find(runs: &[Prepared], residual: &Column, spread: &Spread) -> Option<Ton
     };
     let best = grid
         .iter()
-        .filter(|(frequency, mean, count, loud)| {
+        .filter(|(frequency, mean, count, shared)| {
             let expected = 2.0 / (*count as f64).sqrt();
             (mean - 2.0) / expected > SIGNIFICANT
-                && *loud >= 4.max(count / 6)
+                && *shared
                 && ((mean - floor) / width > SIGNIFICANT
                     || (*mean > NEARLY_EVERY * CAP && shown(*frequency, *count)))
         })
