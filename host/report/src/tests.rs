@@ -171,7 +171,17 @@ fn the_page_says_what_the_diagnosis_says() {
 
 #[test]
 fn a_poor_campaign_gets_a_page_that_says_what_is_missing() {
-    let (campaign, diagnosis) = measured(&[0.1], &[0.1], 400);
+    let (campaign, shown) = measured(&[0.1], &[0.1], 400);
+    // The pair shows what is hidden, for an instrument set up with care …
+    let page = html(&campaign, &shown).unwrap();
+    assert_eq!(shown.findings[0].cause.id(), "squareness");
+    assert!(page.contains("provisional") && page.contains("one radius"));
+    // … and nothing for one whose sizes scatter by 50 µm.
+    let options = Options {
+        repeatability_m: Some(50e-6),
+        ..Options::default()
+    };
+    let diagnosis = diagnose(&campaign, &options).unwrap();
     let page = html(&campaign, &diagnosis).unwrap();
     let sentences = super::verdict::sentences(&diagnosis, None);
     assert!(

@@ -5,6 +5,18 @@ use crate::campaign::{Campaign, Run};
 
 /// Fewest runs whose scatter says anything.
 pub(super) const FEWEST_RUNS: usize = 6;
+/// Degrees of freedom of a scatter that a person states or that is assumed: as if it were known to a quarter (1/√(2·10)).
+pub(super) const ASSUMED_FREEDOM: f64 = 10.0;
+
+/// Degrees of freedom of the scatter between so many runs to which so many columns were fitted.
+pub(super) fn freedom(runs: usize, columns: f64) -> f64 {
+    if runs < FEWEST_RUNS {
+        ASSUMED_FREEDOM
+    } else {
+        (runs as f64 - columns).max(1.0)
+    }
+}
+
 /// Scatter of the size between runs that is assumed where it is neither measured nor known, m: a ballbar set up with care.
 pub const ASSUMED_REPEATABILITY_M: f64 = 1.5e-6;
 

@@ -1,5 +1,6 @@
 //! Explanations that compete: causes of the list and patterns without a name, and what each costs.
 use super::design_column::Column;
+use super::footing::freedom;
 use super::low_orders::Low;
 use super::pattern::Pattern;
 use super::survey::Prepared;
@@ -120,7 +121,7 @@ const LEFT: f64 = 2.0 / 3.0;
 /// of the same false-alarm rate, against that of the usual number of runs.
 pub fn scarcity(runs: usize) -> f64 {
     let quantile = |runs: usize| {
-        let dof = (LEFT * runs as f64).max(1.0);
+        let dof = freedom(runs, (1.0 - LEFT) * runs as f64);
         // Two-sided: F(1, dof) is the square of t.
         let level = 0.5 * FALSE_COLUMN;
         StudentsT::new(0.0, 1.0, dof).map_or(1.0, |law| law.inverse_cdf(1.0 - level).powi(2))

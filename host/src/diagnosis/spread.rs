@@ -3,6 +3,7 @@
 //! Both are measured before any cause is assumed: the noise from second differences of neighbouring samples,
 //! the scatter from what is left of each run's harmonics when any dependence on R, direction, f, f²/R and
 //! time has been taken out. Tests against the noise within a run alone would make everything significant.
+use super::footing::FEWEST_RUNS;
 use super::linear;
 use super::low_orders::{COLUMNS, Low, ORDERS, order_of};
 use super::residual_waves;
@@ -187,6 +188,9 @@ const TRIMMED_MEAN_OF_CHI2: f64 = 0.623_015;
 
 /// Variance that no function of radius, direction, speed and time explains.
 fn pure_error(runs: &[&Prepared], values: &[f64]) -> f64 {
+    if runs.len() < FEWEST_RUNS {
+        return of_repeats(runs, values);
+    }
     let mut radii: Vec<f64> = runs.iter().map(|run| run.view.radius_m).collect();
     radii.sort_by(f64::total_cmp);
     radii.dedup_by(|a, b| (*a - *b).abs() < 1e-6 * *b);
@@ -213,6 +217,33 @@ fn pure_error(runs: &[&Prepared], values: &[f64]) -> f64 {
         add(&|run| here(run) * run.view.sign);
     }
     linear::residual_variance(&columns, values)
+}
+
+/// Variance between runs of one circle, all that a few runs can show of their scatter: what makes a circle one way round differ
+/// from one the other way is not scatter. 0 without repeats.
+fn of_repeats(runs: &[&Prepared], values: &[f64]) -> f64 {
+    let same = |a: &Prepared, b: &Prepared| {
+        let near = |a: f64, b: f64| (a - b).abs() <= 1e-6 * a.abs().max(b.abs());
+        a.view.sign == b.view.sign
+            && near(a.view.radius_m, b.view.radius_m)
+            && near(a.programmed_m_s, b.programmed_m_s)
+    };
+    let (mut squares, mut free) = (0.0, 0.0);
+    for (at, run) in runs.iter().enumerate() {
+        if runs[..at].iter().any(|before| same(before, run)) {
+            continue;
+        }
+        let those: Vec<f64> = runs
+            .iter()
+            .zip(values)
+            .filter(|(other, _)| same(run, other))
+            .map(|(_, value)| *value)
+            .collect();
+        let mean = those.iter().sum::<f64>() / those.len() as f64;
+        squares += those.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
+        free += those.len() as f64 - 1.0;
+    }
+    if free > 0.0 { squares / free } else { 0.0 }
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! The size of an explanation and half its interval.
 use crate::diagnosis::explained::Explained;
+use crate::diagnosis::footing::{FEWEST_RUNS, freedom};
 use crate::diagnosis::hypothesis::Kind;
 use crate::diagnosis::search::columns_of;
 use crate::diagnosis::tangent;
@@ -16,11 +17,16 @@ pub(super) fn estimate(found: &Explained, item: usize) -> (f64, f64) {
         .iter()
         .filter_map(|c| columns.iter().position(|other| other == c))
         .collect();
-    let dof = (found.runs.len().saturating_sub(columns.len())).max(1) as f64;
+    let dof = freedom(found.runs.len(), columns.len() as f64);
     let t = StudentsT::new(0.0, 1.0, dof).map_or(2.0, |t| t.inverse_cdf(0.975));
     // Nuisance and chosen come first with the tangents, too.
     let (covariance, ..) = tangent::covariance(found);
-    let robust = robust_variances(found);
+    // Of a few runs the pulls say nothing: their scatter is not measured.
+    let robust = if found.runs.len() < FEWEST_RUNS {
+        Vec::new()
+    } else {
+        robust_variances(found)
+    };
     let value: Vec<f64> = at.iter().map(|&i| found.solution.coefficients[i]).collect();
     // The scatter of the runs' pulls is itself uncertain by a quarter or so: it counts where it says clearly more.
     let variance = |i: usize| {
