@@ -187,10 +187,15 @@ fn show_findings(d: &Diagnosis, out: &Output) {
 /// What has no name, what was taken otherwise, what was left out and what cannot be told.
 fn show_doubts(d: &Diagnosis, out: &Output) {
     if d.unexplained.present {
-        out.say(format_args!(
-            "Unexplained: {:.2} µm rms that match no cause in the list:",
-            d.unexplained.rms_um
-        ));
+        // The clock alone may show something, which has no µm.
+        let um = d.unexplained.rms_um;
+        if um < 0.005 {
+            out.say("Unexplained, as no cause in the list does it:");
+        } else {
+            out.say(format_args!(
+                "Unexplained: {um:.2} µm rms that match no cause in the list:"
+            ));
+        }
         for words in &d.unexplained.signature.words {
             out.say(format_args!("  {words}"));
         }

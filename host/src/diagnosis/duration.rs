@@ -1,6 +1,6 @@
 //! A clamp on the feed shows in the clock: the turn lasts longer than programmed.
 use super::survey::believed_feed_m_s;
-use crate::campaign::Campaign;
+use crate::campaign::{Campaign, Run};
 
 /// The controller keeps the centripetal acceleration of arcs below a limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,4 +75,42 @@ pub fn read(campaign: &Campaign) -> Durations {
             smallest,
         }
     }
+}
+
+/// Fewest runs among which one can be said to be labelled wrongly.
+const FEWEST: usize = 6;
+
+/// The run whose turn lasted otherwise than its radius and feed say while all others lasted as theirs do, and that no clamp has
+/// slowed: its label is wrong.
+pub fn contradicted(campaign: &Campaign) -> Option<usize> {
+    let off = |run: &Run| believed_feed_m_s(run) / run.feed_m_s;
+    let mut odd = (0..campaign.runs.len()).filter(|&run| off(&campaign.runs[run]) != 1.0);
+    let (only, None) = (odd.next()?, odd.next()) else {
+        return None;
+    };
+    if campaign.runs.len() < FEWEST {
+        return None;
+    }
+    let acceleration = |run: &Run| believed_feed_m_s(run).powi(2) / run.radius_m;
+    let run = &campaign.runs[only];
+    let others = campaign
+        .runs
+        .iter()
+        .enumerate()
+        .filter(|(other, _)| *other != only);
+    let fastest = others.map(|(_, run)| acceleration(run)).fold(0.0, f64::max);
+    (off(run) > 1.0 || acceleration(run) < 0.9 * fastest).then_some(only)
+}
+
+/// Why such a run is left out.
+pub fn reason(run: &Run) -> String {
+    let ratio = run.feed_m_s / believed_feed_m_s(run);
+    let (times, than) = if ratio > 1.0 {
+        (ratio, "longer")
+    } else {
+        (1.0 / ratio, "shorter")
+    };
+    format!(
+        "its turn lasted {times:.2} times {than} than radius and feed say, and all others as theirs do: the label of another run?"
+    )
 }

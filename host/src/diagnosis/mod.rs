@@ -10,6 +10,7 @@
 pub mod angular_bins;
 pub mod arm;
 pub mod baseline;
+mod by_slide;
 mod claims;
 pub mod delay;
 pub mod design_column;
@@ -31,6 +32,7 @@ pub mod low_orders;
 pub mod material;
 pub mod misfit;
 pub mod omnibus;
+mod other_way;
 pub mod pattern;
 pub mod picture;
 pub mod pitch;
@@ -234,6 +236,7 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
     if like_arm {
         like_arm::take_out_slides(&mut explanation.found);
     }
+    by_slide::split(&mut explanation.found);
     if ground.measured_scatter {
         omnibus::take_out_pieces(&mut explanation.found);
     }

@@ -1,7 +1,7 @@
 //! What a session brought, made ready: one override for all taken in, a spoilt run left out.
 use super::influence::{self, LeftOut};
 use super::survey::{self, Survey};
-use super::{Options, angular_bins, arm, feed_override};
+use super::{Options, angular_bins, arm, duration, feed_override, other_way};
 use crate::campaign::Campaign;
 
 /// What a session brought, made ready: one override for all taken in, a spoilt run left out.
@@ -36,14 +36,20 @@ impl Session {
             (campaign.runs.len() / ONE_SPOILT_IN).max(1)
         };
         while left_out.len() < most {
-            let Some(spoilt) = spoilt_of(&campaign, &survey, options) else {
+            // A label that the clock or the set-up contradicts says so more plainly than what follows from it.
+            let mislabelled = |run: usize| (run, duration::reason(&campaign.runs[run]));
+            let Some((index, reason)) = duration::contradicted(&campaign)
+                .map(mislabelled)
+                .or_else(|| driven_the_other_way(&survey))
+                .or_else(|| spoilt_of(&campaign, &survey, options))
+            else {
                 break;
             };
-            let run = campaign.runs.remove(spoilt.run);
-            places.remove(spoilt.run);
+            let run = campaign.runs.remove(index);
+            places.remove(index);
             left_out.push(LeftOut {
                 file: run.file,
-                reason: influence::reason(&spoilt),
+                reason,
             });
             survey = Survey::new(&campaign);
         }
@@ -57,7 +63,14 @@ impl Session {
     }
 }
 
-fn spoilt_of(campaign: &Campaign, survey: &Survey, options: &Options) -> Option<influence::Spoilt> {
+/// A run with the label of the other direction, and why.
+fn driven_the_other_way(survey: &Survey) -> Option<(usize, String)> {
+    let reason = "its set-up offset lies with that of all others only if it was driven the other way round than its label says";
+    Some((other_way::find(survey)?, reason.to_owned()))
+}
+
+/// A run that is far from what the others foretell, and why.
+fn spoilt_of(campaign: &Campaign, survey: &Survey, options: &Options) -> Option<(usize, String)> {
     let response = match &options.model {
         Some(model) => model.servo.response(),
         None => arm::fit_lag_of(campaign),
@@ -70,5 +83,68 @@ fn spoilt_of(campaign: &Campaign, survey: &Survey, options: &Options) -> Option<
         .zip(data.low())
         .map(|(run, low)| low[0] / (run.visible().max(1) as f64).sqrt())
         .collect();
-    influence::find(&runs, &profiles, &means)
+    let spoilt = influence::find(&runs, &profiles, &means)?;
+    Some((spoilt.run, influence::reason(&spoilt)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulation::{self, Plan};
+    use std::path::Path;
+
+    fn campaign() -> Campaign {
+        let plan = "[machine]\nboth = { kv_per_s = 50.0 }\nsquareness_um_per_m = 60.0\n\
+             [grid]\nradii_mm = [50.0, 100.0, 150.0]\nfeeds_mm_s = [20.0, 100.0, 300.0]";
+        let plan = Plan::parse(plan, Path::new("plan.toml")).unwrap();
+        simulation::campaign(&plan, 1)
+    }
+
+    fn left_out(campaign: &Campaign, options: &Options) -> Vec<(String, String)> {
+        let session = Session::of(campaign, options);
+        let left = session.left_out.into_iter();
+        left.map(|out| (out.file, out.reason)).collect()
+    }
+
+    #[test]
+    fn labels_that_are_right_stay() {
+        assert_eq!(left_out(&campaign(), &Options::default()), []);
+    }
+
+    #[test]
+    fn a_run_of_the_other_direction_is_left_out_whichever_it_is() {
+        let sound = campaign();
+        assert!(sound.runs.iter().all(|run| run.samples.angle_inferred));
+        for index in 0..sound.runs.len() {
+            let mut wrong = sound.clone();
+            let run = &mut wrong.runs[index];
+            run.direction = run.direction.reversed();
+            run.samples
+                .angle_rad
+                .iter_mut()
+                .for_each(|angle| *angle = -*angle);
+            let out = left_out(&wrong, &Options::default());
+            assert_eq!(out.len(), 1, "{index}: {out:?}");
+            assert_eq!(out[0].0, sound.runs[index].file);
+            assert!(out[0].1.contains("other way round"), "{out:?}");
+            let keep_all = Options {
+                keep_all: true,
+                ..Options::default()
+            };
+            assert_eq!(left_out(&wrong, &keep_all), []);
+        }
+    }
+
+    #[test]
+    fn a_label_that_the_clock_contradicts_is_left_out() {
+        let sound = campaign();
+        for (index, factor) in [(0, 2.5), (5, 0.4), (11, 1.5), (17, 0.8)] {
+            let mut wrong = sound.clone();
+            wrong.runs[index].feed_m_s *= factor;
+            let out = left_out(&wrong, &Options::default());
+            assert_eq!(out.len(), 1, "{index}: {out:?}");
+            assert_eq!(out[0].0, sound.runs[index].file);
+            assert!(out[0].1.contains("its turn lasted"), "{out:?}");
+        }
+    }
 }

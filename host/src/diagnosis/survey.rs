@@ -283,6 +283,12 @@ impl Survey {
         self.runs.iter().map(|run| Arc::clone(&run.basis)).collect()
     }
 
+    /// The runs, and the first harmonic of each about its recorded angle, m.
+    pub fn set_ups(&self) -> impl Iterator<Item = (&RunView, [f64; 2])> {
+        let views = self.runs.iter().map(|run| &run.view);
+        views.zip(self.firsts.iter().copied())
+    }
+
     /// Whether the angles follow from the time, and so hold the delay.
     pub const fn inferred(&self) -> bool {
         self.inferred
