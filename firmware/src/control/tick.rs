@@ -233,11 +233,11 @@ where
             };
         }
         let waits = self.jobs.waiting() > 0;
-        if self.executor.paused() || (waits && self.pause) {
-            MotionState::Paused
-        } else if self.executor.fault().is_some() {
-            // Whatever still waits is thrown away.
+        if self.executor.fault().is_some() {
+            // Whatever still waits is thrown away, in a feed hold once it is over.
             MotionState::Fault
+        } else if self.executor.paused() || (waits && self.pause) {
+            MotionState::Paused
         } else if waits || self.shared.program_open(self.executor.epoch()) {
             // It goes on, or waits for more.
             MotionState::Running
