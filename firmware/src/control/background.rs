@@ -73,33 +73,35 @@ impl Streamed {
         Ok(())
     }
 
-    /// Whether the machine, were the newest set-point the last one to come, would leave the coordinates before it stands.
-    /// Mostly one comparison an axis: few are so near.
+    /// Whether the machine, were the newest set-point the last one to come, would leave the coordinates before it stands: at once
+    /// braked, or carried on first at the last velocity and acceleration. Mostly one comparison an axis: few are so near.
     fn leads_out(&self, before: Pose) -> bool {
         /// Farther from the end of the coordinates than any brake is long.
         const FAR_NM: u32 = FARTHEST_NM as u32 / 2;
+        /// What single precision, whole nanometres and the length of a tick leave, nm.
+        const SLACK_NM: f32 = 50_000.0;
         let step = self.steps.step_nm();
         let place = self.steps.place_nm;
         if place.iter().all(|nm| nm.unsigned_abs() < FAR_NM) {
             return false;
         }
-        let [x, y, z] = step.map(|nm| nm as f32);
-        let speed = libm::sqrtf(x * x + y * y + z * z);
-        place
-            .iter()
-            .zip(step)
-            .zip(before)
-            .any(|((&nm, step), was)| {
-                let outward = nm.signum().wrapping_mul(step);
-                let change = nm.signum().wrapping_mul(step.wrapping_sub(was));
-                let (velocity, change) = (outward as f32, change as f32);
-                let on = self.hold_ticks as f32 * velocity;
-                outward > 0
-                    && nm.unsigned_abs() as f32
-                        + on
-                        + farthest_nm(self.limits, speed, velocity, change)
-                        > FARTHEST_NM as f32
-            })
+        let velocity = step.map(|nm| nm as f32);
+        let (mut change, mut carried) = ([0.0; 3], velocity);
+        for axis in 0..3 {
+            change[axis] = step[axis].wrapping_sub(before[axis]) as f32;
+            carried[axis] += self.hold_ticks as f32 * change[axis];
+        }
+        (0..3).any(|axis| {
+            let mut outward = [0.0; 3];
+            outward[axis] = if place[axis] < 0 { -1.0 } else { 1.0 };
+            let farthest = |velocity| farthest_nm(self.limits, velocity, change, outward);
+            let side = outward[axis];
+            // While carried on the velocity changes evenly: on average it is that between its ends.
+            let mean = 0.5 * side * (velocity[axis] + carried[axis] + change[axis]);
+            let on = self.hold_ticks as f32 * mean.max(side * velocity[axis]).max(0.0);
+            let way = farthest(velocity).max(on + farthest(carried));
+            way > 0.0 && place[axis].unsigned_abs() as f32 + way + SLACK_NM > FARTHEST_NM as f32
+        })
     }
 }
 

@@ -201,12 +201,13 @@ impl Shared {
         };
         self.state.store(state, Relaxed);
         self.epoch.store(epoch, Relaxed);
-        for (word, nm) in self.raw_nm.iter().zip(output.nominal_nm) {
-            word.store(nm, Relaxed);
-        }
-        for (word, nm) in self.corrected_nm.iter().zip(output.corrected_nm) {
-            word.store(nm, Relaxed);
-        }
+        let store = |[x, y, z]: &[AtomicI32; 3], nm: [i32; 3]| {
+            x.store(nm[0], Relaxed);
+            y.store(nm[1], Relaxed);
+            z.store(nm[2], Relaxed);
+        };
+        store(&self.raw_nm, output.nominal_nm);
+        store(&self.corrected_nm, output.corrected_nm);
         self.overruns.store(counters.overruns, Relaxed);
         // Executor and stream count for themselves, and so does the queue.
         let sum =

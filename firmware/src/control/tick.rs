@@ -224,22 +224,22 @@ where
                 MotionState::Stopping
             };
         }
-        let waits = self.jobs.waiting() > 0;
-        if self.executor.paused() || (waits && self.pause && self.executor.idle()) {
-            MotionState::Paused
-        } else if !self.executor.idle() {
-            if self.executor.stopping() {
+        // What moves is looked at first: those ticks are the long ones.
+        if self.executor.busy() {
+            return if self.executor.stopping() {
                 MotionState::Stopping
             } else {
                 MotionState::Running
-            }
-        } else if self.executor.fault().is_some() {
-            // Whatever still waits is thrown away.
+            };
+        }
+        let waits = self.jobs.waiting() > 0;
+        if self.executor.fault().is_some() {
+            // Whatever still waits is thrown away, in a feed hold once it is over.
             MotionState::Fault
-        } else if waits {
-            MotionState::Running
-        } else if self.shared.program_open(self.executor.epoch()) {
-            // It waits for more.
+        } else if self.executor.paused() || (waits && self.pause) {
+            MotionState::Paused
+        } else if waits || self.shared.program_open(self.executor.epoch()) {
+            // It goes on, or waits for more.
             MotionState::Running
         } else {
             MotionState::Idle

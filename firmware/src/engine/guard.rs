@@ -110,16 +110,22 @@ impl Guard {
 
     /// The offset that may go out, axis by axis.
     pub(crate) fn pass(&mut self, wanted: [i32; 3]) -> ([i32; 3], Verdict) {
-        let mut verdict = Verdict::default();
-        let mut passed = [0; 3];
-        for ((out, want), last) in passed.iter_mut().zip(wanted).zip(self.last_nm) {
-            let bounded = want.max(self.offset_nm.wrapping_neg()).min(self.offset_nm);
+        let (most, fastest) = (self.offset_nm, self.slew_nm);
+        let (mut offset_cut, mut slew_cut) = (0, 0);
+        let mut axis = |want: i32, last: i32| {
+            let bounded = want.max(most.wrapping_neg()).min(most);
             let change = bounded.saturating_sub(last);
-            let slewed = change.max(self.slew_nm.wrapping_neg()).min(self.slew_nm);
-            verdict.offset_cut |= bounded != want;
-            verdict.slew_cut |= slewed != change;
-            *out = last.wrapping_add(slewed);
-        }
+            let slewed = change.max(fastest.wrapping_neg()).min(fastest);
+            offset_cut |= bounded ^ want;
+            slew_cut |= slewed ^ change;
+            last.wrapping_add(slewed)
+        };
+        let ([x, y, z], [lx, ly, lz]) = (wanted, self.last_nm);
+        let passed = [axis(x, lx), axis(y, ly), axis(z, lz)];
+        let verdict = Verdict {
+            offset_cut: offset_cut != 0,
+            slew_cut: slew_cut != 0,
+        };
         self.last_nm = passed;
         (passed, verdict)
     }

@@ -1,10 +1,13 @@
 //! Profile terms in fixed point: what a zone with profile terms adds to the tick.
+use super::hysteresis::ahead;
+use core::sync::atomic::{Ordering, compiler_fence};
 use giotto_shared::angle::sincos_with;
 use giotto_shared::fixed::{mulh, mulh_add};
 use giotto_shared::law::MAX_CYCLIC;
 
-/// One slide's linear terms, nm·2. On an arc the weights of cosφ and sinφ, each
-/// `[0] + W·[1] + W²·[2] + w⁴·[3]`; on a line `share·a[0] + W·a[1] + w⁴·a[3]`.
+/// One slide's linear terms. On an arc the weights of cosφ and sinφ, each `[0] + W·[1] + W²·[2] + w⁴·[3]`, `[0]` in nm·2 and the
+/// others in nm·4, since they meet Q31; on a line `share·a[0] + W·a[1] + w⁴·a[3]`, nm·2.
+#[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub(crate) struct Linear {
     pub(crate) a: [i32; 4],
@@ -37,8 +40,12 @@ pub(crate) struct Cyclic {
 /// What the sides of X, Y and Z are made of. Offsets in [`FINE`](super::hysteresis::FINE) nm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub(crate) struct Turning {
-    /// Ticks of a take-up, at least 3, and their distance in x (Q31).
-    pub(crate) ticks: u32,
+    /// Ticks of a take-up and one that sets right, at least 4; by slide the same, or 0 where nothing hangs on its sense.
+    pub(crate) take_up: u32,
+    pub(crate) ticks: [u32; 3],
+    /// By slide, of its indicator: [`limit`](super::hysteresis::limit).
+    pub(crate) limit: [i32; 3],
+    /// Distance of the ticks of a take-up in x (Q31).
     pub(crate) dx: i32,
     /// Middle of the first tick, Q31.
     pub(crate) first_x: i32,
@@ -67,11 +74,21 @@ pub(crate) struct Extra {
     pub(crate) cyclic: [Cyclic; MAX_CYCLIC],
     /// Opposite of the bow, Q31 for u²/2³² in nm, by the slide of travel and the slide that is off.
     pub(crate) bow: [[i32; 3]; 3],
-    /// Anything that depends on the sense of a slide.
-    pub(crate) sided: bool,
     /// Periodic errors, and any bow.
     pub(crate) periodic: u8,
     pub(crate) bowed: bool,
+}
+
+impl Turning {
+    /// In pieces that the compiler copies in place: all at once it is a call.
+    #[inline(always)]
+    fn copy(&mut self, from: &Self) {
+        (self.take_up, self.ticks, self.limit) = (from.take_up, from.ticks, from.limit);
+        (self.dx, self.first_x, self.share_q30) = (from.dx, from.first_x, from.share_q30);
+        self.side = from.side;
+        self.jump = from.jump;
+        (self.spike, self.fade) = (from.spike, from.fade);
+    }
 }
 
 impl Extra {
@@ -86,9 +103,8 @@ impl Extra {
                 *to = *from;
             }
         }
-        self.sided = from.sided;
         self.ahead = from.ahead;
-        self.turning = from.turning;
+        self.turning.copy(&from.turning);
         self.constant_fine = from.constant_fine;
         self.periodic = from.periodic;
         for (to, from) in self
@@ -115,52 +131,75 @@ impl Extra {
     /// Indicators of the sense of X, Y and Z.
     #[inline(always)]
     pub(crate) fn ahead_at(&self, c: i32, s: i32) -> [i32; 3] {
-        let [[xc, xs, x], [yc, ys, y], [zc, zs, z]] = self.ahead;
-        [
-            mulh_add(mulh_add(x, xc, c), xs, s),
-            mulh_add(mulh_add(y, yc, c), ys, s),
-            mulh_add(mulh_add(z, zc, c), zs, s),
-        ]
+        let [x, y, z] = &self.ahead;
+        [ahead(x, c, s), ahead(y, c, s), ahead(z, c, s)]
     }
 
-    /// Adds periodic errors at a position, and bow at a distance from the centre, nm.
-    #[inline(always)]
-    pub(crate) fn by_place(
+    /// Adds the linear terms on an arc in a ramp (`rate` is W in Q31, `turning` w⁴ in Q31 with the sign of the ramp), nm.
+    #[inline(never)]
+    pub(crate) fn add_linear(
         &self,
-        sincos: &[i32; 2],
-        place: [i32; 3],
-        arm: impl FnOnce() -> [i32; 3],
-        mut offset: [i32; 3],
-    ) -> [i32; 3] {
-        for (index, cyclic) in self.cyclic.iter().enumerate() {
-            if index >= usize::from(self.periodic) {
-                break;
-            }
-            cyclic.add(sincos, place, &mut offset);
+        rate: i32,
+        turning: i32,
+        [c, s]: [i32; 2],
+        wanted: &mut [i32; 3],
+    ) {
+        let rate2 = mulh(rate, rate).wrapping_mul(2);
+        let ([lx, ly, lz], [x, y, z]) = (&self.linear, wanted);
+        // One after the other: the coefficients of all do not fit into the registers.
+        *x = lx.on_arc(*x, [rate, rate2, turning], [c, s]);
+        compiler_fence(Ordering::AcqRel);
+        *y = ly.on_arc(*y, [rate, rate2, turning], [c, s]);
+        compiler_fence(Ordering::AcqRel);
+        *z = lz.on_arc(*z, [rate, rate2, turning], [c, s]);
+    }
+
+    /// Adds the linear terms of the rise of a helix that has risen so far (nm) and rises at a rate W (Q31) that changes with
+    /// w⁴ (Q31), nm.
+    #[inline(never)]
+    pub(crate) fn add_rise(
+        &self,
+        risen: &[i32; 3],
+        rate: i32,
+        turning: i32,
+        wanted: &mut [i32; 3],
+    ) {
+        for (w, rising) in wanted.iter_mut().zip(&self.rising) {
+            *w = w.wrapping_add(rising.offset(*risen, rate, turning));
         }
-        if self.bowed {
-            let ([ax, ay, az], [bx, by, bz]) = (arm(), &self.bow);
-            for (arm, [x, y, z]) in [(ax, bx), (ay, by), (az, bz)] {
-                let square = mulh(arm, arm).wrapping_mul(2);
-                let [ox, oy, oz] = offset;
-                offset = [
-                    mulh_add(ox, square, *x),
-                    mulh_add(oy, square, *y),
-                    mulh_add(oz, square, *z),
-                ];
-            }
+    }
+
+    /// Adds periodic errors at a position, nm.
+    #[inline(never)]
+    pub(crate) fn add_periodic(&self, sincos: [i32; 2], place: &[i32; 3], wanted: &mut [i32; 3]) {
+        let used = self.cyclic.get(..usize::from(self.periodic));
+        for cyclic in used.unwrap_or_default() {
+            cyclic.add(sincos, place, wanted);
         }
-        offset
+    }
+
+    /// Adds the bow at a distance from the centre, nm.
+    #[inline(never)]
+    pub(crate) fn add_bow(&self, arm: &[i32; 3], wanted: &mut [i32; 3]) {
+        for (arm, [x, y, z]) in arm.iter().zip(&self.bow) {
+            let square = mulh(*arm, *arm).wrapping_mul(2);
+            let [ox, oy, oz] = *wanted;
+            *wanted = [
+                mulh_add(ox, square, *x),
+                mulh_add(oy, square, *y),
+                mulh_add(oz, square, *z),
+            ];
+        }
     }
 }
 
 impl Cyclic {
     #[inline(always)]
-    fn add(&self, sincos: &[i32; 2], place: [i32; 3], offset: &mut [i32; 3]) {
+    fn add(&self, sincos: [i32; 2], place: &[i32; 3], offset: &mut [i32; 3]) {
         if let (Some(at), Some(offset)) = (place.get(self.slide), offset.get_mut(self.slide)) {
             let whole = at.wrapping_mul(self.per_nm).wrapping_add(self.phase as i32);
             let phase = mulh_add(whole, *at, self.rest_q32);
-            let (_, sine) = sincos_with(*sincos, phase as u32);
+            let (_, sine) = sincos_with(sincos, phase as u32);
             *offset = mulh_add(*offset, self.amplitude, sine);
         }
     }
@@ -170,20 +209,20 @@ impl Linear {
     /// On an arc at constant rate, nm·2: there they cost the tick nothing.
     pub(crate) fn steady(&self) -> (i32, i32) {
         let ([a0, a1, a2, _], [b0, b1, b2, _]) = (self.a, self.b);
-        (
-            a0.wrapping_add(a1).wrapping_add(a2),
-            b0.wrapping_add(b1).wrapping_add(b2),
-        )
+        let whole = |k0: i32, k1: i32, k2: i32| k0.wrapping_add(k1.wrapping_add(k2) >> 1);
+        (whole(a0, a1, a2), whole(b0, b1, b2))
     }
 
-    /// Offset on an arc in a ramp (`rate` and `rate2` are W and W² in Q31, `turning` w⁴ in Q31 with the sign of the ramp), nm.
+    /// Offset so far and that on an arc in a ramp, nm; by W, W² and w⁴ in Q31.
     #[inline(always)]
-    pub(crate) fn on_arc(&self, rate: i32, rate2: i32, turning: i32, c: i32, s: i32) -> i32 {
-        let ([a0, a1, a2, a3], [b0, b1, b2, b3]) = (self.a, self.b);
-        let a = mulh_add(mulh_add(mulh(a1, rate), a2, rate2), a3, turning);
-        let b = mulh_add(mulh_add(mulh(b1, rate), b2, rate2), b3, turning);
-        let (a, b) = (a.wrapping_mul(2), b.wrapping_mul(2));
-        mulh_add(mulh(a0.wrapping_add(a), c), b0.wrapping_add(b), s)
+    fn on_arc(&self, so_far: i32, [rate, rate2, turning]: [i32; 3], [c, s]: [i32; 2]) -> i32 {
+        let [a0, a1, a2, a3] = self.a;
+        let a = mulh_add(mulh_add(mulh_add(a0, a1, rate), a2, rate2), a3, turning);
+        let so_far = mulh_add(so_far, a, c);
+        compiler_fence(Ordering::AcqRel);
+        let [b0, b1, b2, b3] = self.b;
+        let b = mulh_add(mulh_add(mulh_add(b0, b1, rate), b2, rate2), b3, turning);
+        mulh_add(so_far, b, s)
     }
 
     /// Offset on a line, nm, without the constant.
@@ -198,8 +237,8 @@ impl Linear {
 }
 
 impl Rising {
-    /// Offset, nm, when a helix has risen so far (nm) and rises at a rate W (Q31) that changes with w⁴ (Q31).
-    pub(crate) fn offset(&self, [x, y, z]: [i32; 3], rate: i32, turning: i32) -> i32 {
+    #[inline(always)]
+    fn offset(&self, [x, y, z]: [i32; 3], rate: i32, turning: i32) -> i32 {
         let [px, py, pz] = self.place_q34;
         let place = mulh_add(mulh_add(mulh(px, x), py, y), pz, z) >> 2;
         mulh_add(mulh_add(place, self.rate, rate), self.change, turning)

@@ -227,9 +227,8 @@ pub fn ensure_with(
         target.push(features.join("-"));
     }
     let path = below(&target, board);
-    let sources = ["firmware", "shared"].map(|room| workspace().join(room));
     let built = modified(&path);
-    let newest = sources.iter().filter_map(|room| newest_below(room)).max();
+    let newest = newest_source(&workspace());
     if built.is_some() && newest.is_none_or(|newest| built >= Some(newest)) {
         return Ok(path);
     }
@@ -264,7 +263,19 @@ pub fn ensure_with(
                 .to_owned(),
         ));
     }
+    // Cargo leaves an image alone that nothing in a newer file has changed: without this it would be asked every time.
+    let touched = std::fs::File::options().write(true).open(&path);
+    let touched = touched.and_then(|image| image.set_modified(SystemTime::now()));
+    touched.map_err(|error| no_image(format!("its time cannot be set: {error}")))?;
     Ok(path)
+}
+
+/// When the newest source of an image was changed: its rooms, and what says how they are built and from what.
+fn newest_source(workspace: &Path) -> Option<SystemTime> {
+    let rooms = ["firmware", "shared"].map(|room| newest_below(&workspace.join(room)));
+    let settings = ["Cargo.toml", "Cargo.lock", ".cargo/config.toml"]
+        .map(|file| modified(&workspace.join(file)));
+    rooms.into_iter().chain(settings).flatten().max()
 }
 
 fn modified(path: &Path) -> Option<SystemTime> {
@@ -283,4 +294,39 @@ fn newest_below(folder: &Path) -> Option<SystemTime> {
         }
     });
     times.max()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs::{File, create_dir_all};
+    use std::time::Duration;
+
+    /// Each of them alone being newer makes the image older than its sources: profiles and versions are in the workspace's files.
+    #[test]
+    fn settings_of_the_workspace_are_sources_of_an_image() {
+        let folder = tempfile::tempdir().unwrap();
+        let sources = [
+            "firmware/src/lib.rs",
+            "shared/src/lib.rs",
+            "Cargo.toml",
+            "Cargo.lock",
+            ".cargo/config.toml",
+        ];
+        let old = SystemTime::UNIX_EPOCH + Duration::from_secs(1_000_000);
+        let make = |name: &str, time: SystemTime| {
+            let path = folder.path().join(name);
+            create_dir_all(path.parent().unwrap()).unwrap();
+            File::create(path).unwrap().set_modified(time).unwrap();
+        };
+        for name in sources {
+            make(name, old);
+        }
+        assert_eq!(newest_source(folder.path()), Some(old));
+        for (name, hours) in sources.into_iter().zip(1..) {
+            let new = old + Duration::from_secs(3600 * hours);
+            make(name, new);
+            assert_eq!(newest_source(folder.path()), Some(new), "{name}");
+        }
+    }
 }

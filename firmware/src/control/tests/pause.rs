@@ -153,3 +153,31 @@ fn an_override_scales_the_feed_and_never_beyond_the_machine() {
         );
     }
 }
+
+/// A late tick while a held path is still on its way to rest, with more behind it: that it is held does not hide the fault.
+#[test]
+fn a_fault_in_a_feed_hold_is_a_fault() {
+    let mut bench = bench();
+    let mut at = [0; 3];
+    bench.desk.begin().unwrap();
+    append(&mut bench, &mut at, line([0.05, 0.0, 0.0]));
+    append(&mut bench, &mut at, line([0.0; 3]));
+    bench.ticks(300);
+    bench.desk.pause(true).unwrap();
+    bench.ticks(1);
+    let output = bench.tick.tick(true);
+    bench.path.push(output.nominal_nm);
+    bench.ticks(1500);
+    let now = bench.now();
+    assert_eq!((now.state, now.fault.is_some()), (MotionState::Fault, true));
+    // What waited is of the program that the fault ended.
+    bench.desk.clear_fault().unwrap();
+    bench.ticks(5);
+    let stood = bench.now().raw_nm;
+    let _ = bench.desk.pause(false);
+    bench.ticks(500);
+    assert_eq!(
+        (bench.now().state, bench.now().raw_nm),
+        (MotionState::Idle, stood)
+    );
+}

@@ -396,3 +396,81 @@ fn a_stream_keeps_room_to_stop_within_the_coordinates() {
         assert!(roughest(&bench) < 5.1, "{}", roughest(&bench));
     }
 }
+
+/// Sends a path from near the end of the coordinates until it is refused or over, and lets it starve; what it was told last.
+fn until_refused(
+    start: [i32; 3],
+    place: &dyn Fn(usize) -> [i32; 3],
+) -> (Bench, Option<MotionRefusal>) {
+    let mut bench = bench();
+    bench.desk.declare(start).unwrap();
+    bench.ticks(1);
+    bench.path.clear();
+    bench.desk.begin_stream(1.0, 20).unwrap();
+    let (mut steps, mut refused) = (Steps::from(start), None);
+    for n in 0..1500 {
+        let mut chunk = Chunk::new();
+        assert!(steps.write(place(n), &mut chunk));
+        loop {
+            match bench.desk.points(&chunk) {
+                Ok(()) => break,
+                Err(MotionRefusal::QueueFull) => bench.ticks(1),
+                Err(other) => {
+                    refused = Some(other);
+                    break;
+                }
+            }
+        }
+        if refused.is_some() {
+            break;
+        }
+    }
+    bench.until_at_rest();
+    (bench, refused)
+}
+
+/// A path that still gains speed when it is refused, or that turns outward there: carried on and braked it is faster and goes
+/// farther than its last velocity says. Never held at the end.
+#[test]
+fn room_to_stop_counts_what_speed_and_curvature_add() {
+    let near = |ahead_mm: i32| [2_100_000_000 - ahead_mm * 1_000_000, 0, 0];
+    for ahead_mm in [60, 80, 100, 120, 150] {
+        let start = near(ahead_mm);
+        // With 2.5 m/s² to 0.9 m/s.
+        let faster = |n: usize| {
+            let t = n as f64 * 1e-3;
+            let rising = t.min(0.36);
+            let way = 1.25 * rising * rising + 0.9 * (t - rising);
+            [start[0] + (way * 1e9).round() as i32, 0, 0]
+        };
+        let (bench, refused) = until_refused(start, &faster);
+        assert_eq!(refused, Some(MotionRefusal::NoRoomToStop), "{ahead_mm}");
+        assert!(roughest(&bench) < 5.15, "{ahead_mm}: {}", roughest(&bench));
+    }
+    for radius_mm in [60, 100, 150, 200] {
+        let radius = f64::from(radius_mm) * 1e-3;
+        let start = near(124);
+        // From where it goes along Y, or inward, it turns outward; centripetal acceleration 4 m/s².
+        for from in [0.0f64, -0.7] {
+            let rate = (4.0 / radius).sqrt().min(0.95 / radius);
+            let turned = |n: usize| {
+                let t = n as f64 * 1e-3;
+                let angle =
+                    rate * (0.8 * smoothstep((t / 0.8).min(1.0)).integral + (t - 0.8).max(0.0));
+                let at = |angle: f64| [radius * (1.0 - angle.cos()), radius * angle.sin()];
+                let ([x, y], [x0, y0]) = (at(angle + from), at(from));
+                let nm = |m: f64| (m * 1e9).round() as i32;
+                [start[0] + nm(x - x0), nm(y - y0), 0]
+            };
+            let (bench, refused) = until_refused(start, &turned);
+            if radius_mm > 100 {
+                assert_eq!(refused, Some(MotionRefusal::NoRoomToStop), "{radius_mm}");
+            }
+            assert!(
+                roughest(&bench) < 5.3,
+                "{radius_mm} {from}: {}",
+                roughest(&bench)
+            );
+        }
+    }
+}

@@ -8,7 +8,6 @@ use crate::engine::ramp::shapes;
 use crate::engine::{Output, flag};
 use core::sync::atomic::{Ordering, compiler_fence};
 use giotto_shared::angle::sincos_with;
-use giotto_shared::fixed::mulh;
 
 impl Executor {
     #[inline(always)]
@@ -23,7 +22,8 @@ impl Executor {
         let [x, y, z] = &self.segment.axes;
         let wanted = [x.steady(c, s), y.steady(c, s), z.steady(c, s)];
         if TERMS {
-            return self.term_out(c, s, wanted, flag::MOVING | flag::CRUISE);
+            let mut wanted = wanted;
+            return self.term_out(c, s, &mut wanted, flag::MOVING | flag::CRUISE);
         }
         self.arc_out(c, s, wanted, flag::MOVING | flag::CRUISE)
     }
@@ -64,15 +64,9 @@ impl Executor {
             } else {
                 shape.w4_q31
             };
-            let rate2 = mulh(shape.s_q31, shape.s_q31).wrapping_mul(2);
-            let [wx, wy, wz] = wanted;
-            let [lx, ly, lz] = &self.segment.extra.linear;
-            wanted = [
-                wx.wrapping_add(lx.on_arc(shape.s_q31, rate2, turning, c, s)),
-                wy.wrapping_add(ly.on_arc(shape.s_q31, rate2, turning, c, s)),
-                wz.wrapping_add(lz.on_arc(shape.s_q31, rate2, turning, c, s)),
-            ];
-            return self.term_out(c, s, wanted, flag::MOVING);
+            let extra = &self.segment.extra;
+            extra.add_linear(shape.s_q31, turning, [c, s], &mut wanted);
+            return self.term_out(c, s, &mut wanted, flag::MOVING);
         }
         self.arc_out(c, s, wanted, flag::MOVING)
     }
@@ -101,20 +95,24 @@ impl Executor {
     }
 
     /// Adds the profile terms that are not linear.
-    #[inline(always)]
-    fn term_out(&mut self, c: i32, s: i32, [wx, wy, wz]: [i32; 3], flags: u16) -> Output {
-        let [sx, sy, sz] = self.sides.tick(&self.segment.extra, c, s);
-        let wanted = [
-            wx.wrapping_add(sx),
-            wy.wrapping_add(sy),
-            wz.wrapping_add(sz),
-        ];
+    #[inline(never)]
+    fn term_out(&mut self, c: i32, s: i32, wanted: &mut [i32; 3], flags: u16) -> Output {
+        self.sides.add(&self.segment.extra, c, s, wanted);
         let nominal = self.on_arc(c, s);
+        self.by_place(&nominal, c, s, wanted);
+        self.out(nominal, *wanted, flags)
+    }
+
+    /// Adds the profile terms that go by the place on an arc.
+    #[inline(always)]
+    pub(super) fn by_place(&self, nominal: &[i32; 3], c: i32, s: i32, wanted: &mut [i32; 3]) {
         let extra = &self.segment.extra;
-        let [x, y, z] = &self.segment.axes;
-        let arm = || [x.turned(c, s), y.turned(c, s), z.turned(c, s)];
-        let wanted = extra.by_place(&self.sincos, nominal, arm, wanted);
-        self.out(nominal, wanted, flags)
+        extra.add_periodic(self.sincos, nominal, wanted);
+        if extra.bowed {
+            let [x, y, z] = &self.segment.axes;
+            let arm = [x.turned(c, s), y.turned(c, s), z.turned(c, s)];
+            extra.add_bow(&arm, wanted);
+        }
     }
 
     /// The last tick: at its end exactly.

@@ -13,15 +13,16 @@ impl Executor {
         self.advance(self.segment.timing.step);
         let phase_q32 = (self.phase >> 32) as u32;
         let (c, s) = self.weights(phase_q32);
-        let nominal = self.place(c, s, phase_q32);
         let [x, y, z] = &self.segment.axes;
         let mut wanted = match self.segment.kind {
             Kind::Arc | Kind::Helix => [x.steady(c, s), y.steady(c, s), z.steady(c, s)],
             Kind::Line | Kind::Dwell | Kind::Clear => [0; 3],
         };
+        let risen = self.risen(phase_q32);
+        let nominal = self.place([c, s], phase_q32, &risen);
         if self.segment.extended {
-            wanted = self.with_way(c, s, nominal, i32::MAX, 0, wanted);
-            wanted = self.with_terms(c, s, nominal, wanted);
+            self.add_way(c, &risen, [i32::MAX, 0], &mut wanted);
+            self.add_terms(c, s, &nominal, &mut wanted);
         }
         self.left = self.left.wrapping_sub(1);
         if self.left == 0 {
@@ -30,73 +31,26 @@ impl Executor {
         self.out(nominal, wanted, flag::MOVING | flag::CRUISE)
     }
 
-    /// Adds the profile terms that are not linear.
+    /// Adds the profile terms that are not linear. On a line there is no bow.
     #[inline(always)]
-    fn with_terms(&mut self, c: i32, s: i32, nominal: [i32; 3], wanted: [i32; 3]) -> [i32; 3] {
-        let extra = &self.segment.extra;
-        let offset = sum(wanted, self.sides.tick(extra, c, s));
-        extra.by_place(&self.sincos, nominal, || self.arm(c, s), offset)
-    }
-
-    /// Distance from the centre of an arc, nm.
-    #[inline(always)]
-    fn arm(&self, c: i32, s: i32) -> [i32; 3] {
-        let [x, y, z] = &self.segment.axes;
-        match self.segment.kind {
-            Kind::Arc | Kind::Helix => [x.turned(c, s), y.turned(c, s), z.turned(c, s)],
-            Kind::Line | Kind::Dwell | Kind::Clear => [0; 3],
-        }
+    fn add_terms(&mut self, c: i32, s: i32, nominal: &[i32; 3], wanted: &mut [i32; 3]) {
+        self.sides.add(&self.segment.extra, c, s, wanted);
+        self.by_place(nominal, c, s, wanted);
     }
 
     /// Adds the linear profile terms of a line, or those of the rise of a helix.
     #[inline(always)]
-    fn with_way(
-        &self,
-        c: i32,
-        s: i32,
-        nominal: [i32; 3],
-        rate: i32,
-        turning: i32,
-        wanted: [i32; 3],
-    ) -> [i32; 3] {
+    fn add_way(&self, c: i32, risen: &[i32; 3], [rate, turning]: [i32; 2], wanted: &mut [i32; 3]) {
+        let extra = &self.segment.extra;
         match self.segment.kind {
             Kind::Line => {
-                let [x, y, z] = &self.segment.extra.linear;
-                let along = [
-                    x.on_line(c, rate, turning),
-                    y.on_line(c, rate, turning),
-                    z.on_line(c, rate, turning),
-                ];
-                sum(wanted, along)
+                for (w, linear) in wanted.iter_mut().zip(&extra.linear) {
+                    *w = w.wrapping_add(linear.on_line(c, rate, turning));
+                }
             }
-            Kind::Helix => self.with_rise(c, s, nominal, rate, turning, wanted),
-            Kind::Arc | Kind::Dwell | Kind::Clear => wanted,
+            Kind::Helix => extra.add_rise(risen, rate, turning, wanted),
+            Kind::Arc | Kind::Dwell | Kind::Clear => {}
         }
-    }
-
-    #[inline(never)]
-    fn with_rise(
-        &self,
-        c: i32,
-        s: i32,
-        [nx, ny, nz]: [i32; 3],
-        rate: i32,
-        turning: i32,
-        wanted: [i32; 3],
-    ) -> [i32; 3] {
-        let [x, y, z] = &self.segment.axes;
-        let risen = [
-            nx.wrapping_sub(x.on_arc(c, s)),
-            ny.wrapping_sub(y.on_arc(c, s)),
-            nz.wrapping_sub(z.on_arc(c, s)),
-        ];
-        let [x, y, z] = &self.segment.extra.rising;
-        let offset = [
-            x.offset(risen, rate, turning),
-            y.offset(risen, rate, turning),
-            z.offset(risen, rate, turning),
-        ];
-        sum(wanted, offset)
     }
 
     #[inline(never)]
@@ -144,44 +98,41 @@ impl Executor {
             &self.segment.rise
         };
         let phase_q32 = ramp_phase(self.phase, step, law.end_term(shape));
-        let (c, s) = self.weights(phase_q32);
-        let nominal = self.place(c, s, phase_q32);
-        let [x, y, z] = &self.segment.axes;
-        let mut wanted = if self.segment.kind == Kind::Line {
+        let (c, s, mut wanted);
+        if self.segment.kind == Kind::Line {
             let along = law.along(shape);
-            [mulh(x.v, along), mulh(y.v, along), mulh(z.v, along)]
+            (c, s) = self.weights(phase_q32);
+            let [x, y, z] = &self.segment.axes;
+            wanted = [mulh(x.v, along), mulh(y.v, along), mulh(z.v, along)];
         } else {
             let (radial, tangential) = law.gain(shape);
+            (c, s) = sincos_with(self.sincos, phase_q32);
             let (re, im) = turn(radial, tangential, c, s);
-            [x.turned(re, im), y.turned(re, im), z.turned(re, im)]
-        };
+            let [x, y, z] = &self.segment.axes;
+            wanted = [x.turned(re, im), y.turned(re, im), z.turned(re, im)];
+        }
+        let risen = self.risen(phase_q32);
+        let nominal = self.place([c, s], phase_q32, &risen);
         if self.segment.extended {
             let turning = if falling {
                 shape.w4_q31.wrapping_neg()
             } else {
                 shape.w4_q31
             };
-            wanted = self.with_linear(c, s, shape.s_q31, turning, wanted);
-            wanted = self.with_way(c, s, nominal, shape.s_q31, turning, wanted);
-            wanted = self.with_terms(c, s, nominal, wanted);
+            self.add_linear(c, s, shape.s_q31, turning, &mut wanted);
+            self.add_way(c, &risen, [shape.s_q31, turning], &mut wanted);
+            self.add_terms(c, s, &nominal, &mut wanted);
         }
         self.out(nominal, wanted, flag::MOVING)
     }
 
     /// Adds the linear profile terms of an arc.
     #[inline(always)]
-    fn with_linear(&self, c: i32, s: i32, rate: i32, turning: i32, wanted: [i32; 3]) -> [i32; 3] {
-        if !matches!(self.segment.kind, Kind::Arc | Kind::Helix) {
-            return wanted;
+    fn add_linear(&self, c: i32, s: i32, rate: i32, turning: i32, wanted: &mut [i32; 3]) {
+        if matches!(self.segment.kind, Kind::Arc | Kind::Helix) {
+            let extra = &self.segment.extra;
+            extra.add_linear(rate, turning, [c, s], wanted);
         }
-        let rate2 = mulh(rate, rate).wrapping_mul(2);
-        let [x, y, z] = &self.segment.extra.linear;
-        let slides = [
-            x.on_arc(rate, rate2, turning, c, s),
-            y.on_arc(rate, rate2, turning, c, s),
-            z.on_arc(rate, rate2, turning, c, s),
-        ];
-        sum(wanted, slides)
     }
 
     /// Weights of a curve's two vectors, Q31: cosine and sine, or the share of a line.
@@ -196,25 +147,30 @@ impl Executor {
         }
     }
 
-    /// Position, nm.
+    /// Position at these weights and this phase, where the curve has risen so far, nm.
     #[inline(always)]
-    pub(super) fn place(&self, c: i32, s: i32, phase_q32: u32) -> [i32; 3] {
-        let [x, y, z] = &self.segment.axes;
+    pub(super) fn place(&self, [c, s]: [i32; 2], phase_q32: u32, risen: &[i32; 3]) -> [i32; 3] {
+        let ([x, y, z], [rx, ry, rz]) = (&self.segment.axes, risen);
         match self.segment.kind {
             Kind::Dwell | Kind::Clear => self.rest_nm,
             Kind::Line => {
                 let share = phase_q32 as i32;
                 [x.on_line(share), y.on_line(share), z.on_line(share)]
             }
-            Kind::Arc => [x.on_arc(c, s), y.on_arc(c, s), z.on_arc(c, s)],
-            Kind::Helix => {
-                self.on_helix([x.on_arc(c, s), y.on_arc(c, s), z.on_arc(c, s)], phase_q32)
-            }
+            Kind::Arc | Kind::Helix => [
+                x.on_arc(c, s).wrapping_add(*rx),
+                y.on_arc(c, s).wrapping_add(*ry),
+                z.on_arc(c, s).wrapping_add(*rz),
+            ],
         }
     }
 
-    #[inline(never)]
-    fn on_helix(&self, flat: [i32; 3], phase_q32: u32) -> [i32; 3] {
+    /// How far a helix has risen at a phase, nm: it is an arc of a program, which begins at phase 0.
+    #[inline(always)]
+    pub(super) fn risen(&self, phase_q32: u32) -> [i32; 3] {
+        if self.segment.kind != Kind::Helix {
+            return [0; 3];
+        }
         // In a ramp the sum of steps is a little ahead of the phase, at its very end a little behind: the one may have
         // passed a whole turn and the other not.
         let sum_q32 = (self.phase >> 32) as u32;
@@ -225,13 +181,7 @@ impl Executor {
             .turns
             .wrapping_add(i32::from(late))
             .wrapping_sub(i32::from(early));
-        let [x, y, z] = self.segment.risen(turns, phase_q32);
-        let [bx, by, bz] = self
-            .segment
-            .risen(0, (self.segment.timing.start >> 32) as u32);
-        let [fx, fy, fz] = flat;
-        let add = |f: i32, r: i32, b: i32| f.wrapping_add(r).wrapping_sub(b);
-        [add(fx, x, bx), add(fy, y, by), add(fz, z, bz)]
+        self.segment.risen(turns, phase_q32)
     }
 
     /// Offset wanted, nm, standing at these weights.
@@ -239,15 +189,18 @@ impl Executor {
         if !self.segment.extended {
             return [0; 3];
         }
-        let sides = self.sides.standing();
-        let extra = &self.segment.extra;
-        let offset = extra.by_place(&self.sincos, self.rest_nm, || self.arm(c, s), sides);
-        let offset = self.with_linear(c, s, 0, 0, offset);
-        self.with_way(c, s, self.rest_nm, 0, 0, offset)
+        let mut offset = self.sides.standing();
+        let rest = self.rest_nm;
+        self.by_place(&rest, c, s, &mut offset);
+        self.add_linear(c, s, 0, 0, &mut offset);
+        // Before a segment begins the phase is still that of the last one: a helix has risen to where it stands.
+        let ([x, y, z], [nx, ny, nz]) = (&self.segment.axes, rest);
+        let risen = [
+            nx.wrapping_sub(x.on_arc(c, s)),
+            ny.wrapping_sub(y.on_arc(c, s)),
+            nz.wrapping_sub(z.on_arc(c, s)),
+        ];
+        self.add_way(c, &risen, [0; 2], &mut offset);
+        offset
     }
-}
-
-#[inline(always)]
-fn sum([a, b, c]: [i32; 3], [x, y, z]: [i32; 3]) -> [i32; 3] {
-    [a.wrapping_add(x), b.wrapping_add(y), c.wrapping_add(z)]
 }

@@ -1,7 +1,7 @@
 //! Profile terms: from the numbers of a zone to those of the tick, and how much they ask for.
 use super::numbers::{dot, length};
 use super::timing::Motion;
-use crate::engine::hysteresis::FINE;
+use crate::engine::hysteresis::{FINE, limit};
 use crate::engine::profile_terms::{Cyclic, Extra, Linear, Rising, Turning};
 use crate::engine::ramp::FIRST;
 use core::f32::consts::TAU;
@@ -12,6 +12,10 @@ use giotto_shared::law::{CyclicError, Profile};
 
 fn nm2(metres: f32) -> i32 {
     single_to_fixed(metres * 1e9, 1)
+}
+
+fn nm4(metres: f32) -> i32 {
+    single_to_fixed(metres * 1e9, 2)
 }
 
 fn fine(metres: f32) -> i32 {
@@ -62,19 +66,17 @@ pub(super) fn on_arc(p: &Profile<f32>, m: &Motion, curve: &Curve, extra: &mut Ex
         let (along, changing) = (velocity * pace.rate, second * pace.change);
         extra.linear[slide] = Linear {
             a: [
-                outward * u_k - dot(row, *u),
-                -along * v_k,
-                square * u_k,
-                -changing * v_k,
-            ]
-            .map(nm2),
+                nm2(outward * u_k - dot(row, *u)),
+                nm4(-along * v_k),
+                nm4(square * u_k),
+                nm4(-changing * v_k),
+            ],
             b: [
-                outward * v_k - dot(row, *v),
-                along * u_k,
-                square * v_k,
-                changing * u_k,
-            ]
-            .map(nm2),
+                nm2(outward * v_k - dot(row, *v)),
+                nm4(along * u_k),
+                nm4(square * v_k),
+                nm4(changing * u_k),
+            ],
         };
         // Radians of the arc's rate to turns of the rise's.
         let per_radian = rise[slide] / TAU;
@@ -96,6 +98,7 @@ pub(super) fn on_arc(p: &Profile<f32>, m: &Motion, curve: &Curve, extra: &mut Ex
         .bow_per_m
         .map(|row| row.map(|c| single_to_fixed(-c * PER_NM, 31)));
     extra.bowed = extra.bow != [[0; 3]; 3];
+    turns(extra);
 }
 
 /// For a line with a span (m), its start seen from the reference point (m); `None`: there is none, and errors of position
@@ -126,6 +129,7 @@ pub(super) fn on_line(
         // It never turns.
         extra.ahead[slide] = [0, 0, single_to_fixed(along * 1e9, 0)];
     }
+    turns(extra);
 }
 
 /// The terms that are the same on every curve.
@@ -135,7 +139,7 @@ fn unsteady(p: &Profile<f32>, m: &Motion, extra: &mut Extra) {
     let share = 3.75 / ticks;
     *extra = Extra::default();
     extra.turning = Turning {
-        ticks: m.take_up_ticks,
+        take_up: m.take_up_ticks.saturating_add(1),
         dx: single_to_fixed(2.0 / ticks, 31),
         first_x: single_to_fixed(1.0 / ticks - 1.0, 31),
         share_q30: single_to_fixed(share, 30),
@@ -149,13 +153,24 @@ fn unsteady(p: &Profile<f32>, m: &Motion, extra: &mut Extra) {
                 single_to_fixed(decay(m.tick_s / spike.decay_s), 32)
             }
         }),
+        ..Turning::default()
     };
     let cyclic = p.cyclic.iter().filter(|c| c.amplitude_m != 0.0);
     for (built, c) in extra.cyclic.iter_mut().zip(cyclic) {
         *built = periodic(c);
         extra.periodic = extra.periodic.wrapping_add(1);
     }
-    extra.sided = p.play_m != [[0.0; 3]; 3] || extra.turning.spike != [0; 3];
+}
+
+/// Once the indicators of the curve are there: which of them are looked at, and what their turns take.
+fn turns(extra: &mut Extra) {
+    let t = &mut extra.turning;
+    let sided = t.side != [[0; 3]; 3] || t.spike != [0; 3];
+    for slide in 0..3 {
+        let idle = t.side[slide] == [0; 3] && t.spike[slide] == 0;
+        t.ticks[slide] = if idle { 0 } else { t.take_up };
+        t.limit[slide] = limit(extra.ahead[slide], sided);
+    }
 }
 
 /// A periodic error. Over a metre of a fine pitch single precision would lose its phase: this divides integers.

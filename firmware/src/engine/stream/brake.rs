@@ -4,6 +4,8 @@
 //! The speed falls in three pieces: the acceleration turns to that of braking at the limit of jerk, stays there, and returns
 //! to none so that it reaches it with the speed. Numbers are single precision, per tick: increments of a path, never places.
 
+use core::f32::consts::PI;
+
 /// Velocity below which there is nothing to brake, nm per tick.
 const SLOWEST: f32 = 2.0;
 /// Below this the curvature is rounding, nm per tick: the brake is some micrometres long, and straight.
@@ -199,13 +201,50 @@ impl Brake {
     }
 }
 
-/// Farthest that a brake from a velocity and its change leads on one axis, nm; `speed` is that along the path. All per tick.
-pub(crate) fn farthest_nm(limits: [f32; 2], speed: f32, velocity: f32, change: f32) -> f32 {
-    let [acceleration, jerk] = limits;
+/// Farthest that a brake leads outward, nm, from a velocity and its change; `outward` is a unit vector. All per tick.
+///
+/// At most: an acceleration is taken back at the limit of jerk, while the speed still grows; then the path goes on along the
+/// curvature that velocity and change have, which leaves less for braking and may turn outward what was not.
+pub(crate) fn farthest_nm(
+    [acceleration, jerk]: [f32; 2],
+    velocity: [f32; 3],
+    change: [f32; 3],
+    outward: [f32; 3],
+) -> f32 {
+    let speed = libm::sqrtf(dot(velocity, velocity));
+    if speed < SLOWEST {
+        return 0.0;
+    }
+    let along = combined(velocity, 1.0 / speed, velocity, 0.0);
+    let growth = dot(change, along);
+    let across = combined(change, 1.0, along, -growth);
     // Not `clamp`: it panics at a limit that is no number.
-    let (velocity, change) = (velocity.abs(), change.max(0.0).min(acceleration));
-    // While the acceleration is taken back the speed still grows.
-    let gained = velocity + 0.5 * change * change / jerk;
-    let growing = change / jerk * (velocity + change * change / (3.0 * jerk));
-    growing + gained * (0.5 * speed / acceleration + 0.5 * acceleration / jerk)
+    let growth = growth.max(0.0).min(acceleration);
+    let bend = libm::sqrtf(dot(across, across));
+    let centripetal = bend.min(acceleration);
+    let left = acceleration * acceleration - centripetal * centripetal;
+    let most = libm::sqrtf(left.max(0.0)).max(LEAST_SHARE * acceleration);
+    let top = speed + 0.5 * growth * growth / jerk;
+    let growing = growth / jerk * (speed + growth * growth / (3.0 * jerk));
+    let length = growing + 0.5 * top * (top / most + most / jerk);
+    let curvature = centripetal / (speed * speed);
+    // Outward share of where it goes and of where it turns to.
+    let u = dot(along, outward);
+    let n = if bend > 0.0 {
+        dot(across, outward) / bend
+    } else {
+        0.0
+    };
+    let angle = curvature * length;
+    if angle < 1e-3 {
+        return length * (u + 0.5 * n * angle).max(0.0);
+    }
+    if angle > PI {
+        return (n + libm::sqrtf(u * u + n * n)) / curvature;
+    }
+    // (u sin + n (1 − cos))/κ has its largest where it goes square to outward, or at the end.
+    let square = libm::atan2f(u, -n);
+    let end = if u > 0.0 { square.min(angle) } else { angle };
+    let turned = u * libm::sinf(end) + n * (1.0 - libm::cosf(end));
+    turned.max(0.0) / curvature
 }
