@@ -171,6 +171,9 @@ impl ModelFile {
             Some(found) if !matches!(found.parse(), Ok(FLAT_FORMAT | FORMAT)) => {
                 return Err(text.format_error(found, FORMAT));
             }
+            None if text.top("servo").is_none() => {
+                return Err(text.missed(&[], "this is no model", EXPECTED));
+            }
             Some(_) | None => {}
         }
         let written: Written = text.parse()?;
@@ -450,8 +453,7 @@ phase_rad = 0.5
         );
         assert!(refuse("kind = \"beta\"", "kind = \"magic\"").contains("magic"));
         assert!(
-            refuse("machine = \"ABB\"", "machin = \"ABB\"")
-                .starts_with("M.toml:3:1: unknown field")
+            refuse("machine = \"ABB\"", "machin = \"ABB\"").starts_with("M.toml:3:1: unknown key")
         );
         assert!(refuse("machine = \"ABB\"", "machine = \"ABB").starts_with("M.toml:3:"));
         assert!(
