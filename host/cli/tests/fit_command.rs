@@ -298,7 +298,7 @@ fn what_is_wrong_is_said_with_the_right_code() {
         (
             vec!["fit", "campaign", "--train-radius", "120"],
             2,
-            "has [100.0, 150.0, 300.0] mm",
+            "has 100, 150, 300 mm",
         ),
         (
             vec!["fit", "campaign", "--alpha", "1.5"],
