@@ -171,6 +171,9 @@ impl ModelFile {
             Some(found) if !matches!(found.parse(), Ok(FLAT_FORMAT | FORMAT)) => {
                 return Err(text.format_error(found, FORMAT));
             }
+            None if text.top("servo").is_none() => {
+                return Err(text.missed(&[], "this is no model", EXPECTED));
+            }
             Some(_) | None => {}
         }
         let written: Written = text.parse()?;
@@ -248,7 +251,7 @@ impl ModelFile {
                 .find(|actuator| !actuator.is_slide() && !joints.contains(actuator))?;
             let path = ["effect", &index.to_string(), "axis"].map(ToString::to_string);
             let expected = match joints.last() {
-                None => "a model with `[kinematics]`, or an axis x, y, z".to_owned(),
+                None => "a model with [kinematics], or an axis x, y, z".to_owned(),
                 Some(last) => format!("a joint up to {last}"),
             };
             Some((path.to_vec(), missing.name(), expected))

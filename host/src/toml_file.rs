@@ -73,6 +73,33 @@ impl TomlFileError {
     }
 }
 
+/// What the reader of TOML says, in words for who wrote the file: kinds of values, not types of a program.
+fn in_words(message: &str) -> String {
+    const KINDS: [(&str, &str); 12] = [
+        ("invalid type: string ", "found the text "),
+        ("invalid type: integer ", "found the number "),
+        ("invalid type: floating point ", "found the number "),
+        ("invalid type: boolean ", "found "),
+        ("invalid type: sequence", "found a list"),
+        ("invalid type: map", "found a table"),
+        ("expected a sequence", "expected a list"),
+        ("expected a map", "expected a table"),
+        ("expected a string", "expected a text"),
+        ("expected f64", "expected a number"),
+        ("unknown field ", "unknown key "),
+        ("missing field ", "there is no key "),
+    ];
+    let mut words = message.to_owned();
+    for (of_the_reader, plain) in KINDS {
+        words = words.replace(of_the_reader, plain);
+    }
+    // The rest of it names types of the program.
+    match words.split_once("expected struct ") {
+        Some((before, _)) => format!("{before}expected a table"),
+        None => words,
+    }
+}
+
 /// The text of a TOML file and where it came from.
 ///
 /// ```
@@ -151,7 +178,7 @@ impl TomlText {
                 Some(span) => Place::of_byte(&self.file, self.text.as_bytes(), span.start),
                 None => Place::file(&self.file),
             };
-            let reason = e.message().replace('\n', ", ");
+            let reason = in_words(&e.message().replace('\n', ", "));
             TomlFileError::new(
                 at,
                 TomlProblem::Syntax {
@@ -235,6 +262,61 @@ impl TomlText {
         match span {
             Some(span) => Place::of_byte(&self.file, self.text.as_bytes(), span.start),
             None => Place::at(&self.file, 1, 1),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde::Deserialize;
+
+    #[derive(Debug, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    #[allow(dead_code, reason = "only whether it is read counts")]
+    struct Names {
+        name: String,
+        feeds: Vec<f64>,
+        inner: Option<Inner>,
+    }
+
+    #[derive(Debug, Deserialize)]
+    #[allow(dead_code, reason = "only whether it is read counts")]
+    struct Inner {
+        size: f64,
+    }
+
+    #[test]
+    fn what_is_refused_is_said_without_types_of_a_program() {
+        let refused = |text: &str| {
+            let read = TomlText::new("a.toml", text, "names").parse::<Names>();
+            read.unwrap_err().to_string()
+        };
+        for (text, said) in [
+            (
+                "name = 3\nfeeds = []",
+                "found the number `3`, expected a text",
+            ),
+            (
+                "name = \"a\"\nfeeds = \"x\"",
+                "found the text \"x\", expected a list",
+            ),
+            (
+                "name = \"a\"\nfeeds = []\ninner = \"x\"",
+                "found the text \"x\", expected a table",
+            ),
+            (
+                "name = \"a\"\nfeeds = [\"x\"]",
+                "found the text \"x\", expected a number",
+            ),
+            ("name = \"a\"\nfeeds = []\nnmae = 1", "unknown key `nmae`"),
+            ("name = \"a\"", "there is no key `feeds`"),
+        ] {
+            let words = refused(text);
+            assert!(words.contains(said), "{said}: {words}");
+            for programmers in ["struct", "invalid type", "f64", "sequence", "field"] {
+                assert!(!words.contains(programmers), "{words}");
+            }
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The real `giotto`, as its user runs it.
 use std::path::PathBuf;
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output};
 use std::sync::OnceLock;
 
 /// The binary of this build, brought up to date once a test process; or the one that `GIOTTO_BINARY` names, which
@@ -59,4 +59,14 @@ pub fn outcome(output: &Output) -> (i32, String, String) {
         text(&output.stdout),
         text(&output.stderr),
     )
+}
+
+/// A child that goes when the test does.
+pub struct Running(pub Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
 }

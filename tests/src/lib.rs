@@ -15,3 +15,4 @@ pub mod noise;
 pub mod nuisance;
 pub mod paper;
 pub mod study;
+pub mod terminal;

@@ -159,36 +159,32 @@ const CASES: &[(&str, Break, &[&str])] = &[
     (
         "no file key",
         Toml("file = \"a.csv\"\n", ""),
-        &["campaign.toml:4:1", "`file`", "missing"],
+        &["campaign.toml:4:1", "file", "missing"],
     ),
     (
         "no radius key",
         Toml("radius_mm = 100.0\n", ""),
-        &["campaign.toml:4:1", "`radius_mm`", "missing"],
+        &["campaign.toml:4:1", "radius_mm", "missing"],
     ),
     (
         "no feed key",
         Toml("feed_mm_s = 200.0\n", ""),
-        &["campaign.toml:4:1", "`feed_mm_s`"],
+        &["campaign.toml:4:1", "feed_mm_s"],
     ),
     (
         "no direction key",
         Toml("direction = \"ccw\"\n", ""),
-        &["campaign.toml:4:1", "`direction`"],
+        &["campaign.toml:4:1", "direction"],
     ),
     (
         "misspelt key",
         Toml("feed_mm_s", "feed_mms"),
-        &[
-            "campaign.toml:7:1",
-            "`feed_mms`",
-            "did you mean `feed_mm_s`",
-        ],
+        &["campaign.toml:7:1", "feed_mms", "did you mean feed_mm_s"],
     ),
     (
         "key without its unit",
         Toml("feed_mm_s", "feed"),
-        &["campaign.toml:7:1", "did you mean `feed_mm_s`"],
+        &["campaign.toml:7:1", "did you mean feed_mm_s"],
     ),
     (
         "radius as text",
@@ -309,7 +305,7 @@ const CASES: &[(&str, Break, &[&str])] = &[
     (
         "header wrong",
         Line(1, "time,dev"),
-        &["a.csv:1:1", "time,dev", "`time_s,deviation_um`"],
+        &["a.csv:1:1", "time,dev", "time_s,deviation_um"],
     ),
     (
         "header half right",
@@ -379,12 +375,12 @@ const CASES: &[(&str, Break, &[&str])] = &[
     (
         "German locale",
         Csv(|| bytes(good().replace(',', ";").replace('.', ","))),
-        &["a.csv:1:7", "`;`"],
+        &["a.csv:1:7", "semicolons"],
     ),
     (
         "semicolons below a good header",
         Line(9, "0,08;1,5"),
-        &["a.csv:9:", "`;`"],
+        &["a.csv:9:", "semicolons"],
     ),
     (
         "tabs",

@@ -5,23 +5,15 @@
     clippy::panic,
     reason = "a test may fail where it stands"
 )]
-use giotto_tests::command::giotto;
+use giotto_tests::command::{Running, giotto};
+#[cfg(target_os = "linux")]
+use giotto_tests::terminal::Terminal;
 use serde_json::Value;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::{Child, ChildStdout, Stdio};
+use std::process::{ChildStdout, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
-
-/// A child that goes when the test does.
-struct Running(Child);
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
 
 /// Lines as they come; a reader that hears nothing for a minute gives up instead of hanging.
 fn lines(out: ChildStdout) -> Receiver<String> {
@@ -104,76 +96,10 @@ fn the_watch_outlives_its_controller() {
     assert!(watch.0.try_wait().unwrap().is_none(), "it watches still");
 }
 
-/// A terminal of 40 × 120 in which a script runs, and what it shows.
-#[cfg(target_os = "linux")]
-struct Terminal {
-    child: Running,
-    keys: std::process::ChildStdin,
-    screen: std::sync::Arc<std::sync::Mutex<vt100::Parser>>,
-    reader: Option<std::thread::JoinHandle<()>>,
-}
-
-#[cfg(target_os = "linux")]
-impl Terminal {
-    /// `script` gives the pty; its window is as large as `stty` says.
-    fn run(script: &Path) -> Self {
-        use std::io::Read;
-        use std::sync::{Arc, Mutex};
-        let mut command = std::process::Command::new("script");
-        command.args([
-            "--quiet",
-            "--return",
-            "--command",
-            &format!("sh {}", script.display()),
-            "/dev/null",
-        ]);
-        command
-            .env("TERM", "xterm-256color")
-            .env("SHELL", "/bin/sh");
-        let mut child = command
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let (keys, mut out) = (child.stdin.take().unwrap(), child.stdout.take().unwrap());
-        let [rows, columns] = [40, 120].map(|n| std::num::NonZero::new(n).unwrap());
-        let screen = Arc::new(Mutex::new(vt100::Parser::new(rows, columns, 0)));
-        let drawn = Arc::clone(&screen);
-        let reader = std::thread::spawn(move || {
-            let mut bytes = [0; 4096];
-            while let Ok(count @ 1..) = out.read(&mut bytes) {
-                drawn.lock().unwrap().process(&bytes[..count]);
-            }
-        });
-        Self {
-            child: Running(child),
-            keys,
-            screen,
-            reader: Some(reader),
-        }
-    }
-
-    fn shown(&self) -> String {
-        self.screen.lock().unwrap().screen().contents()
-    }
-
-    /// Waits for words on the screen; a minute is a hang.
-    fn wait(&self, wanted: impl Fn(&str) -> bool, words: &str) {
-        for _ in 0..1200 {
-            if wanted(&self.shown()) {
-                return;
-            }
-            std::thread::sleep(Duration::from_millis(50));
-        }
-        panic!("{words} is not on the screen:\n{}", self.shown());
-    }
-}
-
 /// The picture on a terminal: the state as it changes, the loss and the return of the controller, and the terminal as it was.
 #[cfg(target_os = "linux")]
 #[test]
 fn the_picture_lives_and_leaves_the_terminal_clean() {
-    use std::io::Write;
     let folder = tempfile::tempdir().unwrap();
     let name = folder.path().join("tty");
     let first = controller(&name);
@@ -186,12 +112,12 @@ fn the_picture_lives_and_leaves_the_terminal_clean() {
         name.display()
     );
     std::fs::write(&script, text).unwrap();
-    let mut terminal = Terminal::run(&script);
+    let mut terminal = Terminal::run(&script, [40, 120]);
     terminal.wait(
         |s| s.contains("motion       running") && s.contains("q quit"),
         "a running state",
     );
-    assert!(terminal.screen.lock().unwrap().screen().alternate_screen());
+    assert!(terminal.screen().screen().alternate_screen());
     // Live: ticks go on, and the trace is drawn.
     let ticks = |s: &str| -> u64 {
         let number = s
@@ -205,6 +131,14 @@ fn the_picture_lives_and_leaves_the_terminal_clean() {
         |s| ticks(s) > then && s.contains("corrected, ×"),
         "a later tick and a trace",
     );
+    // A machine that moves is not left without a question; any other key stays.
+    terminal.press("q");
+    terminal.wait(
+        |s| s.contains("The machine moves: s stops it first"),
+        "the question",
+    );
+    terminal.press("x");
+    terminal.wait(|s| s.contains("q quit"), "the keys again");
     drop(first);
     terminal.wait(|s| s.contains("LOST"), "the loss");
     let _second = controller(&name);
@@ -212,14 +146,13 @@ fn the_picture_lives_and_leaves_the_terminal_clean() {
         |s| !s.contains("LOST") && s.contains("motion       idle") && s.contains("line lost"),
         "its return",
     );
-    terminal.keys.write_all(b"q").unwrap();
+    terminal.press("q");
     terminal.wait(
         |s| s.contains("the terminal is as it was"),
         "the shell's last word",
     );
-    assert!(terminal.child.0.wait().unwrap().success());
-    terminal.reader.take().unwrap().join().unwrap();
-    let parser = terminal.screen.lock().unwrap();
+    assert!(terminal.end());
+    let parser = terminal.screen();
     let screen = parser.screen();
     assert!(
         screen.contents().contains("it ended with 0"),

@@ -74,7 +74,8 @@ fn keeps(report: &Report, assessment: &Assessment) -> Result<(), Failure> {
             "{n} of {} circles leave the tolerance of {} µm",
             held.len(),
             um(tolerance_m)
-        ))),
+        ))
+        .help("the largest feed that holds it stands above; giotto diagnose says what spoils the circles")),
     }
 }
 
@@ -91,6 +92,15 @@ fn um(si: f64) -> String {
         "0.0".to_owned()
     } else {
         text
+    }
+}
+
+/// Thousandths of a millimetre, without a minus before nothing.
+fn thousandths(si: f64) -> String {
+    let text = format!("{:.3}", si * 1e3);
+    match text.as_str() {
+        "-0.000" => "0.000".to_owned(),
+        _ => text,
     }
 }
 
@@ -122,7 +132,7 @@ fn show(report: &Report, assessment: &Assessment, out: Output) {
     }
 }
 
-fn show_runs(report: &Report, out: Output) {
+pub(super) fn show_runs(report: &Report, out: Output) {
     let header = [
         "run",
         "R mm",
@@ -166,7 +176,7 @@ fn show_runs(report: &Report, out: Output) {
             format!("{:.2}", run.noise_m * 1e6),
             run.measured_feed_m_s
                 .map_or_else(|| "–".to_owned(), |f| format!("{:.1}", f * 1e3)),
-            format!("{:.3} {:.3}", run.centre_m[0] * 1e3, run.centre_m[1] * 1e3),
+            run.centre_m.map(thousandths).join(" "),
         ]);
     }
     runs.show(out);
@@ -208,9 +218,9 @@ fn show_iso(report: &Report, budgets: &[Iso230Budget], out: Output) {
         );
     }
     iso.show(out);
-    out.say("G is about the least-squares circle, F from the nominal circle as centred, D of both directions.");
+    out.tell(0, "G is about the least-squares circle, F from the nominal circle as centred, D of both directions.");
     if let Some(budget) = budgets.first() {
-        out.say(format_args!("{}", uncertainty::words(&budget.f)));
+        out.tell(0, uncertainty::words(&budget.f));
     }
 }
 
@@ -240,7 +250,7 @@ fn show_tolerance(report: &Report, budgets: &[Iso230Budget], tolerance_m: f64, o
         );
     }
     grid.show(out);
-    out.say("pass and FAIL hold with the uncertainty counted in (ISO 14253-1); within U: it decides neither.");
+    out.tell(0, "pass and FAIL hold with the uncertainty counted in (ISO 14253-1); within U: it decides neither.");
     for feed in tolerance::largest_feeds(report, tolerance_m) {
         let limit = feed.limited_by.map_or_else(String::new, |name| {
             format!("; {} leaves it first", tolerance::name(name))
@@ -252,7 +262,7 @@ fn show_tolerance(report: &Report, budgets: &[Iso230Budget], tolerance_m: f64, o
                 format!("held up to {f} mm/s, about {between} mm/s between the measured feeds")
             }
         };
-        out.say(format_args!("R {} mm: {words}{limit}.", feed.radius_mm));
+        out.tell(0, format_args!("R {} mm: {words}{limit}.", feed.radius_mm));
     }
 }
 

@@ -1,5 +1,6 @@
 //! `giotto compare`: before and after, figure by figure and cause by cause, with intervals.
-use super::destination::{Destination, Kind};
+use super::choice::whole;
+use super::destination::{Destination, Kind, quoted};
 use super::grid::Grid;
 use super::{Failure, Output};
 use giotto::analysis;
@@ -24,7 +25,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE.html")]
     html: Option<PathBuf>,
     /// Seed of the diagnoses.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u64>)]
     seed: u64,
 }
 
@@ -100,8 +101,10 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
 /// Analyses and diagnoses a campaign.
 pub(super) fn summary(campaign: &Campaign, path: &Path, seed: u64) -> Result<Summary, Failure> {
     let refused = |reason: &dyn std::fmt::Display| {
-        Failure::input(format_args!("{}: {reason}", path.display()))
-            .help("see `giotto analyze` for what the runs hold")
+        Failure::input(format_args!("{}: {reason}", path.display())).help(format_args!(
+            "see what the runs hold: giotto analyze {}",
+            quoted(path)
+        ))
     };
     let report = analysis::of_campaign(campaign).map_err(|(index, error)| {
         let file = campaign.runs.get(index).map_or("", |run| run.file.as_str());
@@ -119,14 +122,17 @@ pub(super) fn summary(campaign: &Campaign, path: &Path, seed: u64) -> Result<Sum
 }
 
 fn show(comparison: &Comparison, before: &Path, after: &Path, out: Output) {
-    out.say(format_args!(
-        "{} ({}) → {} ({})",
-        comparison.before,
-        before.display(),
-        comparison.after,
-        after.display()
-    ));
-    comparison.words.iter().for_each(|words| out.say(words));
+    out.tell(
+        0,
+        format_args!(
+            "{} ({}) → {} ({})",
+            comparison.before,
+            before.display(),
+            comparison.after,
+            after.display()
+        ),
+    );
+    comparison.words.iter().for_each(|words| out.tell(0, words));
     out.say("");
     show_causes(comparison, out);
     show_figures(comparison, out);

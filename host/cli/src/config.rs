@@ -1,8 +1,8 @@
 //! `giotto config`: the limits that a controller keeps.
 use super::port::PortArgs;
 use super::{Failure, Output};
-use giotto_link::Controller;
-use giotto_shared::wire::{Command, MachineConfig};
+use giotto_link::{Controller, ControllerError};
+use giotto_shared::wire::{Command, MachineConfig, Refusal};
 use serde_json::{Map, Value, json};
 
 /// Arguments of `giotto config`.
@@ -147,7 +147,15 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
             values
                 .iter()
                 .try_for_each(|text| change(&mut config, text))?;
-            controller.command(Command::Configure(config))?;
+            let told = controller.command(Command::Configure(config));
+            told.map_err(|error| match error {
+                ControllerError::Refused(Refusal::Config(_)) => {
+                    Failure::controller(format_args!("{}: {error}", values.join(" "))).help(
+                        "giotto config get shows what it keeps now; its firmware bounds each limit",
+                    )
+                }
+                error => error.into(),
+            })?;
             show(&mut controller, out)
         }
         Verb::Save { port } => {

@@ -1,4 +1,5 @@
 //! `giotto demo`: the whole loop on a bundled campaign and a simulated machine.
+use super::choice::whole;
 use super::destination::{Destination, Kind as FileKind};
 use super::failure::Failure;
 use super::grid::{Grid, width};
@@ -23,7 +24,7 @@ pub struct Args {
     #[arg(long, value_name = "PATH")]
     image: Option<PathBuf>,
     /// Seed of every random draw: noise, set-up, spread, order of the runs.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u64>)]
     seed: u64,
     /// Write a picture of a circle before and after here.
     #[arg(long, value_name = "FILE.svg")]

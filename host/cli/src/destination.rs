@@ -199,6 +199,26 @@ impl Destination {
         path.map(|path| Self::new(path, kind, inputs)).transpose()
     }
 
+    /// Refuses two results in one file, before either is made.
+    ///
+    /// # Errors
+    /// Two of the places are the same (exit 2).
+    pub fn apart(places: &[Option<&Path>]) -> Result<(), Failure> {
+        let whole = |path: &Path| std::path::absolute(path).ok();
+        let given: Vec<&Path> = places.iter().flatten().copied().collect();
+        for (k, place) in given.iter().enumerate() {
+            let same = |other: &&Path| same_file(place, other) || whole(place) == whole(other);
+            if given[..k].iter().any(same) {
+                return Err(Failure::usage(format_args!(
+                    "{}: two results cannot go into one file",
+                    place.display()
+                ))
+                .help("give each a path of its own"));
+            }
+        }
+        Ok(())
+    }
+
     /// The place.
     pub fn path(&self) -> &Path {
         &self.0

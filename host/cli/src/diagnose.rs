@@ -1,10 +1,13 @@
 //! `giotto diagnose`: what the simulation gets wrong, why, the extended model, the gain.
+use super::choice::whole;
 use super::destination::{Destination, Kind, quoted};
-use super::failure::Failure;
+use super::failure::{Failure, plain};
 use super::grid::Grid;
 use super::output::Output;
+use super::paragraph::sentence;
+use super::plan::name;
 use super::source::Source;
-use comfy_table::{CellAlignment, Table, presets};
+use giotto::diagnosis::recommendation::{Action, CAMPAIGN};
 use giotto::diagnosis::{Diagnosis, Finding, Options, diagnose};
 use giotto::model_file::ModelFile;
 use std::path::{Path, PathBuf};
@@ -17,6 +20,10 @@ pub struct Args {
     /// Simulation to start from; without it one servo lag with fitted kv.
     #[arg(long, value_name = "MODEL.toml")]
     model: Option<PathBuf>,
+    /// Model whose table was at work while these circles were measured: what it corrects is counted back in, and the extended
+    /// model replaces it.
+    #[arg(long, value_name = "MODEL.toml", conflicts_with = "model")]
+    corrected_by: Option<PathBuf>,
     /// Write the extended model here.
     #[arg(short, long, value_name = "EXTENDED.toml")]
     output: Option<PathBuf>,
@@ -30,7 +37,7 @@ pub struct Args {
     #[arg(long)]
     keep_all: bool,
     /// Seed of the bootstrap.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u64>)]
     seed: u64,
 }
 
@@ -43,7 +50,9 @@ fn repeatability(text: &str) -> Result<f64, String> {
 
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
-    let inputs = args.source.inputs(args.model.as_deref());
+    let given = args.model.as_deref().or(args.corrected_by.as_deref());
+    let inputs = args.source.inputs(given);
+    Destination::apart(&[args.output.as_deref(), args.report.as_deref()])?;
     Destination::maybe(args.output.as_deref(), Kind::Model, &inputs)?;
     let page = Destination::maybe(args.report.as_deref(), Kind::Html, &inputs)?;
     let (campaign, mislabelled) = if args.keep_all {
@@ -51,12 +60,14 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     } else {
         args.source.read_labelled(out)?
     };
-    let model = args.model.as_deref().map(ModelFile::load).transpose()?;
+    let load = |path: &Option<PathBuf>| path.as_deref().map(ModelFile::load).transpose();
+    let (model, corrected_by) = (load(&args.model)?, load(&args.corrected_by)?);
     let bar = out.spinner("diagnosing");
     let diagnosis = diagnose(
         &campaign,
         &Options {
             model,
+            corrected_by,
             seed: args.seed,
             repeatability_m: args.repeatability.map(|um| um * 1e-6),
             keep_all: args.keep_all,
@@ -75,6 +86,11 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         Some(path) => refused = Some(nothing_real(path, &diagnosis)),
         None => {}
     }
+    let steps = Steps {
+        campaign: args.source.argument(),
+        model: args.output.as_deref().filter(|_| diagnosis.model_written),
+    };
+    diagnosis.recommendation.command = steps.of(&diagnosis).pop();
     if let Some(page) = &page {
         let html = giotto_report::html(&campaign, &diagnosis).map_err(Failure::input)?;
         page.write(html)?;
@@ -83,7 +99,7 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     if out.json {
         out.document(&diagnosis)?;
     } else {
-        show(&campaign.name, &diagnosis, args.output.as_deref(), &out);
+        show(&campaign.name, &diagnosis, &steps, out);
     }
     refused.map_or(Ok(()), Err)
 }
@@ -91,29 +107,31 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
 /// Why no model was written.
 fn nothing_real(path: &Path, d: &Diagnosis) -> Failure {
     let why = match (&d.gain, d.findings.is_empty()) {
-        (None, _) => "these runs prove nothing: ",
-        (Some(_), true) => "nothing was found beside circles that do not shrink with speed: ",
-        (Some(_), false) => "what was found does not foretell runs left out better than before: ",
+        _ if d.at_work => "a table was at work, and of what it leaves alone no model is made",
+        (None, _) => "these runs prove nothing: nothing can be called real",
+        (Some(_), true) => {
+            "nothing was found beside circles that do not shrink with speed: nothing can be called real"
+        }
+        (Some(_), false) => {
+            "what was found does not foretell runs left out better than before: nothing can be called real"
+        }
     };
-    Failure::check(format_args!(
-        "{}: not written; {why}nothing can be called real",
-        path.display()
-    ))
-    .help(&d.recommendation.words)
+    Failure::check(format_args!("{}: not written; {why}", path.display()))
+        .help(&d.recommendation.words)
 }
 
 /// The diagnosis as a person reads it.
-fn show(name: &str, d: &Diagnosis, extended: Option<&Path>, out: &Output) {
-    out.say(format_args!(
-        "Campaign {name}: noise {:.2} µm a sample, {:.2} µm between runs; seed {}",
-        d.noise_um, d.spread_um, d.seed
-    ));
-    out.say(format_args!("Simulation: {}", d.baseline.name));
+fn show(name: &str, d: &Diagnosis, steps: &Steps<'_>, out: Output) {
+    out.tell(
+        0,
+        format_args!(
+            "Campaign {name}: noise {:.2} µm a sample, {:.2} µm between runs; seed {}",
+            d.noise_um, d.spread_um, d.seed
+        ),
+    );
+    out.tell(0, format_args!("Simulation: {}", d.baseline.name));
     let m = &d.misfit;
-    let mut table = Table::new();
-    table
-        .load_style(presets::NOTHING)
-        .set_header(["misfit of the simulation", "µm rms"]);
+    let mut grid = Grid::new(&["misfit of the simulation", "µm rms"], 1, 1);
     for (kind, value) in [
         ("size of the circles", m.size_um),
         ("  of which follows campaign time", m.drift_um),
@@ -123,27 +141,43 @@ fn show(name: &str, d: &Diagnosis, extended: Option<&Path>, out: &Output) {
         ("periodic in time", m.periodic_um),
         ("random and the rest", m.random_um),
     ] {
-        table.add_row([kind.to_string(), format!("{value:.2}")]);
+        grid.row([kind.to_string(), format!("{value:.2}")]);
     }
-    right(&mut table, 1);
-    out.say(&table);
+    grid.show(out);
     show_findings(d, out);
     show_doubts(d, out);
-    if let Some(g) = &d.gain {
-        out.say(format_args!(
-            "On runs left out (each radius, each speed): {:.2} µm rms, before {:.2}; β1, β2 alone {:.2}; no model {:.2}.",
-            g.extended_rms_um, g.baseline_rms_um, g.beta_rms_um, g.no_model_rms_um
-        ));
-        out.say(format_args!(
-            "Gain {:.1} % ({:.1} to {:.1}), {:.1} % of what a perfect model would gain.",
-            g.percent, g.ci95_percent[0], g.ci95_percent[1], g.of_perfect_percent
-        ));
+    if let Some(g) = d.gain.as_ref().filter(|_| !d.findings.is_empty()) {
+        out.tell(
+            0,
+            format_args!(
+                "On runs left out (each radius, each speed): {:.2} µm rms, before {:.2}; β1, β2 alone {:.2}; no model {:.2}.",
+                g.extended_rms_um, g.baseline_rms_um, g.beta_rms_um, g.no_model_rms_um
+            ),
+        );
+        out.tell(
+            0,
+            format_args!(
+                "Gain {:.1} % ({:.1} to {:.1}), {:.1} % of what a perfect model would gain.",
+                g.percent, g.ci95_percent[0], g.ci95_percent[1], g.of_perfect_percent
+            ),
+        );
+    } else if let Some(g) = &d.gain {
+        out.tell(
+            0,
+            format_args!(
+                "On runs left out (each radius, each speed) the simulation is off by {:.2} µm rms; no model by {:.2}.",
+                g.baseline_rms_um, g.no_model_rms_um
+            ),
+        );
     }
-    out.say(format_args!("Next: {}", recommendation(d, extended)));
+    out.tell(0, format_args!("Next: {}.", d.recommendation.words));
+    for command in steps.of(d) {
+        out.say(format_args!("  {command}"));
+    }
 }
 
 /// What was found, as a table and in words.
-fn show_findings(d: &Diagnosis, out: &Output) {
+fn show_findings(d: &Diagnosis, out: Output) {
     if d.findings.is_empty() && !d.unexplained.present && d.cannot_tell.is_empty() {
         out.say("Nothing found: the simulation explains the data.");
     } else if !d.findings.is_empty() {
@@ -154,75 +188,101 @@ fn show_findings(d: &Diagnosis, out: &Output) {
             "95 % interval",
             "share",
             "probability",
-            "correctable",
         ];
         let mut grid = Grid::new(&header, 2, 2);
         d.findings.iter().for_each(|f| grid.row(row(f)));
         out.say("");
-        grid.show(*out);
+        grid.show(out);
         out.say("");
-        for f in &d.findings {
-            let words = f.cause.model().words();
-            out.say(format_args!(
-                "{}: {}. Usually {}. Remedy: {}.",
-                words.name, words.what, words.usual, words.adjust
-            ));
-            if let Some(note) = &f.note {
-                out.say(format_args!("  {note}."));
-            }
-            if !f.indistinguishable_from.is_empty() {
-                out.say(format_args!(
-                    "  Not to be told from: {}. Measure: {}.",
-                    f.indistinguishable_from.join(", "),
-                    f.next_measurement
-                ));
-            }
-            if let (false, Some(why)) = (f.compensable, words.not_compensable) {
-                out.say(format_args!("  The controller cannot correct it: {why}."));
-            }
-        }
+        d.findings.iter().for_each(|f| show_finding(f, out));
     }
 }
 
+/// What one cause does, what to turn and which way, and what it usually is.
+fn show_finding(f: &Finding, out: Output) {
+    let words = f.cause.model().words();
+    let most = match &f.effect_um {
+        most if most.max > 0.0 => format!(
+            ": up to {:.1} µm on the circles, at R {} mm and {} mm/s",
+            most.max,
+            round(most.radius_mm),
+            round(most.feed_mm_s)
+        ),
+        _ => String::new(),
+    };
+    let corrected = if f.compensable {
+        "; the controller can correct it"
+    } else {
+        ""
+    };
+    out.tell(0, sentence(&format!("{}{most}{corrected}", f.title())));
+    out.tell(2, sentence(&f.remedy));
+    out.tell(
+        2,
+        format_args!(
+            "{} Usually {}. In general: {}.",
+            sentence(words.what),
+            words.usual,
+            words.adjust
+        ),
+    );
+    if let Some(note) = &f.note {
+        out.tell(2, sentence(note));
+    }
+    if !f.indistinguishable_from.is_empty() {
+        let others: Vec<String> = f.indistinguishable_from.iter().map(|id| name(id)).collect();
+        out.tell(
+            2,
+            format_args!(
+                "Not to be told from: {}. Measure: {}.",
+                others.join(", "),
+                f.next_measurement
+            ),
+        );
+    }
+    if let (false, Some(why)) = (f.compensable, words.not_compensable) {
+        out.tell(2, format_args!("The controller cannot correct it: {why}."));
+    }
+}
+
+/// Millimetres as they were programmed, without what the conversion of units left.
+fn round(value: f64) -> f64 {
+    (value * 1e6).round() / 1e6
+}
+
 /// What has no name, what was taken otherwise, what was left out and what cannot be told.
-fn show_doubts(d: &Diagnosis, out: &Output) {
+fn show_doubts(d: &Diagnosis, out: Output) {
     if d.unexplained.present {
         // The clock alone may show something, which has no µm.
         let um = d.unexplained.rms_um;
         if um < 0.005 {
-            out.say("Unexplained, as no cause in the list does it:");
+            out.tell(0, "Unexplained, as no cause in the list does it:");
         } else {
-            out.say(format_args!(
-                "Unexplained: {um:.2} µm rms that match no cause in the list:"
-            ));
+            out.tell(
+                0,
+                format_args!("Unexplained: {um:.2} µm rms that match no cause in the list:"),
+            );
         }
         for words in &d.unexplained.signature.words {
-            out.say(format_args!("  {words}"));
+            out.tell(2, words);
         }
     }
     for note in &d.notes {
-        out.say(format_args!("Note: {note}."));
+        out.tell(0, format_args!("Note: {note}."));
     }
     for run in &d.left_out {
-        out.say(format_args!(
-            "Left out: {}: {} (`--keep-all` keeps it).",
-            run.file, run.reason
-        ));
+        let reason = plain(&run.reason);
+        out.tell(
+            0,
+            format_args!("Left out: {}: {reason} (--keep-all keeps it).", run.file),
+        );
     }
     for missing in &d.cannot_tell {
-        out.say(format_args!("Cannot tell: {missing}."));
+        out.tell(0, format_args!("Cannot tell: {missing}."));
     }
 }
 
-/// Numbers to the right: every column from `first` on.
-fn right(table: &mut Table, first: usize) {
-    table
-        .column_iter_mut()
-        .skip(first)
-        .for_each(|column| column.set_cell_alignment(CellAlignment::Right));
-}
-
-fn row(f: &Finding) -> [String; 7] {
+fn row(f: &Finding) -> [String; 6] {
     let e = &f.estimate;
     let shown = giotto::units::shown(e.value, e.ci95, e.unit);
     [
@@ -232,20 +292,36 @@ fn row(f: &Finding) -> [String; 7] {
         format!("{} … {}", shown.low, shown.high),
         format!("{:.0} %", f.share_percent),
         format!("{:.3}", f.probability),
-        if f.compensable { "yes" } else { "no" }.to_string(),
     ]
 }
 
-/// The one thing to do now, with the file that was written.
-fn recommendation(d: &Diagnosis, extended: Option<&Path>) -> String {
-    let words = &d.recommendation.words;
-    match extended.filter(|_| d.model_written) {
-        Some(path) => words
-            .replace(
-                "write the extended model with -o EXTENDED.toml and flash it",
-                "flash it",
-            )
-            .replace("EXTENDED.toml", &quoted(path)),
-        None => words.clone(),
+/// The commands that come next, with the paths of this call.
+struct Steps<'a> {
+    /// The campaign, as it was typed.
+    campaign: String,
+    /// The extended model, if it was written.
+    model: Option<&'a Path>,
+}
+
+impl Steps<'_> {
+    fn of(&self, d: &Diagnosis) -> Vec<String> {
+        match (d.recommendation.action, self.model) {
+            (Action::Flash, Some(model)) => vec![flash(&quoted(model))],
+            (Action::Flash, None) => vec![
+                format!("giotto diagnose {} -o model.toml", self.campaign),
+                flash("model.toml"),
+            ],
+            _ => {
+                let command = d.recommendation.command.iter();
+                command
+                    .map(|c| c.replace(CAMPAIGN, &self.campaign))
+                    .collect()
+            }
+        }
     }
+}
+
+/// The port is the one thing that nobody but the user knows.
+fn flash(model: &str) -> String {
+    format!("giotto flash {model} --port PORT")
 }

@@ -71,9 +71,9 @@ impl Failure {
     pub fn report(&self) -> ExitCode {
         // A closed or full stderr must not make a panic of an error: the exit code still says it.
         let mut stderr = std::io::stderr();
-        let _ = writeln!(stderr, "error: {}", self.message);
+        let _ = writeln!(stderr, "error: {}", plain(&self.message));
         if let Some(help) = &self.help {
-            let _ = writeln!(stderr, " help: {help}");
+            let _ = writeln!(stderr, " help: {}", plain(help));
         }
         ExitCode::from(self.kind as u8)
     }
@@ -86,8 +86,35 @@ impl From<giotto::toml_file::TomlFileError> for Failure {
     }
 }
 
+/// Words of the library and of the system for a person: programmers set keys and commands off by backticks, the system adds
+/// the number of its error.
+pub fn plain(words: &str) -> String {
+    let mut text = words.replace('`', "");
+    while let Some(from) = text.find(" (os error ") {
+        let Some(length) = text[from..].find(')') else {
+            break;
+        };
+        text.replace_range(from..=from + length, "");
+    }
+    text
+}
+
 /// Writing a result failed: the place it should go to is bad input.
 pub fn cannot_write(path: &std::path::Path, error: &std::io::Error) -> Failure {
     Failure::input(format_args!("{}: cannot write: {error}", path.display()))
         .help("choose another path with -o, or make room there")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::plain;
+
+    #[test]
+    fn a_person_reads_neither_backticks_nor_numbers_of_errors() {
+        let words =
+            "`radius_mm` is missing: No space left on device (os error 28), see `giotto status`";
+        let read = "radius_mm is missing: No space left on device, see giotto status";
+        assert_eq!(plain(words), read);
+        assert_eq!(plain("odd (os error 28"), "odd (os error 28");
+    }
 }

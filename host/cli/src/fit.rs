@@ -407,12 +407,12 @@ fn show_radii(fit: &RadiusFit, runs: &[Observation], out: Output) {
 /// What the fit leaves of the runs it has seen and of those it has not.
 fn show_prediction(fit: &RadiusFit, out: Output) {
     let (runs, rms) = fit.train;
-    out.say(format_args!(
-        "fitted: {runs} runs, residuals {:.2} µm rms",
-        rms * 1e6
-    ));
+    out.tell(
+        0,
+        format_args!("fitted: {runs} runs, residuals {:.2} µm rms", rms * 1e6),
+    );
     match &fit.heldout {
-        Some(h) => out.say(format_args!(
+        Some(h) => out.tell(0, format_args!(
             "predicted ({}): {} runs, residuals {:.2} µm rms, largest {:.2} µm, {:.3} % of the radius error explained",
             if fit.options.train_radius_m.is_some() {
                 "radii not fitted; only their β0 is their own"
@@ -424,7 +424,7 @@ fn show_prediction(fit: &RadiusFit, out: Output) {
             h.max_m * 1e6,
             h.explained_percent
         )),
-        None => out.say("predicted: nothing; a second radius would show whether the model carries over"),
+        None => out.tell(0, "predicted: nothing; a second radius would show whether the model carries over"),
     }
 }
 
@@ -455,14 +455,16 @@ fn show_chain(fit: &RadiusFit, out: Output) {
     } else {
         fit.classes.to_string().replace('_', " ")
     };
-    out.say(format_args!(
-        "\nκ4/κ2² between {low:.1} and {high:.1} (95 %): the chain may be {classes}"
-    ));
+    out.say("");
+    out.tell(
+        0,
+        format_args!("κ4/κ2² between {low:.1} and {high:.1} (95 %): the chain may be {classes}"),
+    );
     match fit.cumulants().equivalent() {
-        Some(Element::SecondOrder { omega_n_rad_s, zeta }) => out.say(format_args!(
+        Some(Element::SecondOrder { omega_n_rad_s, zeta }) => out.tell(0, format_args!(
             "a second order with the same κ2 and κ4: ωn {omega_n_rad_s:.1} rad/s, ζ {zeta:.3} (an equivalent, not a finding)"
         )),
-        Some(Element::FeedForwardLag { kv_per_s, feed_forward }) => out.say(format_args!(
+        Some(Element::FeedForwardLag { kv_per_s, feed_forward }) => out.tell(0, format_args!(
             "a lag with feed-forward of the same κ2 and κ4: kv {kv_per_s:.1} 1/s, a {feed_forward:.2} (an equivalent, not a finding)"
         )),
         Some(_) | None => {}

@@ -53,10 +53,14 @@ impl Grid {
             let heading = self.header.get(k).map_or(0, |h| length(h));
             cells.map(|c| length(c)).fold(heading, usize::max)
         };
-        let sizes: Vec<usize> = (0..self.header.len())
-            .map(|k| longest(k).min((width / 3).max(12)))
-            .collect();
+        let whole: Vec<usize> = (0..self.header.len()).map(longest).collect();
         let keys: Vec<usize> = (0..self.keys.min(self.header.len())).collect();
+        // Long names are cut only where a block of the table would not fit with them whole.
+        let (first, others) = whole.split_at(keys.len());
+        let widest = others.iter().copied().max().unwrap_or(0);
+        let fits = first.iter().map(|size| size + GAP).sum::<usize>() + widest <= width;
+        let most = if fits { width } else { (width / 3).max(12) };
+        let sizes: Vec<usize> = whole.iter().map(|size| (*size).min(most)).collect();
         let of = |columns: &[usize]| columns.iter().map(|k| sizes[*k] + GAP).sum::<usize>();
         let mut blocks: Vec<Vec<usize>> = vec![keys.clone()];
         #[allow(

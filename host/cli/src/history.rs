@@ -1,4 +1,5 @@
 //! `giotto history`: every campaign of a folder diagnosed once and kept; what drifts, what stepped.
+use super::choice::whole;
 use super::compare::summary;
 use super::destination::{Destination, Kind};
 use super::failure::cannot_write;
@@ -27,7 +28,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE.html")]
     html: Option<PathBuf>,
     /// Seed of the diagnoses and of the shuffles.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u64>)]
     seed: u64,
 }
 
@@ -103,8 +104,12 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
 /// The campaigns of a folder, in order of their names.
 fn campaigns(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let entries = std::fs::read_dir(folder).map_err(|error| {
+        let reason = match error.kind() {
+            std::io::ErrorKind::NotFound => "no such folder".to_owned(),
+            _ => error.to_string(),
+        };
         Failure::input(format_args!(
-            "{}: {error}; expected a folder whose directories are campaigns",
+            "{}: {reason}; expected a folder whose directories are campaigns",
             folder.display()
         ))
         .help("check the path")
@@ -207,7 +212,7 @@ fn show(machine: &History, out: Output) {
     } else if words.is_empty() {
         out.say("Nothing drifts and nothing stepped beyond what unchanged machines show.");
     }
-    words.iter().for_each(|words| out.say(words));
+    words.iter().for_each(|words| out.tell(0, words));
     out.say("");
     let header = ["series", "first", "last", "low limit", "high limit", "unit"];
     let mut grid = Grid::new(&header, 1, 1);

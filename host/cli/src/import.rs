@@ -1,5 +1,6 @@
 //! `giotto import`: foreign measurements into a campaign, one by one or a whole session.
 use super::choice::one_of;
+use super::destination::quoted;
 use super::source::{Foreign, Progress, tell};
 use super::{Failure, Output};
 use giotto::campaign::import::batch::{self, Said};
@@ -91,7 +92,10 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
             a.lines.1
         ));
     }
-    out.note(format_args!("next: giotto analyze {folder}"));
+    out.note(format_args!(
+        "next: giotto analyze {}",
+        quoted(&args.output)
+    ));
     Ok(())
 }
 

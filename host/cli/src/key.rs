@@ -33,7 +33,7 @@ enum KeyCommand {
 pub(super) fn load(path: &Path) -> Result<SigningKey, Failure> {
     SigningKey::load(path).map_err(|error| {
         Failure::input(format_args!("{}: {error}", path.display()))
-            .help("make a key with `giotto key new FILE`")
+            .help("make a key: giotto key new FILE")
     })
 }
 

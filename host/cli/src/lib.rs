@@ -3,6 +3,7 @@
 #![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 mod analyze;
+mod bounds_in_words;
 mod bypass;
 mod campaign_edit;
 mod choice;
@@ -24,6 +25,7 @@ mod key;
 mod log;
 mod man;
 mod monitor;
+mod paragraph;
 mod plan;
 mod port;
 mod report;
@@ -31,6 +33,7 @@ mod reset;
 mod rollback;
 mod run;
 mod simulate;
+mod start;
 mod status;
 mod stop;
 mod table;
@@ -46,14 +49,14 @@ pub mod source;
 pub use failure::Failure;
 pub use output::Output;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
 
 /// True circles from robots and machine tools: measure, explain, compensate, prove.
 #[derive(Parser, Debug)]
 #[command(name = "giotto", version, about, propagate_version = true)]
 struct Cli {
-    /// Print one JSON document on stdout and nothing else.
+    /// Print one JSON document on stdout and nothing else; what goes on (monitor, log) prints one a line.
     #[arg(long, global = true)]
     json: bool,
     /// Print results and errors only.
@@ -68,6 +71,8 @@ struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Command {
+    /// The first time, by questions: two files to a provisional verdict.
+    Start(start::Args),
     /// Foreign measurements into a campaign.
     Import(import::Args),
     /// List, change and remove the runs of a campaign.
@@ -130,6 +135,7 @@ enum Command {
 
 fn dispatch(command: Command, out: Output) -> Result<(), Failure> {
     match command {
+        Command::Start(args) => start::run(args, out),
         Command::Import(args) => import::run(args, out),
         Command::Campaign(args) => campaign_edit::run(args, out),
         Command::Analyze(args) => analyze::run(args, out),
@@ -162,9 +168,24 @@ fn dispatch(command: Command, out: Output) -> Result<(), Failure> {
     }
 }
 
+/// Options take numbers below zero, so that one that may not be is refused by its range and not as an unknown option.
+fn below_zero(command: clap::Command) -> clap::Command {
+    command
+        .mut_args(|arg| {
+            let takes = arg.get_action().takes_values() && !arg.is_positional();
+            if takes {
+                arg.allow_negative_numbers(true)
+            } else {
+                arg
+            }
+        })
+        .mut_subcommands(below_zero)
+}
+
 /// Runs the command line of this process.
 pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let given = below_zero(Cli::command()).try_get_matches();
+    let cli = match given.and_then(|given| Cli::from_arg_matches(&given)) {
         Ok(cli) => cli,
         Err(words) => return told(&words),
     };

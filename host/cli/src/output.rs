@@ -25,10 +25,19 @@ impl Output {
         }
     }
 
+    /// Sentences for a person, at the width of the terminal and set in by `indent`.
+    pub fn tell(&self, indent: usize, text: impl std::fmt::Display) {
+        self.say(super::paragraph::wrapped(&text.to_string(), indent));
+    }
+
     /// A note beside the result: stderr, silenced by `--quiet`.
     pub fn note(&self, text: impl std::fmt::Display) {
         if !self.quiet {
-            let _ = writeln!(std::io::stderr(), "{text}");
+            let _ = writeln!(
+                std::io::stderr(),
+                "{}",
+                super::failure::plain(&text.to_string())
+            );
         }
     }
 

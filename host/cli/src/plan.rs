@@ -1,4 +1,5 @@
 //! `giotto plan`: the next runs that would best separate what cannot be told apart yet.
+use super::choice::{up_to_60, whole};
 use super::destination::{Destination, Kind as FileKind};
 use super::source::{Source, length};
 use super::{Failure, Output};
@@ -41,16 +42,21 @@ pub struct Args {
     #[arg(long, value_name = "MM_S2", value_parser = length)]
     max_acceleration: Option<f64>,
     /// Most runs beside the three reference runs.
-    #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u8).range(1..=60))]
+    #[arg(long, value_name = "N", default_value_t = 12, value_parser = up_to_60)]
     runs: u8,
     /// Seed of the order of the runs and of the diagnosis.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u64>)]
     seed: u64,
 }
 
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let inputs = args.source.inputs(args.model.as_deref());
+    Destination::apart(&[
+        args.output.as_deref(),
+        args.gcode.as_deref(),
+        args.rapid.as_deref(),
+    ])?;
     let place = |path: &Option<PathBuf>, kind| Destination::maybe(path.as_deref(), kind, &inputs);
     let file = place(&args.output, FileKind::Plan)?;
     let programs = [
@@ -105,7 +111,7 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     if out.json {
         return out.document(&plan);
     }
-    show(&plan, out);
+    show(&plan, &diagnosis.cannot_tell, asked, out);
     Ok(())
 }
 
@@ -125,34 +131,48 @@ fn nothing(plan: &Plan) -> &'static str {
     }
 }
 
-fn name(id: &str) -> String {
+/// A cause for a person; what is none of the list keeps its name.
+pub(super) fn name(id: &str) -> String {
     Cause::from_id(id).map_or_else(
         || id.replace('_', " "),
         |cause| cause.model().words().name.to_string(),
     )
 }
 
-fn show(plan: &Plan, out: Output) {
+/// More causes than this are named as what they are: nearly all.
+const MANY: usize = 6;
+
+fn show(plan: &Plan, cannot_tell: &[String], asked: bool, out: Output) {
     for class in &plan.open {
+        if class.members.len() > MANY && !cannot_tell.is_empty() {
+            out.tell(0, "Open: nearly every cause, for these runs cannot tell:");
+            for missing in cannot_tell {
+                let first = missing.split(';').next().unwrap_or(missing);
+                out.tell(2, first.split(", so ").next().unwrap_or(first));
+            }
+            continue;
+        }
         let members: Vec<String> = class.members.iter().map(|cause| name(cause.id())).collect();
-        out.say(format_args!(
-            "Open: any of {}: {}.",
-            members.join(", "),
-            class.why
-        ));
+        out.tell(
+            0,
+            format_args!("Open: any of {}: {}.", members.join(", "), class.why),
+        );
     }
     for line in &plan.line_tests {
         let [a, b] = &line.pair;
-        out.say(format_args!(
-            "No circle can tell {} from {} ({}); do a line test: {}.",
-            name(a),
-            name(b),
-            line.why,
-            line.test
-        ));
+        out.tell(
+            0,
+            format_args!(
+                "No circle can tell {} from {} ({}); do a line test: {}.",
+                name(a),
+                name(b),
+                line.why,
+                line.test
+            ),
+        );
     }
     if plan.runs.is_empty() {
-        out.say(nothing(plan));
+        out.tell(0, nothing(plan));
         return;
     }
     let mut table = Table::new();
@@ -183,19 +203,28 @@ fn show(plan: &Plan, out: Output) {
     out.say(&table);
     for s in &plan.separations {
         let [a, b] = &s.pair;
-        out.say(format_args!(
-            "{} or {}: χ² {:.0} now, {:.0} with these runs{}.",
-            name(a),
-            name(b),
-            s.expected_chi2_before,
-            s.expected_chi2_after,
-            if s.told() { "" } else { ", not enough" }
-        ));
+        out.tell(
+            0,
+            format_args!(
+                "{} or {}: χ² {:.0} now, {:.0} with these runs{}.",
+                name(a),
+                name(b),
+                s.expected_chi2_before,
+                s.expected_chi2_after,
+                if s.told() { "" } else { ", not enough" }
+            ),
+        );
     }
-    out.say(format_args!(
+    out.tell(0, format_args!(
         "Warm up with {} turns of the first circle, then measure in this order: {:.0} min in all; seed {}.",
         plan.warm_up_turns,
         (plan.duration_s / 60.0).ceil(),
         plan.seed
     ));
+    if !asked {
+        out.tell(
+            0,
+            "The program for it: --gcode FILE.nc for a machine tool, --rapid FILE.mod for a robot; -o PLAN.toml for giotto simulate.",
+        );
+    }
 }

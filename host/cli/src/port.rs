@@ -1,5 +1,6 @@
 //! `--port` and what goes with it, and a controller's errors in words.
-use super::{Failure, Output};
+use super::choice::whole;
+use super::{Failure, Output, bounds_in_words};
 use giotto_link::port::BAUD;
 use giotto_link::{Controller, ControllerError, OpenOptions, Port, open};
 use std::path::PathBuf;
@@ -15,7 +16,7 @@ pub(super) struct PortArgs {
     #[arg(long, value_name = "PATH")]
     image: Option<PathBuf>,
     /// Baud rate of a serial device.
-    #[arg(long, default_value_t = BAUD, value_name = "BAUD")]
+    #[arg(long, default_value_t = BAUD, value_name = "BAUD", value_parser = whole::<u32>)]
     baud: u32,
 }
 
@@ -46,7 +47,9 @@ impl From<ControllerError> for Failure {
         let failure = match &error {
             // The table came from a file: that is where the fault is.
             ControllerError::Table(_) => Self::input(&error),
-            _ => Self::controller(&error),
+            _ => Self::controller(
+                bounds_in_words::words(&error).unwrap_or_else(|| error.to_string()),
+            ),
         };
         match error.help() {
             Some(help) => failure.help(help),

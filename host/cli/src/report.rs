@@ -1,4 +1,5 @@
 //! `giotto report`: self-contained HTML report with plots.
+use super::choice::whole;
 use super::destination::{Destination, Kind};
 use super::failure::Failure;
 use super::output::Output;
@@ -23,7 +24,7 @@ pub struct Args {
     #[arg(long, value_name = "MODEL.toml")]
     model: Option<PathBuf>,
     /// Seed of the bootstrap.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = whole::<u64>)]
     seed: u64,
 }
 
@@ -38,6 +39,7 @@ struct Document<'a> {
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let inputs = args.source.inputs(args.model.as_deref());
+    Destination::apart(&[Some(&args.output), args.pdf.as_deref()])?;
     let page = Destination::new(&args.output, Kind::Html, &inputs)?;
     let pdf = Destination::maybe(args.pdf.as_deref(), Kind::Pdf, &inputs)?;
     let campaign = args.source.read(out)?;

@@ -26,8 +26,12 @@ fn place(mm: &[f64]) -> Result<[i32; 3], Failure> {
     let all: Option<Vec<i32>> = mm.iter().map(nm).collect();
     all.and_then(|all| <[i32; 3]>::try_from(all).ok())
         .ok_or_else(|| {
-            Failure::usage("--at takes X,Y,Z in mm, each from -2100 to 2100")
-                .help("such as --at 120.5,-40,0")
+            let given: Vec<String> = mm.iter().map(f64::to_string).collect();
+            Failure::usage(format_args!(
+                "--at {}: expected X,Y,Z in mm, each from -2100 to 2100",
+                given.join(",")
+            ))
+            .help("such as --at 120.5,-40,0")
         })
 }
 

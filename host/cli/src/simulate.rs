@@ -1,4 +1,5 @@
 //! `giotto simulate`: a simulated machine runs the circles of a plan and writes a campaign.
+use super::choice::whole;
 use super::{Failure, Output};
 use giotto::simulation::{self, Plan};
 use serde::Serialize;
@@ -21,7 +22,7 @@ pub struct Args {
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// Seed of every random draw: noise, spread, order of the runs.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole::<u64>)]
     seed: u64,
 }
 

@@ -1,5 +1,6 @@
 //! A campaign, or a foreign file where a campaign stands.
 use super::choice::one_of;
+use super::destination::quoted;
 use super::{Failure, Output};
 use giotto::campaign::import::{self, Added, Format, Laps, Options, Reason};
 use giotto::campaign::{Campaign, Direction, Manifest, Plane};
@@ -104,6 +105,32 @@ impl Source {
             .collect()
     }
 
+    /// The same as it is typed: for the commands that are proposed next.
+    pub(super) fn argument(&self) -> String {
+        let mut text = quoted(&self.campaign);
+        let given = &self.foreign;
+        let mut add = |option: &str, value: Option<String>| {
+            if let Some(value) = value {
+                text += &format!(" --{option} {value}");
+            }
+        };
+        add("radius", given.radius.map(|mm| mm.to_string()));
+        add("feed", given.feed.map(|mm_s| mm_s.to_string()));
+        let way = given.direction.map(|way| match way {
+            Direction::Ccw => "ccw",
+            Direction::Cw => "cw",
+        });
+        add("direction", way.map(str::to_owned));
+        let format = given.format.filter(|format| *format != Format::Auto);
+        let named = format.and_then(|f| Format::ALL.into_iter().find(|(of, ..)| *of == f));
+        add("format", named.map(|(_, name, _)| name.to_owned()));
+        add("columns", given.columns.as_ref().map(quoted));
+        add("angles", given.angles.clone());
+        add("plane", given.plane.map(|plane| plane.name().to_owned()));
+        add("start-angle", given.start_angle.map(|deg| deg.to_string()));
+        text
+    }
+
     /// Opens the campaign, or the foreign file as a campaign of one run.
     pub fn open(&self, out: Output) -> Result<Manifest, Failure> {
         let path = &self.campaign;
@@ -130,8 +157,10 @@ impl Source {
 
     /// The campaign was read, but what was asked cannot be answered from it.
     pub(super) fn refused(&self, reason: &dyn std::fmt::Display) -> Failure {
-        Failure::input(format_args!("{}: {reason}", self.campaign.display()))
-            .help("see `giotto analyze` for what the runs hold")
+        Failure::input(format_args!("{}: {reason}", self.campaign.display())).help(format_args!(
+            "see what the runs hold: giotto analyze {}",
+            self.argument()
+        ))
     }
 
     /// As [`Source::read`], but leaves out the odd run whose file contradicts its label.

@@ -199,7 +199,7 @@ fn position_rows(status: &Status) -> Vec<Row> {
         format!("{x:.6} {y:.6} {z:.6} mm")
     };
     let known = match status.position {
-        PositionState::Unknown => "not known: `giotto reset --at X,Y,Z` declares it",
+        PositionState::Unknown => "not known: giotto reset --at X,Y,Z declares it",
         PositionState::Known => "known",
         PositionState::Kept => "kept over the last reset",
     };

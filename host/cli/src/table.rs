@@ -52,7 +52,7 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
             Ok(())
         }
         _ => Err(Failure::usage(
-            "giotto table needs MODEL.toml and -o TABLE.bin, or `show TABLE.bin`",
+            "giotto table needs MODEL.toml and -o TABLE.bin, or giotto table show TABLE.bin",
         )),
     }
 }
@@ -89,11 +89,14 @@ fn bytes(count: usize) -> String {
 
 fn words(table: &Table, out: Output) {
     let mm = |metres: f32| number(f64::from(metres) * 1e3);
-    out.say(format_args!(
-        "No correction is larger than {} mm or changes faster than {} mm/s.",
-        mm(table.limits.offset_m),
-        mm(table.limits.slew_m_s)
-    ));
+    out.tell(
+        0,
+        format_args!(
+            "No correction is larger than {} mm or changes faster than {} mm/s.",
+            mm(table.limits.offset_m),
+            mm(table.limits.slew_m_s)
+        ),
+    );
     for (at, zone) in table.zones.iter().enumerate() {
         let ([r0, r1], [f0, f1]) = (zone.radius_m.map(mm), zone.feed_m_s.map(mm));
         let travel = match zone.travel {
@@ -109,13 +112,16 @@ fn words(table: &Table, out: Output) {
             ),
             None => "any place".to_owned(),
         };
-        out.say(format_args!(
-            "Zone {}: radius {r0} to {r1} mm, feed {f0} to {f1} mm/s, {travel}, {place}",
-            at + 1
-        ));
-        out.say(format_args!("  {}", response(&zone.cumulants)));
+        out.tell(
+            0,
+            format_args!(
+                "Zone {}: radius {r0} to {r1} mm, feed {f0} to {f1} mm/s, {travel}, {place}",
+                at + 1
+            ),
+        );
+        out.tell(2, response(&zone.cumulants));
         for term in &zone.terms {
-            out.say(format_args!("  {}", in_words(term)));
+            out.tell(2, in_words(term));
         }
     }
 }
@@ -144,6 +150,16 @@ fn response(cumulants: &Cumulants<f32>) -> String {
     )
 }
 
+/// Of a pair the one with more first: words follow the sign.
+fn larger_first(pair: [String; 2], value: f32) -> ([String; 2], f32) {
+    let [a, b] = pair;
+    if value < 0.0 {
+        ([b, a], -value)
+    } else {
+        ([a, b], value)
+    }
+}
+
 /// A term as a person says it; what stands in the table is the machine's error, the controller does the opposite.
 fn in_words(term: &Term<f32>) -> String {
     let n = |value: f32, factor: f64| number(f64::from(value) * factor);
@@ -156,26 +172,32 @@ fn in_words(term: &Term<f32>) -> String {
             format!("scale error of {} {} µm/m", of(actuator), n(relative, 1e6))
         }
         Term::ScaleMismatch { plane, relative } => {
-            let [a, b] = pair(plane);
-            let size = n(relative, 1e6);
-            format!("scale mismatch, {a} longer than {b} by {size} µm/m")
+            let ([a, b], size) = larger_first(pair(plane), relative);
+            format!(
+                "scale mismatch, {a} longer than {b} by {} µm/m",
+                n(size, 1e6)
+            )
         }
         Term::Squareness { plane, shear_rad } => {
             let [a, b] = pair(plane);
-            format!("squareness of {a} and {b} {} µm/m", n(shear_rad, 1e6))
+            let side = if shear_rad < 0.0 { "over" } else { "under" };
+            let size = n(shear_rad.abs(), 1e6);
+            format!("squareness, the angle between {a} and {b} is {size} µm/m {side} 90°")
         }
         Term::ServoMismatch { plane, delta_tau_s } => {
-            let [a, b] = pair(plane);
-            let size = n(delta_tau_s, 1e6);
-            format!("servo mismatch, {a} follows {size} µs later than {b}")
+            let ([a, b], size) = larger_first(pair(plane), delta_tau_s);
+            format!(
+                "servo mismatch, {a} follows {} µs later than {b}",
+                n(size, 1e6)
+            )
         }
         Term::BandwidthMismatch {
             plane,
             delta_kappa2_s2,
         } => {
-            let [a, b] = pair(plane);
-            let size = n(delta_kappa2_s2, 1e6);
-            format!("bandwidth mismatch, κ2 of {a} less that of {b} {size} ms²")
+            let ([a, b], size) = larger_first(pair(plane), delta_kappa2_s2);
+            let size = n(size, 1e6);
+            format!("bandwidth mismatch, {a} rounds off its motion more than {b}: κ2 by {size} ms²")
         }
         Term::Backlash { actuator, step_m } => {
             format!("backlash of {} {} µm", of(actuator), n(step_m, 1e6))

@@ -51,7 +51,7 @@ pub(super) fn read(path: &Path, out: Output) -> Result<TableFile, Failure> {
         return Err(Failure::input(format_args!(
             "{shown}: not a giotto table; expected {expected}"
         ))
-        .help("make one with `giotto table MODEL.toml -o TABLE.bin`"));
+        .help("make one: giotto table MODEL.toml -o TABLE.bin"));
     }
     from_model(path, out)
 }
@@ -65,7 +65,8 @@ pub(super) fn from_model(path: &Path, out: Output) -> Result<TableFile, Failure>
     })?;
     for cause in &made.left_out {
         out.note(format_args!(
-            "note: {cause:?} cannot be corrected by a controller and is left out"
+            "note: {} cannot be corrected by a controller and is left out",
+            cause.model().words().name
         ));
     }
     let image = encode(&made.table).map_err(|error| bad_table(path, &error))?;
@@ -88,6 +89,6 @@ fn bad_table(path: &Path, error: &TableError) -> Failure {
         TableError::NewerVersion { .. } => {
             failure.help("use the giotto that wrote it, or a newer one")
         }
-        _ => failure.help("make the table anew with `giotto table MODEL.toml -o TABLE.bin`"),
+        _ => failure.help("make the table anew: giotto table MODEL.toml -o TABLE.bin"),
     }
 }

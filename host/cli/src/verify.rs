@@ -41,8 +41,8 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
             "{port}: the table in use, in slot {slot}, differs from {} from byte {offset} on",
             args.file.display()
         ))
-        .help("flash it, or `giotto status` to see what the slots hold")),
+        .help("flash it; giotto status says what the slots hold")),
         Verdict::None => Err(Failure::check(format_args!("{port}: no table is in use"))
-            .help("flash it, or `giotto status` to see what the slots hold")),
+            .help("flash it; giotto status says what the slots hold")),
     }
 }

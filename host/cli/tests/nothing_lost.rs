@@ -25,6 +25,7 @@ const SPEAKERS: &[&str] = &[
     "fit campaign",
     "simulate plan.toml -o new",
     "diagnose campaign",
+    "diagnose campaign --corrected-by model.toml",
     "plan campaign",
     "report campaign -o new.html",
     "compensate part.nc --model model.toml -o new.nc",
@@ -54,6 +55,7 @@ const WRITERS: &[(&str, &str)] = &[
     ("diagnose campaign -o {}", "new.toml"),
     ("diagnose campaign --report {}", "new.html"),
     ("report campaign -o {}", "new.html"),
+    ("report campaign -o page.html --pdf {}", "new.pdf"),
     ("compare campaign campaign --html {}", "new.html"),
     ("history months --html {}", "new.html"),
     ("plan campaign -o {}", "new.toml"),
@@ -77,6 +79,14 @@ const FILLERS: &[&str] = &[
     "man -o new",
 ];
 
+/// Lines that change what is there; on a full disk it stays as it was.
+const EDITORS: &[&str] = &[
+    "campaign set campaign run000.csv --start-angle 5",
+    "campaign remove campaign run000.csv",
+    "import ball.csv --radius 100 --feed 100 --direction ccw -o campaign",
+    "history months",
+];
+
 /// Lines whose output is their input or belongs to it.
 const SWALLOWERS: &[&str] = &[
     "fit campaign -o campaign/campaign.toml",
@@ -85,6 +95,14 @@ const SWALLOWERS: &[&str] = &[
     "diagnose campaign --report campaign/campaign.toml",
     "report campaign -o campaign/campaign.toml",
     "report campaign -o campaign/run000.csv",
+    "report campaign -o new.html --pdf campaign/run000.csv",
+    "report campaign -o new.html --pdf new.html",
+    "diagnose campaign -o new.toml --report ./new.toml",
+    "plan campaign -o new.toml --gcode new.toml",
+    "diagnose campaign --corrected-by model.toml -o model.toml",
+    "history months --html months/a/campaign.toml",
+    "run program part.nc --port sim -o part.nc",
+    "run stream ball.csv --port sim -o ball.csv",
     "report ball.csv --radius 100 --feed 100 --direction ccw -o ball.csv",
     "plan campaign -o campaign/campaign.toml",
     "plan campaign --gcode campaign/run000.csv",
@@ -279,7 +297,7 @@ fn a_full_disk_leaves_no_file() {
     let lines = WRITERS
         .iter()
         .map(|(line, name)| line.replace("{}", name))
-        .chain(FILLERS.iter().map(|line| (*line).to_owned()));
+        .chain(FILLERS.iter().chain(EDITORS).map(|line| (*line).to_owned()));
     for line in lines {
         // A limit of no bytes a file: what writes fails as on a full disk; pipes are not limited.
         let script = format!("trap '' XFSZ; ulimit -f 0; exec \"$0\" {line}");
@@ -312,6 +330,7 @@ fn what_stands_in_the_way_stays() {
         ("r.csv", "a,b\n"),
         ("r.mod", "MODULE a\n"),
         ("r.key", "a\n"),
+        ("r.pdf", "%PDF-1.4\n"),
     ] {
         fs::write(folder.join(name), text).unwrap();
         let mut permissions = fs::metadata(folder.join(name)).unwrap().permissions();
@@ -345,6 +364,24 @@ fn what_stands_in_the_way_stays() {
             refused(&output, &line);
             assert_eq!(state(folder), before, "{line}");
         }
+    }
+}
+
+/// A manifest that is marked read-only is not changed; a result is not put beside it either.
+#[test]
+fn a_campaign_that_is_read_only_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    lay_out(folder);
+    let manifest = folder.join("campaign/campaign.toml");
+    let mut permissions = fs::metadata(&manifest).unwrap().permissions();
+    permissions.set_readonly(true);
+    fs::set_permissions(&manifest, permissions).unwrap();
+    let before = state(folder);
+    for line in EDITORS.iter().filter(|line| line.contains(" campaign")) {
+        let output = run(folder, line);
+        refused(&output, line);
+        assert_eq!(state(folder), before, "{line}");
     }
 }
 

@@ -10,7 +10,7 @@ use giotto::diagnosis::{Diagnosis, Finding};
 use serde::Serialize;
 
 #[derive(Debug, Serialize)]
-pub(super) struct CauseView {
+pub(super) struct CauseView<'a> {
     name: String,
     value: String,
     low: String,
@@ -24,6 +24,10 @@ pub(super) struct CauseView {
     what: &'static str,
     usual: &'static str,
     adjust: &'static str,
+    /// What to turn, which way and how far.
+    remedy: &'a str,
+    /// The largest thing it does, and where.
+    effect: String,
     look_alikes: Vec<String>,
     next: String,
     compensable: bool,
@@ -32,11 +36,16 @@ pub(super) struct CauseView {
     picture: Option<[String; 2]>,
 }
 
-pub(super) fn cause(campaign: &Campaign, alone: &Alone, at: usize, f: &Finding) -> CauseView {
+pub(super) fn cause<'a>(
+    campaign: &Campaign,
+    alone: &Alone,
+    at: usize,
+    f: &'a Finding,
+) -> CauseView<'a> {
     let words = f.cause.model().words();
     let shown = verdict::shown(&f.estimate);
     CauseView {
-        name: verdict::title(f),
+        name: f.title(),
         value: shown.value,
         low: shown.low,
         high: shown.high,
@@ -54,6 +63,8 @@ pub(super) fn cause(campaign: &Campaign, alone: &Alone, at: usize, f: &Finding) 
         what: words.what,
         usual: words.usual,
         adjust: words.adjust,
+        remedy: &f.remedy,
+        effect: effect(f),
         look_alikes: f
             .indistinguishable_from
             .iter()
@@ -63,6 +74,20 @@ pub(super) fn cause(campaign: &Campaign, alone: &Alone, at: usize, f: &Finding) 
         compensable: f.compensable,
         why_not: words.not_compensable,
     }
+}
+
+/// Most that a cause does to a circle, and to which.
+fn effect(f: &Finding) -> String {
+    let most = f.effect_um;
+    if most.max <= 0.0 {
+        return String::new();
+    }
+    format!(
+        "up to {} µm, at radius {} mm and {} mm/s",
+        fixed(most.max, 1),
+        plain(most.radius_mm),
+        plain(most.feed_mm_s)
+    )
 }
 
 /// A further parameter of a cause in words; one that only the simulation understands is left to the model's file.
@@ -109,7 +134,7 @@ fn alone_on_circle(
         plain(chosen.radius_m * 1e3),
         plain(chosen.feed_m_s * 1e3)
     );
-    let words = format!("{} alone on the circle. {where_}.", verdict::title(f));
+    let words = format!("{} alone on the circle. {where_}.", f.title());
     Some([
         portrait::svg(&format!("alone-{at}"), &words, &curves),
         where_,

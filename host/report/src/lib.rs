@@ -35,6 +35,8 @@ mod portrait;
 mod tests;
 mod verdict;
 
+pub use verdict::sentences;
+
 pub use pages::{comparison_page, history_page};
 
 use giotto::campaign::Campaign;

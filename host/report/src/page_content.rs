@@ -14,12 +14,12 @@ use serde::Serialize;
 
 /// The whole page.
 #[derive(Debug, Serialize)]
-pub struct PageContent {
+pub struct PageContent<'a> {
     name: String,
     machine: String,
     grid: String,
     verdict: [String; 3],
-    causes: Vec<CauseView>,
+    causes: Vec<CauseView<'a>>,
     /// Causes that can be ticked off.
     whatif: Vec<String>,
     unexplained: Option<UnexplainedView>,
@@ -74,9 +74,9 @@ struct Legend {
     radius: String,
 }
 
-impl PageContent {
+impl<'a> PageContent<'a> {
     /// Of a campaign and its diagnosis.
-    pub fn of(campaign: &Campaign, d: &Diagnosis) -> Self {
+    pub fn of(campaign: &Campaign, d: &'a Diagnosis) -> Self {
         let radii = radii(campaign);
         let report = analysis::of_campaign(campaign).ok();
         let alone = Alone::of(campaign, d);
@@ -96,7 +96,7 @@ impl PageContent {
                 .iter()
                 .zip(&alone.profiles)
                 .filter(|(_, profiles)| profiles.is_some())
-                .map(|(f, _)| verdict::title(f))
+                .map(|(f, _)| f.title())
                 .collect(),
             unexplained: d.unexplained.present.then(|| UnexplainedView {
                 rms: fixed(d.unexplained.rms_um, 2),
@@ -159,14 +159,22 @@ fn grid(campaign: &Campaign, radii: &[f64]) -> String {
         String::new()
     };
     let of = |d| campaign.runs.iter().filter(|r| r.direction == d).count();
+    let count = campaign.runs.len();
+    let s = if count == 1 { "" } else { "s" };
+    let ways: Vec<String> = [Direction::Ccw, Direction::Cw]
+        .into_iter()
+        .filter(|way| of(*way) > 0)
+        .map(|way| format!("{} {}", of(way), ways(way)))
+        .collect();
+    let feeds = if low == high {
+        plain(low)
+    } else {
+        format!("{} to {}", plain(low), plain(high))
+    };
     format!(
-        "{} runs ({} CCW, {} CW); radius {}{more} mm; feed {} to {} mm/s",
-        campaign.runs.len(),
-        of(Direction::Ccw),
-        of(Direction::Cw),
+        "{count} run{s} ({}); radius {}{more} mm; feed {feeds} mm/s",
+        ways.join(", "),
         shown.join(", "),
-        plain(low),
-        plain(high)
     )
 }
 

@@ -171,6 +171,8 @@ pub fn history_page(machines: &[History]) -> Result<String, ReportError> {
             charts: machine
                 .series
                 .iter()
+                // What was never there has nothing to draw.
+                .filter(|series| series.values.iter().any(|value| *value != 0.0))
                 .map(|series| {
                     number += 1;
                     chart(series, number)
@@ -259,7 +261,10 @@ fn chart(series: &giotto::history::Series, number: usize) -> Drawn {
         }
         .svg(),
         caption: if series.words.is_empty() {
-            format!("{}: no change", series.title)
+            format!(
+                "{}: nothing that unchanged machines do not show",
+                series.title
+            )
         } else {
             series.words.join(" ")
         },

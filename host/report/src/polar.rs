@@ -103,7 +103,7 @@ pub fn json(
         .and_then(|(radius_m, feed_m_s)| keys.iter().position(|key| *key == (radius_m, feed_m_s)));
     let named = boxes().filter(|(_, runs)| runs.is_some());
     let data = Data {
-        causes: named.map(|(f, _)| super::verdict::title(f)).collect(),
+        causes: named.map(|(f, _)| f.title()).collect(),
         circles,
         worst: worst.unwrap_or(0),
     };

@@ -4,32 +4,13 @@ use giotto::analysis::{Report, RunAnalysis};
 use giotto::causes::Cause;
 use giotto::diagnosis::recommendation::{self, Action};
 use giotto::diagnosis::status::Status;
-use giotto::diagnosis::{Diagnosis, Estimate, Finding};
+use giotto::diagnosis::{Diagnosis, Estimate};
 use giotto::units::{self, Shown};
 use giotto_shared::Direction;
 
-/// The three sentences.
+/// The verdict in three sentences for a person: how the worst circle looks, why, and what to do.
 pub fn sentences(d: &Diagnosis, report: Option<&Report>) -> [String; 3] {
     [misfit(report), cause(d), action(d)]
-}
-
-/// Names of the actuators in words, with a leading space; nothing for the machine as a whole.
-pub fn axis(finding: &Finding) -> String {
-    let names: Vec<String> = finding
-        .actuators
-        .iter()
-        .map(|actuator| actuator.name().to_uppercase().replace("JOINT", "joint "))
-        .collect();
-    if names.is_empty() {
-        String::new()
-    } else {
-        format!(" of {}", names.join(" and "))
-    }
-}
-
-/// Name of a finding with its place.
-pub fn title(finding: &Finding) -> String {
-    format!("{}{}", finding.cause.model().words().name, axis(finding))
 }
 
 /// The run whose form is worst.
@@ -70,9 +51,19 @@ fn cause(d: &Diagnosis) -> String {
     };
     let Some(first) = d.findings.first() else {
         return if d.unexplained.present {
-            format!("No cause in the list fits what is left{rest}.")
+            let words = d.unexplained.signature.words.first();
+            format!(
+                "No cause in the list fits: {} µm rms have no name{}.",
+                fixed(d.unexplained.rms_um, 2),
+                words.map_or_else(String::new, |words| format!(", {words}"))
+            )
         } else if let (None, Some(missing)) = (&d.gain, d.cannot_tell.first()) {
-            format!("Nothing can be named from these runs ({missing}).")
+            // What is missing comes first, what follows from it stands further down.
+            let ends = [";", ", so ", " (--"];
+            let first = ends.iter().fold(missing.as_str(), |words, end| {
+                words.split_once(end).map_or(words, |(before, _)| before)
+            });
+            format!("Nothing can be named from these runs: {first}.")
         } else {
             "Nothing was found beyond it: the simulation explains the data.".to_string()
         };
@@ -80,7 +71,7 @@ fn cause(d: &Diagnosis) -> String {
     let others: Vec<String> = d.findings[1..]
         .iter()
         .take(3)
-        .map(|f| format!("{} ({} %)", title(f), fixed(f.share_percent, 0)))
+        .map(|f| format!("{} ({} %)", f.title(), fixed(f.share_percent, 0)))
         .collect();
     let more = match others.len() {
         0 => String::new(),
@@ -95,7 +86,7 @@ fn cause(d: &Diagnosis) -> String {
     format!(
         "{} % of what a lag does not explain is{sure} {}, {} {} (95 %: {} to {}){more}{rest}.",
         fixed(first.share_percent, 0),
-        title(first),
+        first.title(),
         shown.value,
         shown.unit,
         shown.low,
@@ -117,13 +108,9 @@ fn action(d: &Diagnosis) -> String {
                 _ => format!("{what}."),
             }
         }
-        Action::Adjust => format!("{}.", capitalised(&d.recommendation.words)),
-        Action::Measure => "Measure what is missing first: the next runs stand further down.".into(),
-        Action::Look => {
-            "Look at the place and the law of what has no name, further down.".into()
-        }
-        Action::Nothing => {
-            "Nothing is to be done beyond the fitted radius model, which corrects what shrinks with speed.".into()
+        Action::Measure => "Measure what is missing first: it stands further down, under what these runs cannot tell.".into(),
+        Action::Adjust | Action::Look | Action::Nothing => {
+            format!("{}.", capitalised(&d.recommendation.words))
         }
     }
 }

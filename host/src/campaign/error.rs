@@ -135,7 +135,7 @@ pub enum Problem {
         angle_deg: f64,
         reason: ReachError,
     },
-    #[error("no run \"{file}\"; expected one of {}", runs.join(", "))]
+    #[error("no run \"{file}\"; expected one of {}", some_of(runs))]
     UnknownRun { file: String, runs: Vec<String> },
     #[error("the campaign lists no runs; expected at least one [[run]]")]
     NoRuns,
@@ -151,7 +151,7 @@ pub enum Problem {
     DuplicateColumn { name: String },
     #[error("no header: the first line holds numbers; expected {}", SHAPES)]
     NoHeader,
-    #[error("`;` separates the columns; expected `,` and decimal points")]
+    #[error("semicolons separate the columns; expected commas and decimal points")]
     Semicolons,
     #[error("row has {found} fields; expected {expected} as in the header")]
     Ragged { found: usize, expected: usize },
@@ -224,7 +224,7 @@ pub enum Problem {
         share: f64,
     },
     #[error(
-        "the samples last {measured_s:.4} s, one turn at the programmed feed {programmed_s:.6} s: {hint}; expected one turn"
+        "the samples last {measured_s:.4} s, one turn at the programmed feed {programmed_s:.4} s: {hint}; expected one turn"
     )]
     TooLong {
         measured_s: f64,
@@ -346,6 +346,21 @@ impl CampaignError {
     }
 }
 
+/// The first names of a long list and its last.
+fn some_of(names: &[String]) -> String {
+    const FIRST: usize = 4;
+    match names.split_last() {
+        Some((last, rest)) if rest.len() > FIRST => {
+            format!(
+                "{}, … {last}, {} in all",
+                rest[..FIRST].join(", "),
+                names.len()
+            )
+        }
+        _ => names.join(", "),
+    }
+}
+
 const SHAPES: &str = "`time_s,deviation_um`, `angle_deg,deviation_um`, `time_s,x_mm,y_mm[,z_mm]` or `x_mm,y_mm[,z_mm]` (`deviation_mm` and `radius_mm` serve as well)";
 
 /// The columns that do not make a circular test.
@@ -425,7 +440,7 @@ impl CampaignError {
                 "correct `centre_mm` (in the robot's base), the tool, the orientation or the branch in campaign.toml"
             }
             P::MissingKey { .. } | P::UnknownKey { .. } => "correct the key in campaign.toml",
-            P::UnknownRun { .. } => "see `giotto campaign list CAMPAIGN`",
+            P::UnknownRun { .. } => "`giotto campaign list` shows the runs of a campaign",
             P::NoRuns => "add a run with `giotto import`",
             P::DuplicateRun { .. } | P::DuplicateName { .. } => {
                 "remove one of the two, or give the second its own file"
@@ -449,12 +464,12 @@ impl CampaignError {
                 "`giotto import` trims laps and feed-in, and takes arcs of 180° and more"
             }
             P::ArcContradicted { .. } => "correct `arc_deg`, or import the file again",
-            P::TooShort { .. } => "record the whole turn, or correct `feed_mm_s` or `radius_mm`",
+            P::TooShort { .. } => "record the whole turn, or correct the programmed feed or radius",
             P::TooLong { .. } => {
-                "correct `feed_mm_s` (mm/s), `radius_mm` (mm) or the unit of time_s"
+                "correct the programmed feed (mm/s), the radius (mm) or the unit of time_s"
             }
             P::Implausible { .. } | P::WrongRadius { .. } => {
-                "correct the unit in the header, or `radius_mm`"
+                "correct the unit in the header, or the programmed radius"
             }
             P::Open { .. } => "export the whole turn, or give the angles in a column of their own",
             P::Held { .. } => "measure the run again; the instrument lost its target",

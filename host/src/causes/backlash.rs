@@ -19,6 +19,7 @@ const WORDS: Words = Words {
     adjust: "take up the play mechanically, then set the backlash compensation of that axis",
     positive: "{a} loses {size} at each reversal: raise its backlash compensation by {size}, or take up the play of screw and nut",
     negative: "{a} jumps ahead by {size} at each reversal: lower its backlash compensation by {size}",
+    elsewhere: None,
     never_told_from: &[],
     next: "a back-and-forth line of a few steps of the axis with a dial gauge",
     not_compensable: None,

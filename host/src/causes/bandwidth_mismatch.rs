@@ -16,6 +16,10 @@ const WORDS: Words = Words {
     adjust: "match the acceleration and jerk filters of the axes",
     positive: "{a} rounds off its motion more than {b}, by {size}: shorten the filter of {a}, or lengthen that of {b}",
     negative: "{b} rounds off its motion more than {a}, by {size}: shorten the filter of {b}, or lengthen that of {a}",
+    elsewhere: Some([
+        "{a} rounds off its motion more than the other joints, by {size}: shorten its filter, or lengthen those of the others",
+        "{a} rounds off its motion less than the other joints, by {size}: lengthen its filter, or shorten those of the others",
+    ]),
     never_told_from: &[],
     next: "circles at the highest safe speed, or a frequency response of each axis",
     not_compensable: None,

@@ -17,6 +17,7 @@ const WORDS: Words = Words {
     adjust: "map the axis over one pitch and enter it in the pitch compensation",
     positive: "{a} is off by up to {size} within each pitch: map it, or look at the alignment of screw and scale",
     negative: "{a} is off by up to {size} within each pitch: map it, or look at the alignment of screw and scale",
+    elsewhere: None,
     never_told_from: &[],
     next: "a slow line along the axis over a few pitches",
     not_compensable: None,

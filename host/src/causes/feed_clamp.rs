@@ -14,6 +14,7 @@ const WORDS: Words = Words {
     adjust: "programme speeds that the controller keeps, or raise its limit if the machine allows it",
     positive: "arcs are slowed to {size} of centripetal acceleration: raise that limit, or program what the machine can hold",
     negative: "arcs are slowed to {size} of centripetal acceleration: raise that limit, or program what the machine can hold",
+    elsewhere: None,
     never_told_from: &[],
     next: "the duration of the turn, over speeds around the limit",
     not_compensable: Some(

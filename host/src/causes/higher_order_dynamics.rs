@@ -19,6 +19,7 @@ const WORDS: Words = Words {
                    feed-forward, or the jerk and acceleration of the path",
     negative: "at the highest speeds circles shrink more than the lag alone would make them: raise the velocity feed-forward, or \
                    shorten the acceleration filters",
+    elsewhere: None,
     never_told_from: &[],
     next: "smaller radii at the highest safe speed, and a step or line test with an accelerometer",
     not_compensable: None,

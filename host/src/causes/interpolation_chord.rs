@@ -14,6 +14,7 @@ const WORDS: Words = Words {
     adjust: "raise the set-point rate or switch on the fine interpolator of the drive",
     positive: "the path is a polygon with a set-point every {size}: shorten the cycle of the interpolator",
     negative: "the path is a polygon with a set-point every {size}: shorten the cycle of the interpolator",
+    elsewhere: None,
     never_told_from: &[],
     next: "the same circle at half the speed: the scallops shrink to a quarter, their period in time stays",
     not_compensable: Some("it arises in the interpolator behind the correction"),

@@ -20,6 +20,7 @@ const WORDS: Words = Words {
     adjust: "take up the play of that joint's gear, or have it overhauled",
     positive: "the gear of {a} has {size} of play: take it up, or have the gear overhauled",
     negative: "{a} jumps ahead by {size} where it turns back: lower its backlash compensation by {size}",
+    elsewhere: None,
     never_told_from: &[],
     next: "the joint alone, forth and back by a degree, with a dial gauge at the tool",
     not_compensable: Some("the table has no model of the arm"),

@@ -17,6 +17,7 @@ const WORDS: Words = Words {
     adjust: "map the joint over one turn of its gear's input, or have the gear overhauled",
     positive: "the gear of {a} is off by up to {size} within each turn of its input: map it, or have it overhauled",
     negative: "the gear of {a} is off by up to {size} within each turn of its input: map it, or have it overhauled",
+    elsewhere: None,
     never_told_from: &[],
     next: "a slow turn of the joint alone over a few waves, with an encoder or a tracker at the tool",
     not_compensable: Some("the table has no model of the arm"),

@@ -21,6 +21,10 @@ const WORDS: Words = Words {
     adjust: "match the position gains of the joints that move in this plane",
     positive: "{a} follows {size} later than the joints on average: raise its gain",
     negative: "{a} follows {size} earlier than the joints on average: lower its gain, or raise that of the others",
+    elsewhere: Some([
+        "circles counter-clockwise come out smaller than clockwise, by {size} of lag between the joints: match the gains of the joints that move in this plane; with the kinematics given it is told which",
+        "circles counter-clockwise come out larger than clockwise, by {size} of lag between the joints: match the gains of the joints that move in this plane; with the kinematics given it is told which",
+    ]),
     never_told_from: &[],
     next: "the same circles at another place of the work space, where the Jacobian differs",
     not_compensable: Some("the table has no model of the arm: its size changes with the place"),

@@ -19,6 +19,7 @@ const WORDS: Words = Words {
     adjust: "friction compensation of that joint",
     positive: "{a} sticks where it turns back, {size} at the tool: raise its friction compensation, look at its gear",
     negative: "{a} is pushed too far where it turns back, {size} at the tool: lower its friction compensation",
+    elsewhere: None,
     never_told_from: &[],
     next: "the same circle elsewhere: the spikes move with the joint angles",
     not_compensable: Some("the table has no model of the arm"),

@@ -16,6 +16,7 @@ const WORDS: Words = Words {
     adjust: "calibrate that joint's zero again",
     positive: "{a} stands {size} further than its controller reads: set its zero again, {size} less",
     negative: "{a} stands {size} less far than its controller reads: set its zero again, {size} more",
+    elsewhere: None,
     never_told_from: &[],
     next: "the same circle at three more places of the work space",
     not_compensable: Some("the table has no model of the arm"),

@@ -18,6 +18,7 @@ const WORDS: Words = Words {
     positive: "{a} shifts sideways by {size} when it turns back: raise the preload of its guide until the {size} are gone",
     negative: "{a} shifts sideways by {size}, against its usual side, when it turns back: raise the preload of its guide until the \
                    {size} are gone",
+    elsewhere: None,
     never_told_from: &[],
     next: "a line along the moving axis, forth and back, with an indicator square to it",
     not_compensable: None,

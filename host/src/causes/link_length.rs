@@ -16,6 +16,7 @@ const WORDS: Words = Words {
     adjust: "enter the calibrated length of that link",
     positive: "the link behind {a} is {size} longer than the controller has it: enter its calibrated length",
     negative: "the link behind {a} is {size} shorter than the controller has it: enter its calibrated length",
+    elsewhere: None,
     never_told_from: &[],
     next: "the same circle at three more places of the work space",
     not_compensable: Some("the table has no model of the arm"),

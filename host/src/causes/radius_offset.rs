@@ -15,6 +15,7 @@ const WORDS: Words = Words {
     adjust: "calibrate the length of the bar and the tool centre point",
     positive: "every circle is {size} too large: enter the bar's length {size} shorter, or raise the tool radius by {size}",
     negative: "every circle is {size} too small: enter the bar's length {size} longer, or lower the tool radius by {size}",
+    elsewhere: None,
     never_told_from: &[],
     next: "a wide range of radii: a scale error grows with R, an offset does not",
     not_compensable: None,

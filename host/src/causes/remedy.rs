@@ -2,29 +2,41 @@
 //!
 //! The words stand in the file of each cause. A test turns what they name: the misfit of the simulated machine then falls,
 //! whatever the sign.
-use super::Cause;
+use super::{Cause, Seat};
 use crate::units;
+
+/// Name of an actuator for a person: a slide is a letter, a joint a word, `joint2` is read as `joint 2`.
+pub fn spoken(actuator: &str) -> String {
+    match actuator.strip_prefix("joint") {
+        Some(number) => format!("joint {number}"),
+        None => actuator.to_uppercase(),
+    }
+}
 
 /// What to turn and which way. `value` is in the unit of the contract; a finding of the machine as a whole is one of X
 /// against Y where its actuators are not given.
 pub fn remedy(cause: Cause, actuators: &[&str], value: f64) -> String {
-    let of_cause = cause.model().words();
+    let model = cause.model();
+    let of_cause = model.words();
     let shown = units::shown(value.abs(), [value.abs(); 2], of_cause.unit);
-    let name = |at: usize, otherwise: &str| {
-        let given = actuators.get(at).copied().unwrap_or(otherwise);
-        // A slide is a letter, a joint a word: `joint2` is read as `joint 2`.
-        match given.strip_prefix("joint") {
-            Some(number) => format!("joint {number}"),
-            None => given.to_uppercase(),
-        }
+    let name = |at: usize, otherwise: &str| spoken(actuators.get(at).copied().unwrap_or(otherwise));
+    let negative = usize::from(value < 0.0);
+    let usual = [of_cause.positive, of_cause.negative];
+    let spoken_of = ["{a}", "{b}"].map(|gap| usize::from(usual[negative].contains(gap)));
+    let words = match of_cause.elsewhere {
+        Some(other) if actuators.len() != spoken_of.iter().sum::<usize>() => other[negative],
+        _ => usual[negative],
     };
-    let words = if value < 0.0 {
-        of_cause.negative
-    } else {
-        of_cause.positive
+    // Found on two axes alike, it is set right on both.
+    let first = match (model.seat(), actuators) {
+        (Seat::One | Seat::Joint, [_, _, ..]) => {
+            let others: Vec<String> = (1..actuators.len()).map(|at| name(at, "y")).collect();
+            format!("{}, and likewise {},", name(0, "x"), others.join(" and "))
+        }
+        _ => name(0, "x"),
     };
     words
-        .replace("{a}", &name(0, "x"))
+        .replace("{a}", &first)
         .replace("{b}", &name(1, "y"))
         .replace("{size}", &format!("{} {}", shown.value, shown.unit))
 }
@@ -32,7 +44,7 @@ pub fn remedy(cause: Cause, actuators: &[&str], value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::causes::{Effect, Seat, Site};
+    use crate::causes::{Effect, Site};
     use crate::simulation::machine::{Friction, Machine, PositionLoop};
     use crate::simulation::{CircleTest, circle};
     use giotto_shared::{Actuator, Direction, Plane};
@@ -55,6 +67,16 @@ mod tests {
                 .starts_with("Z follows 58.0 µs later than X")
         );
         assert!(remedy(Cause::JointReversal, &["joint2"], 4.0).starts_with("joint 2 sticks"));
+        assert_eq!(
+            remedy(Cause::ScaleError, &["z"], -40.0),
+            "Z alone travels 40.0 µm/m too little: raise its scale by 40.0 µm/m"
+        );
+        assert!(remedy(Cause::ScaleError, &[], -40.0).starts_with("both axes travel"));
+        assert!(remedy(Cause::BandwidthMismatch, &["joint2"], 1e-6).contains("the other joints"));
+        assert!(
+            remedy(Cause::Backlash, &["y", "x"], 0.01)
+                .starts_with("Y, and likewise X, loses 10.0 µm")
+        );
     }
 
     /// A setting of the machine that the words name.

@@ -16,6 +16,10 @@ const WORDS: Words = Words {
     adjust: "set the scale of both axes, or measure at 20 °C",
     positive: "both axes travel {size} too far: lower the scale of both by {size}",
     negative: "both axes travel {size} too little: raise the scale of both by {size}",
+    elsewhere: Some([
+        "{a} alone travels {size} too far: lower its scale by {size}",
+        "{a} alone travels {size} too little: raise its scale by {size}",
+    ]),
     never_told_from: &[],
     next: "a wide range of radii, and the temperature of machine and bar",
     not_compensable: None,

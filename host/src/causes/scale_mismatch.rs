@@ -16,6 +16,7 @@ const WORDS: Words = Words {
     adjust: "set the scale of one axis",
     positive: "{a} travels {size} more than {b}: lower the scale of {a} by {size}, or raise that of {b}",
     negative: "{a} travels {size} less than {b}: raise the scale of {a} by {size}, or lower that of {b}",
+    elsewhere: None,
     never_told_from: &[],
     next: "a line test along each axis with a laser or a scale",
     not_compensable: None,

@@ -21,6 +21,7 @@ const WORDS: Words = Words {
     adjust: "match kv of the axes: raise that of the axis that lags",
     positive: "{a} follows {size} later than {b}: raise kv of {a}, or lower that of {b}",
     negative: "{b} follows {size} later than {a}: raise kv of {b}, or lower that of {a}",
+    elsewhere: None,
     never_told_from: &["dead_time_mismatch"],
     next: "a straight line at 45° at several speeds, forth and back: no circle can tell a gain from a dead time",
     not_compensable: None,

@@ -15,6 +15,7 @@ const WORDS: Words = Words {
     adjust: "align the axes or enter the squareness correction in the controller",
     positive: "the angle between {a} and {b} is {size} under 90°: open it by {size}",
     negative: "the angle between {a} and {b} is {size} over 90°: close it by {size}",
+    elsewhere: None,
     never_told_from: &[],
     next: "the same circle in the other quadrants of the work space, or a square",
     not_compensable: None,

@@ -16,6 +16,7 @@ const WORDS: Words = Words {
     adjust: "re-seat the guide or enter a straightness (sag) correction",
     positive: "the guide of {a} bows by {size} over the circle, its ends towards plus: align or map it",
     negative: "the guide of {a} bows by {size} over the circle, its ends towards minus: align or map it",
+    elsewhere: None,
     never_told_from: &[],
     next: "a straight line along the axis with a straight edge or laser",
     not_compensable: None,

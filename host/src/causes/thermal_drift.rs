@@ -15,6 +15,7 @@ const WORDS: Words = Words {
     adjust: "warm up before measuring; measure in random order with a repeated reference run",
     positive: "circles grew by {size}: warm up longer before measuring or working, or compensate for the temperature",
     negative: "circles shrank by {size}: warm up longer before measuring or working, or compensate for the temperature",
+    elsewhere: None,
     never_told_from: &[],
     next: "repeat the first run now and again: only time can have changed it",
     not_compensable: Some("it changes with time, and the controller does not know the temperature"),

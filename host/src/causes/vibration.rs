@@ -15,6 +15,7 @@ const WORDS: Words = Words {
     adjust: "stiffen or damp the structure; keep accelerations below those that excite it; set a notch filter",
     positive: "something swings at {size}: find it with a shaker or an accelerometer; stiffen or damp it, or keep the speed from it",
     negative: "something swings at {size}: find it with a shaker or an accelerometer; stiffen or damp it, or keep the speed from it",
+    elsewhere: None,
     never_told_from: &[],
     next: "an accelerometer on the tool, with the drives on and at rest",
     not_compensable: Some("it is faster than the position loop and its phase is not known"),

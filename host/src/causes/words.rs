@@ -20,6 +20,9 @@ pub struct Words {
     pub positive: &'static str,
     /// The same where the value is negative.
     pub negative: &'static str,
+    /// Both again for the other kind of seat, where a cause has two: on one actuator instead of the machine or a pair, or
+    /// the machine as a whole instead of a joint.
+    pub elsewhere: Option<[&'static str; 2]>,
     /// What cannot be told from it by circles at all.
     pub never_told_from: &'static [&'static str],
     /// The measurement that would separate it from its look-alikes.

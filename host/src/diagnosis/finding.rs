@@ -1,5 +1,6 @@
 //! What is reported of a cause.
 use super::status::Status;
+use crate::causes::remedy::spoken;
 use crate::causes::{Cause, Effect};
 use giotto_shared::Actuator;
 use serde::Serialize;
@@ -70,6 +71,17 @@ impl Finding {
     pub fn place(&self) -> String {
         let names: Vec<&str> = self.actuators.iter().map(|a| a.name()).collect();
         names.join(" ")
+    }
+
+    /// Its name with its place, for a person: `backlash of X`, `servo mismatch of X and Y`, `joint zero of joint 2`.
+    pub fn title(&self) -> String {
+        let name = self.cause.model().words().name;
+        let places: Vec<String> = self.actuators.iter().map(|a| spoken(a.name())).collect();
+        if places.is_empty() {
+            name.to_owned()
+        } else {
+            format!("{name} of {}", places.join(" and "))
+        }
     }
 }
 

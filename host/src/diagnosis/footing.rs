@@ -55,9 +55,10 @@ fn poverty(campaign: &Campaign, repeatability_m: f64) -> Vec<String> {
     };
     let mut out = Vec::new();
     if campaign.runs.len() < FEWEST_RUNS {
+        let runs = campaign.runs.len();
+        let s = if runs == 1 { "" } else { "s" };
         out.push(format!(
-            "{} run(s): the scatter between runs cannot be measured and is taken as {:.1} µm (`--repeatability` states another), so what is listed is provisional and nothing can be called real; measure at least {FEWEST_RUNS}, better 26",
-            campaign.runs.len(),
+            "{runs} run{s}: the scatter between runs cannot be measured and is taken as {:.1} µm (--repeatability states another), so what is listed is provisional and nothing can be called real; measure at least {FEWEST_RUNS}, better 26",
             repeatability_m * 1e6
         ));
     }

@@ -31,8 +31,8 @@ const OF_ARM: (i32, i32) = (2, 0);
 const FEWEST: usize = 8;
 
 /// What is to be done.
-pub const WORDS: &str = "three waves a turn, the same both ways, ∝ f² and whatever the radius: this looks like an arm: give its kinematics (`[kinematics]` in \
-                         campaign.toml, with `centre_mm` of the runs); no cause of a slide is named";
+pub const WORDS: &str = "three waves a turn, the same both ways, ∝ f² and whatever the radius: this looks like an arm: give its kinematics ([kinematics] in \
+                         campaign.toml, with centre_mm of the runs); no cause of a slide is named";
 
 /// One harmonic of a run, about the machine angle, with what it goes by.
 struct Seen {

@@ -9,6 +9,7 @@
 //! ([`feed_override`]), a spoilt run ([`influence`]), a delay that is not known ([`delay`]).
 pub mod angular_bins;
 pub mod arm;
+pub mod at_work;
 pub mod baseline;
 mod by_slide;
 mod claims;
@@ -60,6 +61,7 @@ pub mod vector;
 pub mod verdict;
 pub mod veto;
 
+pub use at_work::as_uncorrected;
 pub use delay::Delay;
 pub use finding::{Estimate, Finding, Unexplained};
 pub use gain::Gain;
@@ -87,6 +89,8 @@ pub use footing::ASSUMED_REPEATABILITY_M;
 pub struct Options {
     /// The simulation to start from; without it one servo lag with fitted kv.
     pub model: Option<ModelFile>,
+    /// The model whose table was at work while these circles were measured.
+    pub corrected_by: Option<ModelFile>,
     /// Seed of the bootstrap.
     pub seed: u64,
     /// Known scatter of the size between runs of one circle, m; that of the campaign where it states one.
@@ -99,6 +103,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             model: None,
+            corrected_by: None,
             seed: 1,
             repeatability_m: None,
             keep_all: false,
@@ -158,6 +163,9 @@ pub struct Diagnosis {
     /// Whether there is anything in the model that can be called real: without it no file is written.
     #[serde(skip)]
     pub worth_writing: bool,
+    /// Whether a table was at work whose model was not given: only what it leaves is known.
+    #[serde(skip)]
+    pub at_work: bool,
     /// Seed of the bootstrap.
     pub seed: u64,
     /// The extended model.
@@ -209,7 +217,16 @@ const FEWEST_SAMPLES: usize = 16;
 /// ```
 pub fn diagnose(campaign: &Campaign, options: &Options) -> Result<Diagnosis, DiagnosisError> {
     // From within the pool: who stands outside waits for a thread to wake up each time that work is shared.
-    rayon::scope(|_| within_pool(campaign, options))
+    rayon::scope(|_| match &options.corrected_by {
+        Some(model) => at_work::diagnose(campaign, model, options),
+        None => {
+            let mut diagnosis = within_pool(campaign, options)?;
+            if campaign.table.is_some() {
+                at_work::withhold(&mut diagnosis);
+            }
+            Ok(diagnosis)
+        }
+    })
 }
 
 fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, DiagnosisError> {
@@ -292,6 +309,7 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
         delay_s: explanation.delay,
         recommendation: Recommendation::default(),
         model_written: false,
+        at_work: false,
         seed: options.seed,
         picture,
         model,

@@ -346,6 +346,15 @@ fn is_material(found: &Explained, whole: &[&Left], hit: &Hit) -> bool {
     loud_m2 > OF_NOISE.powi(2) * found.spread.sample_m2 && loud_m2 > OF_FORM.powi(2) * form_m2
 }
 
+/// How rare a thing is, for a person.
+fn chance_words(chance: f64) -> String {
+    if chance < 1e-6 {
+        "less than once in a million".to_owned()
+    } else {
+        format!("once in {:.0}", 1.0 / chance.max(f64::MIN_POSITIVE))
+    }
+}
+
 fn leftover(hit: &Hit) -> Leftover {
     let (a, b) = hit.law;
     let ways = if hit.odd {
@@ -366,8 +375,10 @@ fn leftover(hit: &Hit) -> Leftover {
             feed_exponent: Some(f64::from(a)),
             radius_exponent: Some(f64::from(b)),
             words: vec![format!(
-                "{} waves a turn, {ways}, about f^{a}·R^{b}{turning} ({rms_um:.2} µm rms): chance {:.1e} by noise",
-                hit.order, hit.chance
+                "{} waves a turn, {ways}, about {}{turning} ({rms_um:.2} µm rms): {} by noise alone",
+                hit.order,
+                super::unexplained::law_words(f64::from(a), f64::from(b)),
+                chance_words(hit.chance)
             )],
             ..Signature::default()
         },

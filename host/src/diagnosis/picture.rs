@@ -5,6 +5,7 @@ use super::hypothesis::Kind;
 use super::misfit::of_baseline;
 use super::search::columns_of;
 use crate::campaign::Campaign;
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
@@ -48,17 +49,24 @@ pub fn draw(campaign: &Campaign, seen: &Campaign, found: &Explained) -> Vec<RunP
                 let (data, own) = (data.samples(run, at), own.samples(run, at));
                 run.deviation_m[i] - data[i] + amount * own[i] + radius * slowed
             });
+            let arc = campaign.runs[run.index].samples.covered_rad().is_some();
             let centred = |samples: Vec<f64>| -> (f64, Vec<f64>) {
                 let mut read = samples.clone();
                 run.mask(&mut read);
-                let harmonics = run.basis.harmonics(&read).0;
-                let [c, s] = harmonics[1];
+                // Over an arc the orders are not independent: with all of them size and centre would be anything.
+                let (size, [c, s]) = match arc {
+                    true => circle(theta, &samples, visible),
+                    false => {
+                        let harmonics = run.basis.harmonics(&read).0;
+                        (harmonics[0][0], harmonics[1])
+                    }
+                };
                 let free = samples
                     .iter()
                     .zip(theta)
                     .map(|(y, a)| y - c * a.cos() - s * a.sin())
                     .collect();
-                (harmonics[0][0], free)
+                (size, free)
             };
             let measured = centred(campaign.runs[run.index].samples.deviation_m.clone());
             let before = centred(raw.iter().map(|y| y - size).collect());
@@ -96,6 +104,21 @@ fn left_by_simulation(found: &Explained) -> Column {
         }
     }
     left
+}
+
+/// Size and centre of the least-squares circle alone.
+fn circle(theta: &[f64], samples: &[f64], read: impl Fn(usize) -> bool) -> (f64, [f64; 2]) {
+    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    for (_, (angle, y)) in (theta.iter().zip(samples).enumerate()).filter(|(i, _)| read(*i)) {
+        let row = Vector3::new(1.0, angle.cos(), angle.sin());
+        normal += row * row.transpose();
+        right += row * *y;
+    }
+    // Three parameters of an arc of 180° and more: only where nothing was read is there nothing to solve.
+    let solved = normal
+        .try_inverse()
+        .map_or_else(Vector3::zeros, |inverse| inverse * right);
+    (solved[0], [solved[1], solved[2]])
 }
 
 fn rms(samples: &[f64], read: impl Fn(usize) -> bool) -> f64 {
@@ -193,6 +216,38 @@ mod tests {
                 (there.abs() / (0.5 * 200e-6 * run.radius_m) - 1.0).abs() < 0.25,
                 "{there}"
             );
+        }
+    }
+
+    /// Of arcs of 220° the size and the form are those of the circle, not of orders that an arc cannot tell apart.
+    #[test]
+    fn an_arc_is_drawn_as_the_circle_it_is_part_of() {
+        let text = "[machine]\nboth = { kv_per_s = 40.0 }\nsquareness_um_per_m = 100.0\n[instrument]\nsetup_um = [30.0, -20.0]\n\
+                    noise_um = 0.3\n[grid]\nradii_mm = [100.0, 200.0]\nfeeds_mm_s = [50.0, 200.0, 400.0]\n";
+        let plan = Plan::parse(text, std::path::Path::new("plan.toml")).unwrap();
+        let mut campaign = campaign(&plan, 5);
+        for run in &mut campaign.runs {
+            let samples = &mut run.samples;
+            let kept = samples.deviation_m.len() * 220 / 360;
+            samples.deviation_m.truncate(kept);
+            samples.angle_rad.truncate(kept);
+            if let Some(time) = &mut samples.time_s {
+                time.truncate(kept);
+            }
+        }
+        let diagnosis = diagnose(&campaign, &Options::default()).unwrap();
+        assert!(!diagnosis.picture.is_empty());
+        for picture in &diagnosis.picture {
+            let run = &campaign.runs[picture.index];
+            let shrink = -0.5 * (run.omega_rad_s() / 40.0).powi(2) * run.radius_m;
+            // The oval of the missing angle between the axes is seen as size, too: half of it at most.
+            let oval = 0.5 * 100e-6 * run.radius_m;
+            let off = (picture.size_m[0] - shrink).abs();
+            assert!(off < oval + 3e-6, "{} {shrink}", picture.size_m[0]);
+            let known = || picture.profile_m[0].iter().flatten();
+            let (low, high) =
+                known().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
+            assert!(high - low < 3.0 * oval + 4e-6, "{low} {high}");
         }
     }
 }

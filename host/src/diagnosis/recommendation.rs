@@ -25,11 +25,17 @@ pub enum Action {
 pub struct Recommendation {
     /// What kind of thing to do.
     pub action: Action,
-    /// In words.
+    /// In words, without commands.
     pub words: String,
-    /// The command that does it or leads to it; `None`: it is done by hand.
+    /// The command that does it or leads to it; `None`: it is done by hand. [`CAMPAIGN`] and [`MODEL`] stand for files that
+    /// only the caller knows.
     pub command: Option<String>,
 }
+
+/// Stands for the campaign in a command.
+pub const CAMPAIGN: &str = "CAMPAIGN";
+/// Stands for the file of the extended model in a command.
+pub const MODEL: &str = "EXTENDED.toml";
 
 /// Whether a model is proven: the whole interval of its gain is above 0, and it foretells runs left out better than the
 /// simulation as it stood, the paper's β1 and β2 alone, and no model.
@@ -54,13 +60,13 @@ pub fn of(d: &Diagnosis) -> Recommendation {
         return match (d.unexplained.present, &d.gain, d.cannot_tell.first()) {
             (true, ..) => say(
                 Action::Look,
-                "look at the place and the law of what is unexplained; `giotto plan CAMPAIGN` lists the runs that would narrow it down".into(),
+                "look at the place and the law of what is unexplained; further runs would narrow it down".into(),
                 Some(PLAN),
             ),
             (false, None, Some(missing)) => say(Action::Measure, missing.clone(), Some(PLAN)),
             _ => say(
                 Action::Nothing,
-                "nothing beyond the radius model: `giotto fit CAMPAIGN -o MODEL.toml` fits it where the circles shrink with speed".into(),
+                "nothing is to be done beyond the radius model, which giotto fit makes where the circles shrink with speed".into(),
                 None,
             ),
         };
@@ -69,8 +75,8 @@ pub fn of(d: &Diagnosis) -> Recommendation {
         return say(
             Action::Measure,
             format!(
-                "these circles show {} first ({:.1} µm at most), provisionally: `giotto plan CAMPAIGN` gives the shortest session that makes it certain",
-                first.cause.model().words().name,
+                "these circles show {} first ({:.1} µm at most), provisionally: measure the shortest session that makes it certain",
+                first.title(),
                 first.effect_um.max
             ),
             Some(PLAN),
@@ -98,15 +104,15 @@ pub fn of(d: &Diagnosis) -> Recommendation {
     }
     let expected = match expected_um(d) {
         Some([now, then]) if then < now => {
-            format!(" (circles off by {now:.1} µm rms now, by {then:.1} expected)")
+            format!(
+                ": circles that it has not seen are off by {now:.1} µm rms now, by {then:.1} µm expected with it"
+            )
         }
         _ => String::new(),
     };
     say(
         Action::Flash,
-        format!(
-            "write the extended model with -o EXTENDED.toml and flash it: `giotto flash EXTENDED.toml --port PORT`{expected}"
-        ),
+        format!("write the extended model into the controller{expected}"),
         Some("giotto flash EXTENDED.toml --port PORT"),
     )
 }

@@ -105,11 +105,42 @@ fn fill(signature: &mut Signature, pattern: &Pattern) {
     }
 }
 
-fn words(pattern: &Pattern) -> String {
-    let law = |law: Law| match (law.feed, law.radius) {
-        (0.0, 0.0) => "independent of speed and radius".to_string(),
-        (f, r) => format!("∝ f^{f}·R^{r}"),
+/// `∝ f²·R⁻¹`, for a person.
+pub(super) fn law_words(feed: f64, radius: f64) -> String {
+    match (feed, radius) {
+        (0.0, 0.0) => "independent of speed and radius".to_owned(),
+        (f, 0.0) => format!("∝ {}, whatever the radius", power("f", f)),
+        (0.0, r) => format!("∝ {}, whatever the speed", power("R", r)),
+        (f, r) => format!("∝ {}·{}", power("f", f), power("R", r)),
+    }
+}
+
+/// A power with its exponent set high; one that is no whole number stays on the line.
+fn power(name: &str, exponent: f64) -> String {
+    if exponent == 1.0 {
+        return name.to_owned();
+    }
+    if exponent.fract() != 0.0 {
+        return format!("{name}^{exponent}");
+    }
+    let high = |c: char| match c {
+        '-' => '⁻',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        digit => char::from_u32(0x2070 + digit.to_digit(10).unwrap_or(0)).unwrap_or(digit),
     };
+    format!(
+        "{name}{}",
+        format!("{exponent:.0}")
+            .chars()
+            .map(high)
+            .collect::<String>()
+    )
+}
+
+fn words(pattern: &Pattern) -> String {
+    let law = |law: Law| law_words(law.feed, law.radius);
     let ways = |odd: bool| {
         if odd {
             "flips with the direction"

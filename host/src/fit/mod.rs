@@ -82,11 +82,20 @@ pub enum FitError {
         dof: (usize, usize),
     },
     /// The radius to train on is not in the campaign.
-    #[error("no run has a radius of {wanted_mm} mm; the campaign has {present_mm:?} mm")]
+    #[error(
+        "no run has a radius of {wanted_mm} mm; the campaign has {} mm",
+        listed(present_mm)
+    )]
     NoSuchRadius {
         /// Asked for, mm.
         wanted_mm: f64,
         /// There, mm.
         present_mm: Vec<f64>,
     },
+}
+
+/// `50, 100, 150`.
+fn listed(values: &[f64]) -> String {
+    let all: Vec<String> = values.iter().map(f64::to_string).collect();
+    all.join(", ")
 }

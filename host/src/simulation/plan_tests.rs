@@ -102,7 +102,7 @@ fn refusals_name_the_place() {
             .starts_with("plan.toml:6:20: `machine.moving_average_s`")
     );
     assert!(
-        refuse("moving_average_s", "moving_avarage_s").starts_with("plan.toml:6:1: unknown field")
+        refuse("moving_average_s", "moving_avarage_s").starts_with("plan.toml:6:1: unknown key")
     );
     assert!(
         refuse("[campaign]", "model = \"model.toml\"\n[campaign]")

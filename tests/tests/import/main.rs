@@ -541,7 +541,7 @@ fn every_command_takes_a_foreign_file() {
         diagnosis["cannot_tell"][0]
             .as_str()
             .unwrap()
-            .starts_with("1 run(s)"),
+            .starts_with("1 run: "),
         "{out}"
     );
     let (code, _, err) = run("report", &["-o", "report.html"]);

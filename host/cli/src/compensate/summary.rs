@@ -1,6 +1,7 @@
 //! What a person reads about a corrected program: sizes, and each reason once with its count and its lines.
 use super::Args;
 use crate::Output;
+use crate::plan::name;
 use giotto::model_file::ModelFile;
 use giotto_nc::{Fate, Led, Left, Report};
 use std::collections::BTreeMap;
@@ -55,6 +56,7 @@ impl Summary<'_> {
         self.leads(out);
         self.reasons(out);
         let not_applied = super::not_applied(self.model);
+        let not_applied: Vec<String> = not_applied.iter().map(|id| name(id)).collect();
         if !not_applied.is_empty() {
             out.say(format_args!(
                 "only the radius law is applied; {} act on lines too and belong to the controller's table",

@@ -20,7 +20,21 @@ pub(super) struct View {
     pub(super) losses: u32,
     /// What was refused last.
     pub(super) refused: Option<String>,
+    /// Whether the person wants to go.
+    pub(super) leaving: Leaving,
     trace: VecDeque<SetPoint>,
+}
+
+/// How far someone is with leaving.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Leaving {
+    /// Not at all.
+    #[default]
+    No,
+    /// Asked, since the machine moves.
+    Asked,
+    /// As soon as the machine is at rest.
+    AtRest,
 }
 
 /// A trace ready to be drawn, mm.
@@ -54,6 +68,12 @@ impl View {
             port: port.to_owned(),
             ..Self::default()
         }
+    }
+
+    /// Whether the machine was under way when it was last heard of.
+    pub(super) fn moves(&self) -> bool {
+        let status = self.status.as_ref().filter(|_| self.lost.is_none());
+        status.is_some_and(|status| status.motion.is_run())
     }
 
     pub(super) fn take(&mut self, event: Event) {

@@ -1,5 +1,5 @@
 //! The view as a picture of characters.
-use super::controller_state::{View, motion};
+use super::controller_state::{Leaving, View, motion};
 use giotto_shared::wire::{Probation, SlotState, Status};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -31,7 +31,13 @@ pub(super) fn draw(frame: &mut Frame<'_>, view: &View) {
         state(frame, view, body);
     }
     frame.render_widget(
-        Paragraph::new("q quit   s stop   b bypass on/off   r run again"),
+        Paragraph::new(match view.leaving {
+            Leaving::No => "q quit   s stop   b bypass on/off   r run again",
+            Leaving::Asked => {
+                "The machine moves: s stops it first, q leaves it (its run ends unwatched), any other key stays."
+            }
+            Leaving::AtRest => "Stopping; this ends when the machine is at rest.   q leaves now",
+        }),
         foot,
     );
 }

@@ -1,5 +1,5 @@
 //! The terminal: keys in, pictures out.
-use super::controller_state::View;
+use super::controller_state::{Leaving, View};
 use super::watch::{Wish, watch};
 use super::{Args, Failure, Output, draw};
 use giotto_link::Controller;
@@ -42,7 +42,10 @@ pub(super) fn run(args: Args, controller: Controller) -> Result<(), Failure> {
         if let Err(error) = step(&mut terminal, &view) {
             break Err(failed(error));
         }
-        match keys(&wishes, &view, circle.map(Wish::Run)) {
+        if view.leaving == Leaving::AtRest && !view.moves() {
+            break Ok(());
+        }
+        match keys(&wishes, &mut view, circle.map(Wish::Run)) {
             Ok(true) => {}
             Ok(false) => break Ok(()),
             Err(error) => break Err(failed(error)),
@@ -59,8 +62,8 @@ fn step(terminal: &mut DefaultTerminal, view: &View) -> io::Result<()> {
     terminal.draw(|frame| draw::draw(frame, view)).map(drop)
 }
 
-/// Takes what was typed; false: quit.
-fn keys(wishes: &Sender<Wish>, view: &View, again: Option<Wish>) -> io::Result<bool> {
+/// Takes what was typed; false: quit. A machine that moves is not left without a question.
+fn keys(wishes: &Sender<Wish>, view: &mut View, again: Option<Wish>) -> io::Result<bool> {
     if !event::poll(PICTURE)? {
         return Ok(true);
     }
@@ -71,14 +74,31 @@ fn keys(wishes: &Sender<Wish>, view: &View, again: Option<Wish>) -> io::Result<b
         return Ok(true);
     }
     let bypass = view.status.as_ref().is_some_and(|s| s.bypass);
+    let control = key.modifiers.contains(KeyModifiers::CONTROL);
     let wish = match key.code {
-        KeyCode::Char('q') | KeyCode::Esc => return Ok(false),
-        KeyCode::Char('c') if key.modifiers.contains(KeyModifiers::CONTROL) => return Ok(false),
+        KeyCode::Char('q') | KeyCode::Esc => return Ok(stays(view)),
+        KeyCode::Char('c') if control => return Ok(stays(view)),
         KeyCode::Char('s') => Some(Wish::Stop),
+        // While it asks, every other key is the answer that it stays.
+        _ if view.leaving == Leaving::Asked => None,
         KeyCode::Char('b') => Some(Wish::Bypass(!bypass)),
         KeyCode::Char('r') => again,
         _ => None,
     };
+    view.leaving = match (view.leaving, wish) {
+        (Leaving::Asked, Some(Wish::Stop)) => Leaving::AtRest,
+        (Leaving::Asked, _) => Leaving::No,
+        (leaving, _) => leaving,
+    };
     // A watch that has ended has said why.
     wish.map_or(Ok(true), |wish| Ok(wishes.send(wish).is_ok()))
+}
+
+/// Whether who wants to quit is asked first; who wants it twice is not.
+fn stays(view: &mut View) -> bool {
+    let ask = view.leaving == Leaving::No && view.moves();
+    if ask {
+        view.leaving = Leaving::Asked;
+    }
+    ask
 }

@@ -31,7 +31,7 @@ pub struct Args {
     #[arg(long, default_value_t = 0.5, value_name = "S")]
     interval: f64,
     /// Stop after so many looks instead of when interrupted.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = crate::choice::whole::<u64>)]
     count: Option<u64>,
     /// Circle to run while watching, about the origin.
     #[arg(long, value_name = "MM", value_parser = length, requires = "feed", help_heading = "A circle to watch")]

@@ -20,7 +20,7 @@ pub(super) struct Args {
     #[arg(long, value_enum, default_value_t = InPlane::Xy)]
     plane: InPlane,
     /// Turns at full feed.
-    #[arg(long, default_value_t = 1, value_name = "N")]
+    #[arg(long, default_value_t = 1, value_name = "N", value_parser = crate::choice::whole::<u32>)]
     laps: u32,
     /// Centre in the machine, mm: X,Y,Z.
     #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', num_args = 1, default_values_t = [0.0, 0.0, 0.0],
@@ -72,10 +72,17 @@ pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
         laps: args.laps,
         start_rad: 0.0,
     };
-    args.record.ready()?;
+    args.record.ready(&[])?;
     let mut controller = super::open(&args.port, out)?;
+    args.record.flash(&mut controller, out)?;
     let before = controller.status()?;
     let recording = controller.run_circle(&wanted, args.record.every)?;
-    args.record
-        .report(&mut controller, &before, &recording, &[], out)
+    args.record.report(
+        &mut controller,
+        &before,
+        &recording,
+        Some(feed_m_s),
+        &[],
+        out,
+    )
 }

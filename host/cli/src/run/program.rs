@@ -41,7 +41,7 @@ fn tolerance(text: &str) -> Result<f64, String> {
 /// Runs the command.
 pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
     let text = read(&args.program, Kind::GCode)?;
-    args.record.ready()?;
+    args.record.ready(&[&args.program])?;
     // Read once without the machine: what is wrong is said before a port is opened.
     let running = Running {
         start_mm: [0.0; 3],
@@ -51,13 +51,14 @@ pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
     };
     blocks(&args.program, &text, &running)?;
     let mut controller = super::open(&args.port, out)?;
+    args.record.flash(&mut controller, out)?;
     let before = controller.status()?;
     if let (Some((line, words)), Some(slot), false) =
         (giotto_nc::marked(&text), before.active, before.bypass)
     {
         out.note(format_args!(
             "warning: {}:{line}: corrected before ({words}), and the controller corrects by the table in slot {slot}: twice; \
-             run the original, or set `giotto bypass on`",
+             run the original, or switch the correction off: giotto bypass on",
             args.program.display()
         ));
     }
@@ -78,6 +79,7 @@ pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
         &mut controller,
         &before,
         &recording,
+        None,
         &[("blocks", json!(blocks.len()))],
         out,
     )

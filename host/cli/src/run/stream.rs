@@ -30,8 +30,9 @@ const SLACK: f64 = 0.1;
 /// Runs the command.
 pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
     let rows = read(&args.file)?;
-    args.record.ready()?;
+    args.record.ready(&[&args.file])?;
     let mut controller = super::open(&args.port, out)?;
+    args.record.flash(&mut controller, out)?;
     let tick_s = 1.0 / f64::from(controller.identity().tick_hz);
     one_a_tick(&args.file, &rows, tick_s)?;
     let places_nm: Vec<[i32; 3]> = rows.iter().map(|row| row.place_nm).collect();
@@ -58,8 +59,14 @@ pub(super) fn run(args: Args, out: Output) -> Result<(), Failure> {
         ("late_set_points", json!(streamed.late)),
         ("rejected_set_points", json!(streamed.rejected)),
     ];
-    args.record
-        .report(&mut controller, &before, &streamed.recording, &more, out)
+    args.record.report(
+        &mut controller,
+        &before,
+        &streamed.recording,
+        None,
+        &more,
+        out,
+    )
 }
 
 /// Where a row's time stands.
@@ -76,7 +83,7 @@ fn one_a_tick(path: &Path, rows: &[Row], tick_s: f64) -> Result<(), Failure> {
             return Err(Failure::input(format_args!(
                 "{place}: {is:.6} s after the first row, expected {due:.6} s: one row a tick of {tick_s} s"
             ))
-            .help("write the set-points at the rate of the controller; `giotto status` says it"));
+            .help("write the set-points at the rate of the controller, which giotto status says"));
         }
     }
     Ok(())
