@@ -34,13 +34,16 @@ impl Plan {
         share(self.entry.step.remaining_mm).max(exit)
     }
 
-    pub(super) fn fate(&self, arc: &Arc, blocks: usize, led: Led) -> Fate {
+    pub(super) fn fate(&self, arc: &Arc, pieces: &[Piece], led: Led) -> Fate {
+        let slower = pieces.iter().filter(|p| p.speed < 1.0);
+        let lost_mm: f64 = slower.map(|p| p.length_mm * (1.0 / p.speed - 1.0)).sum();
         Fate::Corrected {
             radius_mm: arc.radius_mm,
             feed_mm_s: arc.feed_mm_s,
             delta_mm: self.twin.delta_mm,
-            blocks,
+            blocks: pieces.len(),
             joint_share: self.joint_share(),
+            slower_s: lost_mm / arc.feed_mm_s,
             led,
         }
     }

@@ -15,6 +15,7 @@ mod blend;
 mod chain;
 pub mod check;
 mod codes;
+pub mod contour;
 mod correct;
 mod dialect;
 mod digits;
@@ -27,12 +28,15 @@ mod lead;
 mod least_squares;
 mod left;
 mod mark;
+pub mod path;
 #[cfg(test)]
 mod plan_tests;
 pub mod program;
 #[cfg(test)]
 mod proof;
 pub mod rapid;
+#[cfg(test)]
+mod siemens_tests;
 mod state;
 mod steps;
 #[cfg(test)]
@@ -120,6 +124,8 @@ pub enum Fate {
         blocks: usize,
         /// Largest share of `delta_mm` that is expected to remain as an error where the arc meets its neighbours.
         joint_share: f64,
+        /// Time by which the last stretch before a stop takes longer, s.
+        slower_s: f64,
         /// Its leads.
         led: Led,
     },
@@ -205,7 +211,13 @@ pub fn compensate_to(
     out: &mut dyn io::Write,
 ) -> io::Result<Vec<Report>> {
     let mut arcs = Vec::new();
-    let mut copy = mark::Marking::new(program, mark, "(", ")");
+    // Brackets hold no comment of Siemens.
+    let [open, close] = if word::is_siemens(program) {
+        ["; ", ""]
+    } else {
+        ["(", ")"]
+    };
+    let mut copy = mark::Marking::new(program, mark, open, close);
     engine::run(program, model, options, &mut |line, index, text, fate| {
         engine::report(&mut arcs, index, fate);
         copy.line(line.text.len() + line.end.len(), text, out)

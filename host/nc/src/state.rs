@@ -5,7 +5,7 @@
 pub(super) use super::arc::{Arc, FeedMode, Modes, Plane, Shared, sub};
 use super::codes::{self, G, M, Mode};
 use super::left::{Because, Code, Left};
-use super::word::{Keyword, Line, Sort, Word};
+use super::word::{CIP_TENTHS, Counts, Keyword, Line, Sort, VIA, Word};
 use std::rc::Rc;
 
 /// What a line does.
@@ -49,6 +49,8 @@ pub(super) struct Reading {
     pub(super) harmless: Rc<[Code]>,
     /// Calls are followed by whoever asks: they are no riddle here.
     pub(super) followed: bool,
+    /// Written for a control of Siemens.
+    pub(super) siemens: bool,
 }
 
 /// What M70 keeps, and what must be known before numbers mean anything.
@@ -240,7 +242,8 @@ impl State {
         self.now = Modal {
             inch: None,
             absolute: None,
-            absolute_centres: None,
+            // Nothing of Siemens makes centres absolute for more than a block.
+            absolute_centres: self.reading.siemens.then_some(false),
             feed_mode: None,
             plane: None,
             cutter_compensation: None,
@@ -309,7 +312,7 @@ impl State {
             .words
             .iter()
             .rfind(|w| w.letter == b'G' && (0..40).contains(&w.tenths()));
-        matches!(own.map(Word::tenths).or(self.motion), Some(20 | 30))
+        matches!(own.map(Word::tenths).or(self.motion), Some(20 | 30 | CIP_TENTHS))
     }
 
     fn plain(&mut self, line: &Line<'_>) -> Action {
@@ -337,6 +340,15 @@ impl State {
     /// The rest of a block whose G- and M-words are taken.
     fn words_done(&mut self, line: &Line<'_>, axes: bool, own: bool, stops: bool) -> Action {
         self.take_feed(line);
+        if self.reading.siemens && line.has(b'L') {
+            // A subprogram by its number.
+            self.forget(Code::Named("a subprogram"));
+            return Action::Other;
+        }
+        if self.reading.siemens && line.has(b'D') {
+            let because = self.because(Code::Named("D with its offsets"));
+            self.lose_place(because);
+        }
         // Tools of lathes bring their offsets (T0101).
         if line
             .word(b'T')
@@ -379,7 +391,7 @@ impl State {
                 end: self.position,
                 absolute: self.now.absolute == Some(true),
                 bare: line.words.iter().all(|w| {
-                    matches!(w.letter, b'N' | b'X' | b'Y' | b'Z')
+                    (matches!(w.letter, b'N' | b'X' | b'Y' | b'Z') && w.counts == Counts::InForce)
                         || (w.letter == b'G' && w.tenths() == 10)
                 }) && self.now.feed_mode == Some(FeedMode::PerMinute)
                     && self.open_modes().next().is_none()
@@ -387,7 +399,7 @@ impl State {
                     && self.now.cutter_compensation.is_none(),
                 feed_mm_s: None,
             }),
-            Some(direction @ (20 | 30)) => match self.arc(line, start, along, direction == 30) {
+            Some(direction @ (20 | 30 | CIP_TENTHS)) => match self.arc(line, start, along, direction) {
                 Ok(arc) => Action::Arc(arc),
                 Err(left) => Action::LostArc(left),
             },
@@ -402,7 +414,11 @@ impl State {
         if self.reading.harmless.contains(&code) {
             return Use::None;
         }
-        match codes::g(word.tenths(), axes, self.reading.printer) {
+        let meant = match codes::siemens(word.tenths()) {
+            Some(meant) if self.reading.siemens => meant,
+            _ => codes::g(word.tenths(), axes, self.reading.printer),
+        };
+        match meant {
             G::Motion(motion) => self.motion = Some(motion),
             G::Cycle => {
                 self.motion = Some(word.tenths());
@@ -581,6 +597,11 @@ impl State {
         if self.reading.harmless.contains(&code) {
             return;
         }
+        // M17 ends a subprogram of Siemens.
+        if self.reading.siemens && word.tenths() == 170 {
+            self.forget(code);
+            return;
+        }
         match codes::m(word.tenths(), self.reading.printer) {
             M::Ends => self.forget(code),
             M::Call if self.reading.followed => {}
@@ -609,7 +630,9 @@ impl State {
     }
 
     fn take_feed(&mut self, line: &Line<'_>) {
-        if line.has(b'F') {
+        if self.reading.siemens && line.has_g(&[40]) {
+            // `G4 F2` waits for two seconds.
+        } else if line.has(b'F') {
             // Where the unit changes in the same block, controllers differ in which unit F has.
             let value = line.word(b'F').map(|f| f.value);
             self.now.feed = value.filter(|v| v.is_finite() && !self.unit_changed);
@@ -632,7 +655,11 @@ impl State {
             return;
         }
         for axis in 0..3 {
-            if self.position[axis].is_none() {
+            let placed = |w: &Word| w.counts == Counts::FromOrigin;
+            if line.word(b"XYZ"[axis]).is_some_and(placed) {
+                // Behind the block it counts from the program's origin; before it, from where it did.
+                self.floating[axis] = false;
+            } else if self.position[axis].is_none() {
                 (self.position[axis], self.floating[axis]) = (Some(0.0), true);
             }
         }
@@ -653,8 +680,14 @@ impl State {
             if !line.has(letter) {
                 return self.position[axis];
             }
-            let value = line.word(letter)?.value * unit?;
-            let end = if self.now.absolute? {
+            let word = line.word(letter)?;
+            let value = word.value * unit?;
+            let absolute = match word.counts {
+                Counts::InForce => self.now.absolute?,
+                Counts::FromOrigin => true,
+                Counts::FromStart => false,
+            };
+            let end = if absolute {
                 value
             } else {
                 self.position[axis]? + value
@@ -726,29 +759,35 @@ impl State {
         line: &Line<'_>,
         start: [Option<f64>; 3],
         along: [Option<f64>; 4],
-        ccw: bool,
+        direction: i64,
     ) -> Result<Arc, Left> {
         let (modes, plane) = self.modes()?;
         if let Some(because) = self.now.cutter_compensation {
             return Err(Left::CutterCompensation(because));
         }
-        words_of_an_arc(line)?;
+        words_of_an_arc(line, direction == CIP_TENTHS)?;
         let unit = modes.unit_mm();
         let [a, b, c] = plane.axes();
         // Centres in program coordinates need a place in program coordinates.
+        let own = line.words.iter().any(|w| w.counts == Counts::FromOrigin);
         let from = |axis: usize| {
             start[axis]
-                .filter(|_| !(modes.absolute_centres && self.floating[axis]))
+                .filter(|_| !((modes.absolute_centres || own) && self.floating[axis]))
                 .ok_or(Left::UnknownPosition(self.lost_place))
         };
         let start_2 = [from(a)?, from(b)?];
         let to = |axis: usize, from: f64| match line.word(b"XYZ"[axis]) {
             None => from,
-            Some(w) if modes.absolute => w.value * unit,
+            Some(w) if w.absolute(modes.absolute) => w.value * unit,
             Some(w) => from + w.value * unit,
         };
         let end_2 = [to(a, start_2[0]), to(b, start_2[1])];
-        let circle = super::arc::circle(line, plane, modes, [start_2, end_2], ccw)?;
+        let ends = [start_2, end_2];
+        let circle = if direction == CIP_TENTHS {
+            super::arc::circle_through(line, plane, modes, ends)?
+        } else {
+            super::arc::circle(line, plane, modes, ends, direction == 30)?
+        };
         let lift = match (line.word(b"XYZ"[c]), start[c]) {
             (None, _) => None,
             (Some(_), None) => return Err(Left::UnknownPosition(self.lost_place)),
@@ -819,7 +858,7 @@ enum Use {
 }
 
 /// Every word of the block is one that may stand in the first of several blocks.
-fn words_of_an_arc(line: &Line<'_>) -> Result<(), Left> {
+fn words_of_an_arc(line: &Line<'_>, through: bool) -> Result<(), Left> {
     let code = |w: &Word| Code::Word(char::from(w.letter), w.tenths());
     for w in &line.words {
         let twice = w.letter != b'G' && w.letter != b'M' && line.word(w.letter).is_none();
@@ -828,11 +867,13 @@ fn words_of_an_arc(line: &Line<'_>) -> Result<(), Left> {
             b'M' => codes::m(w.tenths(), false) == M::AtStart && !line.has(b'P'),
             b'G' => match w.tenths() {
                 20 | 30 | 170..=190 | 200 | 210 | 900..=940 if w.tenths() != 920 => true,
+                CIP_TENTHS => true,
                 640 => !line.has(b'P') && !line.has(b'Q'),
                 _ => false,
             },
-            b'N' | b'X' | b'Y' | b'Z' | b'I' | b'J' | b'K' | b'R' | b'P' | b'F' | b'S' | b'E'
-            | b'A' | b'B' | b'C' => true,
+            letter if VIA.contains(&letter) => through,
+            b'I' | b'J' | b'K' | b'R' | b'P' => !through,
+            b'N' | b'X' | b'Y' | b'Z' | b'F' | b'S' | b'E' | b'A' | b'B' | b'C' => true,
             _ => false,
         };
         if !allowed || twice {

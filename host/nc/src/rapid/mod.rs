@@ -181,7 +181,7 @@ pub fn compensate(program: &[u8], model: &ModelFile, options: &Options) -> Compe
                 );
                 out.program.extend_from_slice(&text);
                 from = pieces.last().map(|p| p.end);
-                Some(plan.fate(arc, pieces.len(), Led::Not))
+                Some(plan.fate(arc, &pieces, Led::Not))
             }
             (action, plan, _) => {
                 out.program.extend_from_slice(line);
@@ -199,15 +199,16 @@ pub fn compensate(program: &[u8], model: &ModelFile, options: &Options) -> Compe
     out
 }
 
-/// What the lines of a module do, with the stops between them.
-#[cfg(test)]
-pub(super) fn actions(program: &[u8]) -> Vec<Action> {
+/// What the lines of a module do, by their number, with the stops between them.
+pub(super) fn actions(program: &[u8]) -> Vec<(usize, Action)> {
     let mut reader = Reader::default();
-    let read = program
-        .split_inclusive(|b| *b == b'\n')
-        .map(|line| reader.step(line));
-    read.flat_map(|read| std::iter::once(read.action).chain(read.stops.then_some(Action::Other)))
-        .collect()
+    let mut list = Vec::new();
+    for (index, line) in program.split_inclusive(|b| *b == b'\n').enumerate() {
+        let read = reader.step(line);
+        list.push((index + 1, read.action));
+        list.extend(read.stops.then_some((index + 1, Action::Stop)));
+    }
+    list
 }
 
 /// The instructions that take the place of an arc.

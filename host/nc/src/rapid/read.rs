@@ -1,8 +1,8 @@
 //! Lines of a RAPID module as motions.
+use super::super::arc::through;
 use super::super::left::{Because, Code, Left};
 use super::super::state::{Action, Arc, FeedMode, Modes, Plane, Straight};
 use std::collections::HashMap;
-use std::f64::consts::TAU;
 
 /// What a line does, and how it is written if it is an arc that may be rewritten.
 pub(super) struct Read {
@@ -508,30 +508,4 @@ fn literal_speed(text: &str) -> Option<[String; 2]> {
     let all = std::iter::once(v).chain(rest.split(','));
     (all.clone().count() == 4 && all.clone().all(|n| n.parse::<f64>().is_ok()))
         .then(|| [v.into(), rest.into()])
-}
-
-/// Centre and signed sweep of the arc from `s` through `v` to `e`.
-fn through(s: [f64; 2], v: [f64; 2], e: [f64; 2]) -> Option<([f64; 2], f64)> {
-    let (b, c) = ([v[0] - s[0], v[1] - s[1]], [e[0] - s[0], e[1] - s[1]]);
-    let cross = 2.0 * (b[0] * c[1] - b[1] * c[0]);
-    let (bb, cc) = (b[0] * b[0] + b[1] * b[1], c[0] * c[0] + c[1] * c[1]);
-    // Three points that are nearly one, or nearly on a line: no circle to speak of.
-    if cross.abs() < 1e-9 * (bb + cc) || cc < 1e-12 {
-        return None;
-    }
-    let centre = [
-        s[0] + (c[1] * bb - b[1] * cc) / cross,
-        s[1] + (b[0] * cc - c[0] * bb) / cross,
-    ];
-    let angle = |p: [f64; 2]| (p[1] - centre[1]).atan2(p[0] - centre[0]);
-    let turned = |p: [f64; 2]| (angle(p) - angle(s)).rem_euclid(TAU);
-    let (to_via, to_end) = (turned(v), turned(e));
-    Some((
-        centre,
-        if to_via < to_end {
-            to_end
-        } else {
-            to_end - TAU
-        },
-    ))
 }

@@ -1,0 +1,149 @@
+//! Programs of Siemens against the same part in plain RS-274: the same circles, and nothing else touched.
+use super::path::{Kind, Move, moves};
+use super::tests::lag;
+use super::{Because, Code, Fate, Left, Options, compensate};
+
+const HEAD: &str = "G71 G17 G90 G94 F15000\nG0 X-20 Y0\nG1 X0 Y0\n";
+const TAIL: &str = "G1 Y80\nM30\n";
+
+fn corrected(program: &str) -> (String, Vec<Fate>) {
+    let result = compensate(program.as_bytes(), &lag(), &Options::default());
+    let fates = result.arcs.iter().map(|a| a.fate).collect();
+    (String::from_utf8(result.program).unwrap(), fates)
+}
+
+fn left(arc: &str) -> Left {
+    let program = format!("MSG(\"a\")\n{HEAD}{arc}\n{TAIL}");
+    let (text, fates) = corrected(&program);
+    assert_eq!(text, program, "{arc}");
+    match fates[..] {
+        [Fate::Left(left)] => left,
+        _ => panic!("{arc}: {fates:?}"),
+    }
+}
+
+fn same_way(a: &str, b: &str) {
+    let list = |text: &str| -> Vec<Move> {
+        let all = moves(text.as_bytes(), &Options::default());
+        all.into_iter().filter(|m| m.kind != Kind::Rapid).collect()
+    };
+    let (a, b) = (list(a), list(b));
+    assert_eq!(a.len(), b.len());
+    for (a, b) in a.iter().zip(&b) {
+        for axis in 0..2 {
+            let (p, q) = (a.to_mm[axis].unwrap(), b.to_mm[axis].unwrap());
+            assert!((p - q).abs() < 2e-5, "{a:?} {b:?}");
+        }
+        match (a.kind, b.kind) {
+            (Kind::Arc { sweep_rad: p, .. }, Kind::Arc { sweep_rad: q, .. }) => {
+                assert!((p - q).abs() < 1e-3, "{a:?} {b:?}");
+            }
+            (a, b) => assert_eq!(a, b),
+        }
+    }
+}
+
+/// A quarter of a circle of 50 mm about (0, 50) in every form.
+#[test]
+fn every_form_of_an_arc_becomes_the_same_way() {
+    let plain = format!("MSG(\"a\")\n{HEAD}G3 X50 Y50 I0 J50\n{TAIL}");
+    let (reference, fates) = corrected(&plain);
+    assert!(matches!(fates[..], [Fate::Corrected { .. }]), "{fates:?}");
+    for arc in [
+        "G3 X50 Y50 I=AC(0) J=AC(50)",
+        "G3 X50 Y50 I=IC(0) J=AC(50)",
+        "G3 X=AC(50) Y=IC(50) J=IC(50)",
+        "N10 G3 X=50 Y=50 J = AC( 50 )",
+        "G3 X50 Y50 CR=50",
+        "G3 X50 Y50 CR=+50.0",
+        "CIP X50 Y50 I1=35.35533906 J1=14.64466094",
+        "N10 CIP X=AC(50) Y50 J1=AC(14.64466094) I1=35.35533906",
+        "G91 G3 X50 Y50 J50\nG90",
+        "G91 G3 X=AC(50) Y50 J=AC(50)\nG90",
+    ] {
+        let program = format!("MSG(\"a\")\n{HEAD}{arc}\n{TAIL}");
+        let (text, fates) = corrected(&program);
+        assert!(
+            matches!(fates[..], [Fate::Corrected { .. }]),
+            "{arc}: {fates:?}"
+        );
+        if !arc.contains("G91") {
+            same_way(&text, &reference);
+        }
+        // Nothing of the old form is left behind, but an end that is kept to the letter.
+        for gone in ["IC(", "I1=", "J1=", "CR=", "CIP", "I=", "J="] {
+            assert!(!text.contains(gone), "{arc}:\n{text}");
+        }
+        assert!(text.starts_with(&format!("MSG(\"a\")\n{HEAD}")) && text.ends_with(TAIL));
+    }
+}
+
+#[test]
+fn what_is_not_sure_is_left() {
+    use Left::Dialect;
+    for (arc, why) in [
+        ("G3 X50 Y50 AR=90", Dialect("an arc with AC(), AR= or TURN= of Siemens")),
+        ("G3 X50 Y50 I=AC(R1) J=AC(50)", Dialect("an arc with AC(), AR= or TURN= of Siemens")),
+        ("CT X50 Y50", Dialect("CT of Siemens")),
+        ("CIP X50 Y50 Z1 I1=35.3 J1=14.6 K1=0.5", Left::OtherPlane),
+        ("CIP X50 Y50 I1=35.3", Dialect("CIP of Siemens without all of its points in G90")),
+        ("CIP X50 Y50 I1=IC(35.3) J1=14.6", Dialect("CIP of Siemens without all of its points in G90")),
+        ("CIP X50 Y50 I1=25 J1=25", Left::Geometry),
+        ("G3 X50 Y50 I=AC(0) J=AC(49)", Left::Geometry),
+        ("CIP X50 Y50 I1=35.35533906 J1=14.64466094\nX60 Y90 I1=55 J1=70", Dialect("CIP of Siemens that stays in force")),
+    ] {
+        if arc.contains("X60") {
+            let program = format!("{HEAD}{arc}\n{TAIL}");
+            let (text, fates) = corrected(&program);
+            assert_eq!(text, program);
+            assert_eq!(fates[0], Fate::Left(why), "{arc}");
+        } else {
+            assert_eq!(left(arc), why, "{arc}");
+        }
+    }
+}
+
+/// Words that mean something else to Siemens than to the others.
+#[test]
+fn siemens_has_its_own_meanings() {
+    // `G4 F2` waits, and F stays.
+    let program = format!("{HEAD}G4 F2\nG3 X50 Y50 CR=50\n{TAIL}");
+    let (_, fates) = corrected(&program);
+    assert!(
+        matches!(fates[..], [Fate::Corrected { feed_mm_s: 250.0, .. }]),
+        "{fates:?}"
+    );
+    let lost = |words: &str, line: usize, code: Code| {
+        let program = format!("{HEAD}{words}\nG3 X50 Y50 CR=50\n{TAIL}");
+        let (text, fates) = corrected(&program);
+        assert_eq!(text, program);
+        let because = Because { line, code };
+        let known = [
+            Left::UnknownPosition(Some(because)),
+            Left::UnknownModes(because),
+            Left::UnknownCode(because),
+            Left::ExactStop(because),
+        ];
+        let [Fate::Left(left)] = fates[..] else {
+            panic!("{words}: {fates:?}")
+        };
+        assert!(known.contains(&left), "{words}: {left:?}");
+    };
+    lost("L100", 4, Code::Named("a subprogram"));
+    lost("D2", 4, Code::Named("D with its offsets"));
+    lost("M17", 4, Code::Word('M', 170));
+    lost("G60", 4, Code::Word('G', 600));
+    lost("G507", 4, Code::Word('G', 5070));
+    lost("G70", 4, Code::Word('G', 700));
+    lost("TRANS X5", 4, Code::Named("what stands there"));
+    lost("CYCLE800(1,\"\",0)", 4, Code::Named("what stands there"));
+}
+
+/// Without a word that is Siemens' alone the reader is the one of the others: G71 is a cycle of lathes there.
+#[test]
+fn g71_is_metric_to_siemens_only() {
+    let program = format!("{HEAD}G3 X50 Y50 I0 J50\n{TAIL}");
+    let (text, fates) = corrected(&program);
+    assert!(matches!(fates[..], [Fate::Left(_)]), "{fates:?}");
+    assert_eq!(text, program);
+}
