@@ -18,7 +18,7 @@ use summary::Summary;
 /// Arguments of `giotto compensate`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// NC program, RS-274 as LinuxCNC, Grbl, Fanuc and Haas speak it; or a plain RAPID module.
+    /// NC program, RS-274 as LinuxCNC, Grbl, Fanuc, Haas and Siemens speak it; Klartext of Heidenhain; or a plain RAPID module.
     #[arg(value_name = "IN.nc")]
     program: PathBuf,
     /// Model of the machine, from `giotto fit` or `giotto diagnose`.

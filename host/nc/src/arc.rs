@@ -155,32 +155,33 @@ pub(super) fn circle(
         None if modes.absolute_centres => (absolute().ok_or(Left::Geometry)?, None),
         None => (relative(), absolute()),
     };
-    let miss = |centre: [f64; 2]| {
-        let [from, to] = [sub(start, centre), sub(end, centre)].map(|v| v[0].hypot(v[1]));
-        (from, (to - from).abs())
-    };
-    let (radius_mm, off) = miss(centre);
-    if radius_mm < 1e-6 || off > RADIUS_TOLERANCE_MM {
-        let agrees = other.is_some_and(|c| {
-            let (radius, off) = miss(c);
-            radius > 1e-6 && off <= RADIUS_TOLERANCE_MM
-        });
+    let Some(mut found) = about(start, end, centre, ccw) else {
+        let agrees = other.is_some_and(|c| about(start, end, c, ccw).is_some());
         return Err(if agrees {
             Left::AbsoluteCentres
         } else {
             Left::Geometry
         });
+    };
+    found.sweep_rad += found.sweep_rad.signum() * TAU * (turns - 1.0);
+    Ok(found)
+}
+
+/// The arc about a centre; `None` where start and end do not lie on one circle. One that ends where it begins goes once round.
+pub(super) fn about(start: [f64; 2], end: [f64; 2], centre: [f64; 2], ccw: bool) -> Option<Circle> {
+    let [from, to] = [sub(start, centre), sub(end, centre)].map(|v| v[0].hypot(v[1]));
+    if from < 1e-6 || (to - from).abs() > RADIUS_TOLERANCE_MM {
+        return None;
     }
     let angle = |p: [f64; 2]| (p[1] - centre[1]).atan2(p[0] - centre[0]);
     let raw = angle(end) - angle(start);
     let mut sweep = if ccw { raw } else { -raw }.rem_euclid(TAU);
-    if same || sweep < 1e-12 {
+    if (end[0] - start[0]).hypot(end[1] - start[1]) < 1e-9 || sweep < 1e-12 {
         sweep = TAU;
     }
-    sweep += TAU * (turns - 1.0);
-    Ok(Circle {
+    Some(Circle {
         centre,
-        radius_mm,
+        radius_mm: from,
         sweep_rad: if ccw { sweep } else { -sweep },
     })
 }
@@ -208,7 +209,9 @@ pub(super) fn circle_through(
     }
     let all = [b"XYZ"[a], b"XYZ"[b]].map(said);
     let (Some(x), Some(y), [Some(_), Some(_)]) = (said(VIA[a]), said(VIA[b]), all) else {
-        return Err(Left::Dialect("CIP of Siemens without all of its points in G90"));
+        return Err(Left::Dialect(
+            "CIP of Siemens without all of its points in G90",
+        ));
     };
     let (centre, sweep_rad) = through(start, [x, y], end).ok_or(Left::Geometry)?;
     Ok(Circle {
@@ -233,12 +236,16 @@ pub(super) fn through(s: [f64; 2], v: [f64; 2], e: [f64; 2]) -> Option<([f64; 2]
     let angle = |p: [f64; 2]| (p[1] - centre[1]).atan2(p[0] - centre[0]);
     let turned = |p: [f64; 2]| (angle(p) - angle(s)).rem_euclid(TAU);
     let (to_via, to_end) = (turned(v), turned(e));
-    let sweep = if to_via < to_end { to_end } else { to_end - TAU };
+    let sweep = if to_via < to_end {
+        to_end
+    } else {
+        to_end - TAU
+    };
     Some((centre, sweep))
 }
 
 /// Centre from the radius format: R > 0 takes the arc of less than half a turn.
-fn radius_centre(start: [f64; 2], end: [f64; 2], r: f64, ccw: bool) -> Option<[f64; 2]> {
+pub(super) fn radius_centre(start: [f64; 2], end: [f64; 2], r: f64, ccw: bool) -> Option<[f64; 2]> {
     let [dx, dy] = sub(end, start);
     let chord = dx.hypot(dy);
     let square = r * r - chord * chord / 4.0;

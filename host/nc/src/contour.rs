@@ -70,8 +70,15 @@ pub fn contour(
     let mut begin = 0;
     for driven in run.chunk_by(|a, b| a.group == b.group) {
         let group = driven[0].group;
-        let from = begin + meant[begin..].iter().take_while(|m| m.group < group).count();
-        let count = meant[from..].iter().take_while(|m| m.group == group).count();
+        let from = begin
+            + meant[begin..]
+                .iter()
+                .take_while(|m| m.group < group)
+                .count();
+        let count = meant[from..]
+            .iter()
+            .take_while(|m| m.group == group)
+            .count();
         begin = from + count;
         let mut nominal: Vec<(usize, Stretch)> = Vec::new();
         for (k, m) in meant[from..begin].iter().enumerate() {
@@ -262,7 +269,8 @@ impl Machine {
 
     /// About so many samples.
     fn samples(&self, chain: &[Stretch]) -> usize {
-        let time_s = |s: &Stretch| s.length_mm / s.feed_mm_s + s.feed_mm_s / self.acceleration_mm_s2;
+        let time_s =
+            |s: &Stretch| s.length_mm / s.feed_mm_s + s.feed_mm_s / self.acceleration_mm_s2;
         let moving: f64 = chain.iter().map(time_s).sum();
         ((moving / self.dt_s() + self.response.chain.settling() / STEP) as usize).max(1)
     }

@@ -121,6 +121,21 @@ pub(super) fn decide(visits: &mut [Visit<'_>], law: &Law<'_>) -> Vec<Option<Resu
     }
 }
 
+/// The same for motions that are no lines of RS-274.
+pub(super) fn decide_actions(actions: &[Action], law: &Law<'_>) -> Vec<Option<Result<Plan, Left>>> {
+    let nothing = Line {
+        text: b"",
+        end: b"",
+        words: Vec::new(),
+        sort: Sort::Plain,
+    };
+    let mut visits: Vec<Visit<'_>> = actions
+        .iter()
+        .map(|action| Visit::new(0, nothing.clone(), *action, law))
+        .collect();
+    decide(&mut visits, law)
+}
+
 fn twin(arc: &Arc, law: &Law<'_>) -> Result<Twin, Left> {
     if arc.plane != Plane::Xy && !law.options.all_planes {
         return Err(Left::OtherPlane);

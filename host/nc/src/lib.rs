@@ -1,7 +1,7 @@
 //! Programs for machines: arcs rewritten with the inverse correction, everything else to the letter; or read as the
 //! segments that a controller runs ([`program`]).
 //!
-//! RS-274 as LinuxCNC and Grbl speak it, and plain RAPID ([`rapid`]). An arc of radius R at feed f becomes one of the radius that the machine
+//! RS-274 as LinuxCNC, Grbl and Siemens speak it, Klartext of Heidenhain ([`heidenhain`]), and plain RAPID ([`rapid`]). An arc of radius R at feed f becomes one of the radius that the machine
 //! turns into R, with tangent transitions where it meets its neighbours (`blend`); the blocks of lines are not
 //! touched. What cannot be corrected within bounds stays as it was, with a reason.
 //!
@@ -9,6 +9,7 @@
 //! and belong to the controller's table. Checked by the plant, by the `gcode` crate and by LinuxCNC's interpreter; no
 //! corrected program has been run on a real machine.
 #![forbid(unsafe_code)]
+#![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 mod arc;
 mod blend;
@@ -22,6 +23,7 @@ mod digits;
 mod emit;
 mod engine;
 mod flow;
+pub mod heidenhain;
 mod inverse;
 mod joint;
 mod lead;
@@ -158,7 +160,7 @@ pub fn is_program(program: &[u8]) -> bool {
         word::Sort::Flow(_) | word::Sort::Setting => true,
         word::Sort::Unread => dialect::arc(line.text).is_some(),
     };
-    word::lines(program).any(block)
+    heidenhain::is_klartext(program) || word::lines(program).any(block)
 }
 
 /// Rewrites the arcs of a program. The text need not be UTF-8; bytes outside rewritten arcs are copied.
@@ -210,6 +212,9 @@ pub fn compensate_to(
     mark: Option<&Mark>,
     out: &mut dyn io::Write,
 ) -> io::Result<Vec<Report>> {
+    if heidenhain::is_klartext(program) {
+        return heidenhain::compensate_to(program, model, options, mark, out);
+    }
     let mut arcs = Vec::new();
     // Brackets hold no comment of Siemens.
     let [open, close] = if word::is_siemens(program) {

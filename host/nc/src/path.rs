@@ -3,7 +3,7 @@ use super::engine::reading;
 use super::flow::{Order, order};
 use super::state::{Action, FeedMode, State};
 use super::word::{self, Line};
-use super::{Options, rapid};
+use super::{Options, heidenhain, rapid};
 
 /// One move.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,6 +60,14 @@ pub fn moves(program: &[u8], options: &Options) -> Vec<Move> {
         let mut at = [None; 3];
         for (line, action) in rapid::actions(program) {
             let known = path.take(line, action, [at, at], None);
+            at = known.unwrap_or(at);
+        }
+        return path.moves;
+    }
+    if heidenhain::is_klartext(program) {
+        let mut at = [None; 3];
+        for (line, action, feed_mm_s) in heidenhain::actions(program, options) {
+            let known = path.take(line, action, [at, at], feed_mm_s);
             at = known.unwrap_or(at);
         }
         return path.moves;
@@ -171,7 +179,6 @@ impl Path {
         });
     }
 }
-
 
 /// Distance in the axes that are known; `None` where none is.
 fn distance(a: [Option<f64>; 3], b: [Option<f64>; 3]) -> Option<f64> {

@@ -82,15 +82,30 @@ fn every_form_of_an_arc_becomes_the_same_way() {
 fn what_is_not_sure_is_left() {
     use Left::Dialect;
     for (arc, why) in [
-        ("G3 X50 Y50 AR=90", Dialect("an arc with AC(), AR= or TURN= of Siemens")),
-        ("G3 X50 Y50 I=AC(R1) J=AC(50)", Dialect("an arc with AC(), AR= or TURN= of Siemens")),
+        (
+            "G3 X50 Y50 AR=90",
+            Dialect("an arc with AC(), AR= or TURN= of Siemens"),
+        ),
+        (
+            "G3 X50 Y50 I=AC(R1) J=AC(50)",
+            Dialect("an arc with AC(), AR= or TURN= of Siemens"),
+        ),
         ("CT X50 Y50", Dialect("CT of Siemens")),
         ("CIP X50 Y50 Z1 I1=35.3 J1=14.6 K1=0.5", Left::OtherPlane),
-        ("CIP X50 Y50 I1=35.3", Dialect("CIP of Siemens without all of its points in G90")),
-        ("CIP X50 Y50 I1=IC(35.3) J1=14.6", Dialect("CIP of Siemens without all of its points in G90")),
+        (
+            "CIP X50 Y50 I1=35.3",
+            Dialect("CIP of Siemens without all of its points in G90"),
+        ),
+        (
+            "CIP X50 Y50 I1=IC(35.3) J1=14.6",
+            Dialect("CIP of Siemens without all of its points in G90"),
+        ),
         ("CIP X50 Y50 I1=25 J1=25", Left::Geometry),
         ("G3 X50 Y50 I=AC(0) J=AC(49)", Left::Geometry),
-        ("CIP X50 Y50 I1=35.35533906 J1=14.64466094\nX60 Y90 I1=55 J1=70", Dialect("CIP of Siemens that stays in force")),
+        (
+            "CIP X50 Y50 I1=35.35533906 J1=14.64466094\nX60 Y90 I1=55 J1=70",
+            Dialect("CIP of Siemens that stays in force"),
+        ),
     ] {
         if arc.contains("X60") {
             let program = format!("{HEAD}{arc}\n{TAIL}");
@@ -110,7 +125,13 @@ fn siemens_has_its_own_meanings() {
     let program = format!("{HEAD}G4 F2\nG3 X50 Y50 CR=50\n{TAIL}");
     let (_, fates) = corrected(&program);
     assert!(
-        matches!(fates[..], [Fate::Corrected { feed_mm_s: 250.0, .. }]),
+        matches!(
+            fates[..],
+            [Fate::Corrected {
+                feed_mm_s: 250.0,
+                ..
+            }]
+        ),
         "{fates:?}"
     );
     let lost = |words: &str, line: usize, code: Code| {

@@ -106,13 +106,19 @@ fn shade(um: f64, largest: f64) -> usize {
 
 fn key(largest: f64) -> String {
     let line = |class: &str| {
-        format!("<svg viewBox=\"0 0 26 14\" aria-hidden=\"true\"><path class=\"{class}\" d=\"M1 7H25\"/></svg>")
+        format!(
+            "<svg viewBox=\"0 0 26 14\" aria-hidden=\"true\"><path class=\"{class}\" d=\"M1 7H25\"/></svg>"
+        )
     };
     let mut out = String::from("<ul class=\"key\" aria-label=\"Key of the drawing\">");
     if largest > 0.0 {
         for k in 1..=SHADES {
             let to = largest * k as f64 / SHADES as f64;
-            let words = if k == 1 { "radius changed by up to " } else { "to " };
+            let words = if k == 1 {
+                "radius changed by up to "
+            } else {
+                "to "
+            };
             let _ = write!(
                 out,
                 "<li>{} {words}{} µm</li>",
@@ -278,7 +284,9 @@ impl View {
                 // An `A` goes less than once round: in parts of less than half a turn.
                 let parts = (curve.sweep_rad.abs() / 2.0).ceil().clamp(1.0, 8.0) as usize;
                 // More than a turn looks like one.
-                let sweep = curve.sweep_rad.clamp(-std::f64::consts::TAU, std::f64::consts::TAU);
+                let sweep = curve
+                    .sweep_rad
+                    .clamp(-std::f64::consts::TAU, std::f64::consts::TAU);
                 let r = (from[0] - curve.centre_mm[0]).hypot(from[1] - curve.centre_mm[1]);
                 let clockwise = u8::from(sweep < 0.0);
                 for k in 1..=parts {
@@ -306,7 +314,9 @@ impl View {
 }
 
 fn class_name(class: usize) -> &'static str {
-    ["rapid", "straight", "left-arc", "d1", "d2", "d3", "d4", "d5"][class]
+    [
+        "rapid", "straight", "left-arc", "d1", "d2", "d3", "d4", "d5",
+    ][class]
 }
 
 fn turned(from: [f64; 2], centre: [f64; 2], angle: f64) -> [f64; 2] {

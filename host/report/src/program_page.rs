@@ -130,7 +130,9 @@ fn sizes(list: &[Size]) -> Table {
     let more: usize = list.iter().skip(MOST_ROWS).map(|s| s.count).sum();
     Table {
         caption: if more > 0 {
-            format!("Corrected arcs by size, the most frequent; {more} of other sizes are not listed")
+            format!(
+                "Corrected arcs by size, the most frequent; {more} of other sizes are not listed"
+            )
         } else {
             "Corrected arcs by size".into()
         },

@@ -67,8 +67,12 @@ impl Page<'_> {
         }
         // On a lead the machine is beside the contour by intent.
         for report in self.arcs {
-            if let (Fate::Corrected { led: Led::Tangent, .. }, Some(errors)) =
-                (report.fate, list.get_mut(&report.line))
+            if let (
+                Fate::Corrected {
+                    led: Led::Tangent, ..
+                },
+                Some(errors),
+            ) = (report.fate, list.get_mut(&report.line))
             {
                 errors[1] = None;
             }
@@ -197,11 +201,21 @@ impl Page<'_> {
                 effects.join(", ")
             ));
         }
-        let led = |r: &&Report| matches!(r.fate, Fate::Corrected { led: Led::Tangent, .. });
+        let led = |r: &&Report| {
+            matches!(
+                r.fate,
+                Fate::Corrected {
+                    led: Led::Tangent,
+                    ..
+                }
+            )
+        };
         if self.arcs.iter().any(|r| led(&r)) {
             words.push("Circles with leads have no figure behind the correction: on a lead the tool is beside the contour by intent.".into());
         }
-        words.push("In simulation only: no corrected program has been run on a real machine.".into());
+        words.push(
+            "In simulation only: no corrected program has been run on a real machine.".into(),
+        );
         words
     }
 }

@@ -17,11 +17,32 @@ pub(super) enum Named {
 
 /// Commands without arguments that move nothing: look-ahead, jerk, compressors of short lines, feed under cutter compensation.
 const NOTHING: [&str; 22] = [
-    "STOPRE", "FFWON", "FFWOF", "SOFT", "SOFTA", "BRISK", "BRISKA", "DRIVE", "DRIVEA", "COMPON", "COMPOF", "COMPCURV", "COMPCAD",
-    "COMPSURF", "FNORM", "CFC", "CFIN", "CFTCP", "UPATH", "SPATH", "FIFOCTRL", "STARTFIFO",
+    "STOPRE",
+    "FFWON",
+    "FFWOF",
+    "SOFT",
+    "SOFTA",
+    "BRISK",
+    "BRISKA",
+    "DRIVE",
+    "DRIVEA",
+    "COMPON",
+    "COMPOF",
+    "COMPCURV",
+    "COMPCAD",
+    "COMPSURF",
+    "FNORM",
+    "CFC",
+    "CFIN",
+    "CFTCP",
+    "UPATH",
+    "SPATH",
+    "FIFOCTRL",
+    "STARTFIFO",
 ];
 /// Commands with arguments that move nothing: messages, drawings of the blank, tolerances.
-const NOTHING_WITH_ARGUMENTS: [&str; 5] = ["MSG", "WORKPIECE", "GROUP_BEGIN", "GROUP_END", "CYCLE832"];
+const NOTHING_WITH_ARGUMENTS: [&str; 5] =
+    ["MSG", "WORKPIECE", "GROUP_BEGIN", "GROUP_END", "CYCLE832"];
 
 /// What stands at the begin of `text`, with its length; `None` where it is nothing of Siemens, or not known.
 pub(super) fn named(text: &[u8]) -> Option<(Named, usize)> {
