@@ -293,7 +293,9 @@ fn program_page(folder: &Path) -> PathBuf {
         &at("part.html"),
     ]);
     let html = std::fs::read_to_string(at("part.html")).unwrap();
-    for scheme in ["http:", "https:", "src=", "url(", "@import", "<script", "<b>"] {
+    for scheme in [
+        "http:", "https:", "src=", "url(", "@import", "<script", "<b>",
+    ] {
         assert!(!html.contains(scheme), "{scheme}");
     }
     for words in [
@@ -303,7 +305,7 @@ fn program_page(folder: &Path) -> PathBuf {
         "2 arcs in the plane XY",
         "class=\"stroke left-arc\"",
         "class=\"stroke d5\"",
-        "contour before",
+        "largest contour error before and after",
     ] {
         assert!(html.contains(words), "{words} in\n{html}");
     }

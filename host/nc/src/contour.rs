@@ -21,8 +21,8 @@ const TANGENT: f64 = 0.9986;
 const MOST_SAMPLES: usize = 20_000_000;
 /// Way beside that of a sample in which the nearest move is looked for, mm.
 const REACH_MM: f64 = 1.0;
-/// Moves ahead that are looked at whatever their length.
-const LEAST_AHEAD: usize = 4;
+/// Distances that are one.
+const SAME_MM: f64 = 1e-6;
 
 /// The error that a machine leaves of the contour `meant` when it is driven along `run`: the same moves, or those of the corrected
 /// program. `None` where no chain is known for the model, or where `run` is no correction of `meant`.
@@ -95,7 +95,8 @@ pub fn contour(
                 return Some(result);
             }
             for (p, reach_mm) in machine.driven(&chain) {
-                if let Some((index, off_mm)) = follower.nearest(p, reach_mm) {
+                let off_mm = follower.follow(p, reach_mm);
+                for index in follower.near(p, reach_mm, off_mm) {
                     let most = result.most_um[index].get_or_insert(0.0);
                     *most = most.max(off_mm * 1e3);
                 }
@@ -234,25 +235,38 @@ struct Follower<'a> {
 }
 
 impl Follower<'_> {
-    /// The move nearest to a point, from the last one on and no farther than `reach_mm` ahead, and how far off it lies.
-    fn nearest(&mut self, p: [f64; 3], reach_mm: f64) -> Option<(usize, f64)> {
-        let first = self.at.saturating_sub(1);
-        let (mut ahead, mut best) = (0.0, None::<(usize, f64)>);
-        for (k, (_, stretch)) in self.nominal.iter().enumerate().skip(first) {
-            if k > self.at + LEAST_AHEAD && ahead > reach_mm {
-                break;
-            }
-            if k > self.at {
+    /// Moves from the last one on, up to `reach_mm` ahead, with their places in the list.
+    fn ahead(&self, reach_mm: f64) -> impl Iterator<Item = (usize, &(usize, Stretch))> {
+        let (at, mut ahead) = (self.at, 0.0);
+        let list = self.nominal.iter().enumerate().skip(at.saturating_sub(1));
+        list.take_while(move |(k, (_, stretch))| {
+            let within = ahead <= reach_mm;
+            if *k > at {
                 ahead += stretch.length_mm;
             }
-            let off = stretch.distance(p);
-            if best.is_none_or(|(_, least)| off < least) {
-                best = Some((k, off));
-            }
-        }
-        let (k, off) = best?;
+            within
+        })
+    }
+
+    /// Goes on to the move nearest to a point; how far off it lies, mm.
+    fn follow(&mut self, p: [f64; 3], reach_mm: f64) -> f64 {
+        let off = |(k, (_, stretch)): (usize, &(usize, Stretch))| (k, stretch.distance(p));
+        let list = || self.ahead(reach_mm).map(off);
+        let least = list().map(|(_, off)| off).fold(f64::INFINITY, f64::min);
+        // Where the way lies upon itself, the part that comes first.
+        let nearest = list().find(|(_, off)| *off <= least + SAME_MM);
+        let (k, off) = nearest.unwrap_or((self.at, 0.0));
         self.at = self.at.max(k);
-        Some((self.nominal[k].0, off))
+        off
+    }
+
+    /// Indices of the moves that lie so near: more than one where a circle is run twice.
+    fn near(&self, p: [f64; 3], reach_mm: f64, off_mm: f64) -> impl Iterator<Item = usize> {
+        let same = move |stretch: &Stretch| stretch.distance(p) <= off_mm + SAME_MM;
+        let near = self
+            .ahead(reach_mm)
+            .filter(move |(_, (_, stretch))| same(stretch));
+        near.map(|(_, (index, _))| *index)
     }
 }
 

@@ -36,7 +36,8 @@ impl Plan {
 
     pub(super) fn fate(&self, arc: &Arc, pieces: &[Piece], led: Led) -> Fate {
         let slower = pieces.iter().filter(|p| p.speed < 1.0);
-        let lost_mm: f64 = slower.map(|p| p.length_mm * (1.0 / p.speed - 1.0)).sum();
+        // The sum of nothing is −0.
+        let lost_mm = slower.fold(0.0, |sum, p| sum + p.length_mm * (1.0 / p.speed - 1.0));
         Fate::Corrected {
             radius_mm: arc.radius_mm,
             feed_mm_s: arc.feed_mm_s,

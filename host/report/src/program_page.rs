@@ -114,7 +114,7 @@ fn sizes(list: &[Size]) -> Table {
     let row = |size: &Size| Row {
         cells: vec![
             if size.count > 1 {
-                format!("{} …", size.line)
+                format!("{}…", size.line)
             } else {
                 size.line.to_string()
             },
@@ -131,18 +131,19 @@ fn sizes(list: &[Size]) -> Table {
     Table {
         caption: if more > 0 {
             format!(
-                "Corrected arcs by size, the most frequent; {more} of other sizes are not listed"
+                "Corrected arcs by size, the most frequent; {more} of other sizes are not listed. Change of the radius, largest contour error before and after"
             )
         } else {
-            "Corrected arcs by size".into()
+            "Corrected arcs by size: change of the radius, largest contour error before and after"
+                .into()
         },
         header: vec![
             "Line",
             "arcs",
             "R, mm",
-            "feed, mm/s",
-            "change of R, µm",
-            "contour before, µm",
+            "mm/s",
+            "ΔR, µm",
+            "before, µm",
             "after, µm",
         ],
         rows: list.iter().take(MOST_ROWS).map(row).collect(),

@@ -1,8 +1,7 @@
 //! Made-up programs before LinuxCNC's interpreter: `nc` writes `tests/NC.md`.
 //!
 //! Each program is corrected; original and output are run by `rs274`, and their canonical calls compared. Needs Debian's
-//! `linuxcnc-uspace`, or `GIOTTO_RS274`. Programs are worked on in parallel; two interpreters that start at once may kill each other,
-//! and the one that died is started anew (`giotto_tests::nc::canon`). About 0.06 s of a core each.
+//! `linuxcnc-uspace`, or `GIOTTO_RS274`. About 0.1 s of a core each.
 use clap::Parser;
 use giotto_tests::nc::canon::Rs274;
 use giotto_tests::nc::judge;
@@ -52,7 +51,11 @@ fn main() -> ExitCode {
             eprintln!("{words}\n");
         }
         outcomes.extend(some);
-        eprintln!("{} programs in {:.0} s", outcomes.len(), begin.elapsed().as_secs_f64());
+        eprintln!(
+            "{} programs in {:.0} s",
+            outcomes.len(),
+            begin.elapsed().as_secs_f64()
+        );
     }
     let count = outcomes.len();
     let (mut corrected, mut left, mut run, mut wrong, mut whole) = (0, 0, 0, 0, 0);

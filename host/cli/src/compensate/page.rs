@@ -115,7 +115,7 @@ impl Page<'_> {
                 "Largest contour error of the corrected arcs through the model: {before:.1} µm as programmed, {after:.1} µm as corrected (line {line})."
             ));
         }
-        words.extend(super::summary::slower(slower_s));
+        words.extend(super::summary::slower(slower_s).map(|words| plain(&words)));
         words
     }
 
@@ -170,7 +170,7 @@ impl Page<'_> {
                     lines.iter().take(LINES).map(ToString::to_string).collect();
                 let more = if lines.len() > LINES { " …" } else { "" };
                 Reason {
-                    words: left.to_string(),
+                    words: plain(&left.to_string()),
                     count: lines.len(),
                     lines: named.join(", ") + more,
                 }
@@ -218,6 +218,11 @@ impl Page<'_> {
         );
         words
     }
+}
+
+/// Without the marks of a terminal around what is to be typed.
+fn plain(words: &str) -> String {
+    words.replace('`', "")
 }
 
 fn stroke(m: &Move, fate: Option<&Fate>, errors: Option<&Errors>) -> Stroke {

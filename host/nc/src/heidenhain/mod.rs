@@ -78,6 +78,17 @@ pub(super) fn compensate_to(
     let any = place
         .iter()
         .any(|at| matches!((&actions[*at], &plans[*at]), (Action::Arc(_), Some(Ok(_)))));
+    if !any {
+        out.write_all(program)?;
+        let left = place.iter().enumerate().filter_map(|(i, at)| {
+            let left = plans[*at].as_ref()?.as_ref().err()?;
+            Some(Report {
+                line: i + 1,
+                fate: Fate::Left(*left),
+            })
+        });
+        return Ok(left.collect());
+    }
     let mut writer = Writer::new(&blocks, line_end(program));
     for (i, line) in lines.iter().enumerate() {
         let at = place[i];
@@ -98,10 +109,7 @@ pub(super) fn compensate_to(
         let begins = blocks[i]
             .as_ref()
             .is_some_and(|b| b.starts(&["BEGIN", "PGM"]));
-        if begins
-            && any
-            && let Some(mark) = mark
-        {
+        if begins && let Some(mark) = mark {
             writer.comment(&mark.to_string(), out)?;
         }
     }
@@ -134,10 +142,7 @@ fn line_end(program: &[u8]) -> &'static str {
 }
 
 fn read_all(blocks: &[Option<Block<'_>>], options: &Options) -> Vec<Read> {
-    let mut reader = Reader {
-        blocked: blocked(blocks, options),
-        ..Reader::default()
-    };
+    let mut reader = Reader::new(blocked(blocks, options));
     let mut reads: Vec<Read> = blocks.iter().map(|b| reader.step(b.as_ref())).collect();
     let corners: Vec<usize> = (0..reads.len()).filter(|i| reads[*i].trims).collect();
     for corner in corners {
@@ -177,7 +182,10 @@ fn blocked(blocks: &[Option<Block<'_>>], options: &Options) -> Option<Left> {
         ));
     }
     // Numbered from anywhere, but by one; or not at all.
-    let mut numbers = blocks.iter().flatten().filter(|b| !b.words.is_empty());
+    let mut numbers = blocks
+        .iter()
+        .flatten()
+        .filter(|b| b.number.is_some() || !b.words.is_empty());
     let first = numbers.next().and_then(|b| b.number);
     let mut next = first;
     let counted = numbers.all(|block| {

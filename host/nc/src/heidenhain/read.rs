@@ -50,7 +50,7 @@ pub(super) struct Reader {
     compensation: Option<Because>,
     lost: Option<Because>,
     /// What keeps every circle of the program from being corrected.
-    pub(super) blocked: Option<Left>,
+    blocked: Option<Left>,
     /// Within a block that goes on in the next line.
     goes_on: bool,
     line: usize,
@@ -112,7 +112,14 @@ fn is_harmless(m: i64) -> bool {
 }
 
 impl Reader {
-    pub(super) fn because(&self, name: &'static str) -> Because {
+    pub(super) fn new(blocked: Option<Left>) -> Self {
+        Self {
+            blocked,
+            ..Self::default()
+        }
+    }
+
+    fn because(&self, name: &'static str) -> Because {
         Because {
             line: self.line,
             code: Code::Named(name),

@@ -9,7 +9,7 @@ mod place;
 pub(super) use super::arc::{Arc, FeedMode, Modes, Plane, Shared, sub};
 use super::codes::Mode;
 use super::left::{Because, Code, Left};
-use super::word::{CIP_TENTHS, Counts, Keyword, Line, Sort, Word};
+use super::word::{self, CIP_TENTHS, Counts, Keyword, Line, Sort, Word};
 use modes::Use;
 use std::rc::Rc;
 
@@ -184,6 +184,10 @@ impl State {
                 let code = Code::Named("what stands there");
                 let arc = self.moves_on_arc(line);
                 self.forget(code);
+                if let Some(name) = word::transforms(line.text).filter(|_| self.reading.siemens) {
+                    let because = self.because(Code::Named(name));
+                    self.blocked.get_or_insert(Left::Coordinates(because));
+                }
                 if let Some(name) = super::dialect::arc(line.text) {
                     return Action::LostArc(Left::Dialect(name));
                 }

@@ -6,7 +6,7 @@ mod operand;
 mod read;
 mod siemens;
 
-pub(super) use siemens::is_siemens;
+pub(super) use siemens::{is_siemens, transforms};
 use std::ops::Range;
 
 /// A letter with its number.

@@ -72,7 +72,7 @@ pub(super) fn named(text: &[u8]) -> Option<(Named, usize)> {
         let length = name + blanks(&text[name..]);
         return Some((Named::Nothing, length + arguments(&text[length..])?));
     }
-    let letter = match upper.as_slice() {
+    let letter = match &upper[..] {
         b"CR" => b'R',
         b"I1" => VIA[0],
         b"J1" => VIA[1],
@@ -104,7 +104,8 @@ fn number(text: &[u8]) -> Option<(f64, Counts, usize)> {
         let value: f64 = std::str::from_utf8(&text[..length]).ok()?.parse().ok()?;
         (length > 0 && value.is_finite()).then_some((value, length))
     };
-    let counts = match text.get(..2).map(<[u8]>::to_ascii_uppercase)?.as_slice() {
+    let head = text.get(..2).map(<[u8]>::to_ascii_uppercase);
+    let counts = match head.as_deref().unwrap_or_default() {
         b"AC" => Counts::FromOrigin,
         b"IC" => Counts::FromStart,
         _ => {
@@ -144,6 +145,24 @@ fn arguments(text: &[u8]) -> Option<usize> {
         }
     }
     None
+}
+
+/// Commands behind which a number of a place is not one of the path: frames that turn, mirror or scale, planes in space,
+/// transformations, diameters.
+const TRANSFORMS: [&str; 20] = [
+    "SCALE", "ASCALE", "MIRROR", "AMIRROR", "ROT", "AROT", "ROTS", "AROTS", "CROTS", "CYCLE800",
+    "TRANSMIT", "TRACYL", "TRAANG", "TRAORI", "TRACON", "DIAMON", "DIAM90", "DIAMCHAN", "TOFRAME",
+    "TOROT",
+];
+
+/// The first command of a line that changes what numbers mean from there on.
+pub(in super::super) fn transforms(text: &[u8]) -> Option<&'static str> {
+    let upper = text.to_ascii_uppercase();
+    let code = upper.split(|b| *b == b';').next().unwrap_or_default();
+    let names = code.split(|b| !(b.is_ascii_alphanumeric() || *b == b'_'));
+    names
+        .filter(|name| !name.is_empty())
+        .find_map(|name| TRANSFORMS.into_iter().find(|t| t.as_bytes() == name))
 }
 
 /// Words that only programs of Siemens have.
@@ -195,6 +214,14 @@ mod tests {
         ] {
             assert_eq!(named(text.as_bytes()).map(|n| n.0), expected, "{text}");
         }
+    }
+
+    #[test]
+    fn commands_that_transform() {
+        assert_eq!(transforms(b"N10 scale X2 Y2"), Some("SCALE"));
+        assert_eq!(transforms(b"CYCLE800(1,\"\",0)"), Some("CYCLE800"));
+        assert_eq!(transforms(b"TRANS X5 ; no ROT"), None);
+        assert_eq!(transforms(b"AROTX"), None);
     }
 
     #[test]
