@@ -174,3 +174,100 @@ fn g71_is_metric_to_siemens_only() {
     assert!(matches!(fates[..], [Fate::Left(_)]), "{fates:?}");
     assert_eq!(text, program);
 }
+
+/// Arcs of every size and sweep, either way round, in every form: the output is that of the plain one.
+#[test]
+fn made_up_arcs_in_every_form() {
+    for arc in made_up_arcs(60) {
+        let [[x, y], [i, j], [u, v]] = [arc.end, arc.centre, arc.via];
+        let [[sx, sy], [bx, by], [ax, ay]] = [arc.start, arc.before, arc.after];
+        let code = if arc.ccw { "G3" } else { "G2" };
+        let (di, dj) = (i - sx, j - sy);
+        let cr = if arc.sweep > std::f64::consts::PI {
+            -arc.radius
+        } else {
+            arc.radius
+        };
+        let head = format!(
+            "MSG(\"\")\nG71 G17 G90 G94 F6000\nG0 X{bx:.8} Y{by:.8}\nG1 X{sx:.8} Y{sy:.8}\n"
+        );
+        let whole = |block: &str| format!("{head}{block}\nG1 X{ax:.8} Y{ay:.8}\nM30\n");
+        let plain = whole(&format!("{code} X{x:.8} Y{y:.8} I{di:.8} J{dj:.8}"));
+        let (reference, fates) = corrected(&plain);
+        assert!(
+            matches!(fates[..], [Fate::Corrected { .. }]),
+            "{plain}{fates:?}"
+        );
+        for block in [
+            format!("{code} X{x:.8} Y{y:.8} I=AC({i:.8}) J=AC({j:.8})"),
+            format!(
+                "{code} X=IC({:.8}) Y=AC({y:.8}) I=IC({di:.8}) J=AC({j:.8})",
+                x - sx
+            ),
+            format!("{code} X{x:.8} Y{y:.8} CR={cr:.8}"),
+            format!("CIP X{x:.8} Y{y:.8} I1={u:.8} J1={v:.8}"),
+        ] {
+            let (text, fates) = corrected(&whole(&block));
+            assert!(
+                matches!(fates[..], [Fate::Corrected { .. }]),
+                "{block}: {fates:?}"
+            );
+            same_way(&text, &reference);
+        }
+    }
+}
+
+/// An arc between two lines that touch it.
+pub(super) struct MadeUp {
+    pub(super) start: [f64; 2],
+    pub(super) end: [f64; 2],
+    pub(super) centre: [f64; 2],
+    pub(super) via: [f64; 2],
+    pub(super) before: [f64; 2],
+    pub(super) after: [f64; 2],
+    pub(super) radius: f64,
+    pub(super) sweep: f64,
+    pub(super) ccw: bool,
+}
+
+/// The same ones each time.
+pub(super) fn made_up_arcs(count: usize) -> Vec<MadeUp> {
+    let mut state = 88_172_645_463_325_252_u64;
+    let mut between = move |low: f64, high: f64| {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        low + (high - low) * (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let mut arcs = Vec::new();
+    while arcs.len() < count {
+        let radius = between(12.0, 80.0);
+        let sweep = between(1.2, 5.6);
+        // The radius of a half turn says nothing about its centre.
+        if (sweep - std::f64::consts::PI).abs() < 0.2 {
+            continue;
+        }
+        let centre = [between(-200.0, 200.0), between(-200.0, 200.0)];
+        let (begin, ccw) = (between(-3.0, 3.0), between(0.0, 1.0) < 0.5);
+        let side = if ccw { 1.0 } else { -1.0 };
+        let at = |swept: f64, aside: f64| {
+            let (sin, cos) = (begin + side * swept).sin_cos();
+            [
+                centre[0] + radius * cos - side * aside * sin,
+                centre[1] + radius * sin + side * aside * cos,
+            ]
+        };
+        arcs.push(MadeUp {
+            start: at(0.0, 0.0),
+            end: at(sweep, 0.0),
+            centre,
+            via: at(0.45 * sweep, 0.0),
+            before: at(0.0, -40.0),
+            after: at(sweep, 40.0),
+            radius,
+            sweep,
+            ccw,
+        });
+    }
+    arcs
+}

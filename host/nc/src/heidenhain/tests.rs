@@ -1,6 +1,7 @@
 //! Klartext against the same part in RS-274, block by block, and what is left.
 use crate::contour::contour;
 use crate::path::{Kind, moves};
+use crate::siemens_tests::made_up_arcs;
 use crate::tests::lag;
 use crate::{Fate, Left, Options, compensate};
 
@@ -277,5 +278,66 @@ fn programs_of_robots_are_left_by_name() {
         let (output, fates) = corrected(text);
         assert_eq!(output, text);
         assert_eq!(fates, [Fate::Left(Left::Dialect(name))]);
+    }
+}
+
+/// Arcs of every size and sweep, either way round, in both forms: every place of the output of RS-274 is one of Klartext's.
+#[test]
+fn made_up_circles_in_both_forms() {
+    let options = Options {
+        slow_to_stops: false,
+        ..Options::default()
+    };
+    let ends = |text: &[u8]| -> Vec<[f64; 2]> {
+        let list = moves(text, &options).into_iter();
+        list.filter(|m| m.kind != Kind::Rapid)
+            .map(|m| [m.to_mm[0].unwrap(), m.to_mm[1].unwrap()])
+            .collect()
+    };
+    for arc in made_up_arcs(60) {
+        let [[x, y], [i, j]] = [arc.end, arc.centre];
+        let [[sx, sy], [bx, by], [ax, ay]] = [arc.start, arc.before, arc.after];
+        let (code, turn) = if arc.ccw {
+            ("G3", "DR+")
+        } else {
+            ("G2", "DR-")
+        };
+        let rs274 = format!(
+            "G21 G17 G90 F6000\nG0 X{bx:.6} Y{by:.6}\nG1 X{sx:.6} Y{sy:.6}\n{code} X{x:.6} Y{y:.6} I{:.6} J{:.6}\nG1 X{ax:.6} Y{ay:.6}\n",
+            i - sx,
+            j - sy
+        );
+        let reference = ends(&compensate(rs274.as_bytes(), &lag(), &options).program);
+        assert!(reference.len() > 6, "{rs274}");
+        let r = if arc.sweep > std::f64::consts::PI {
+            -arc.radius
+        } else {
+            arc.radius
+        };
+        let pole = format!("CC X{i:+.6} Y{j:+.6}");
+        for block in [
+            format!("C X{x:+.6} Y{y:+.6} {turn}"),
+            format!("CR X{x:+.6} Y{y:+.6} R{r:+.6} {turn}"),
+        ] {
+            let (text, fates) = corrected(&program(&[
+                &format!("L X{bx:+.6} Y{by:+.6} FMAX"),
+                &format!("L X{sx:+.6} Y{sy:+.6} F6000"),
+                &pole,
+                &block,
+                &format!("L X{ax:+.6} Y{ay:+.6}"),
+            ]));
+            assert!(
+                matches!(fates[..], [Fate::Corrected { .. }]),
+                "{block}: {fates:?}"
+            );
+            assert!(!text.contains("R+0 ") && !text.contains("R-0 "), "{text}");
+            let here = ends(text.as_bytes());
+            for there in &reference {
+                let near = here
+                    .iter()
+                    .any(|p| (p[0] - there[0]).hypot(p[1] - there[1]) < 3e-4);
+                assert!(near, "{there:?}\n{text}");
+            }
+        }
     }
 }
