@@ -1,7 +1,7 @@
 //! Programs of Siemens against the same part in plain RS-274: the same circles, and nothing else touched.
 use super::path::{Kind, Move, moves};
 use super::tests::lag;
-use super::{Because, Code, Fate, Left, Options, compensate};
+use super::{Because, Code, Fate, Left, Mark, Options, compensate, compensate_to, marked};
 
 const HEAD: &str = "G71 G17 G90 G94 F15000\nG0 X-20 Y0\nG1 X0 Y0\n";
 const TAIL: &str = "G1 Y80\nM30\n";
@@ -150,6 +150,11 @@ fn siemens_has_its_own_meanings() {
     };
     lost("L100", 4, Code::Named("a subprogram"));
     lost("D2", 4, Code::Named("D with its offsets"));
+    lost(
+        "T=\"MILL (10)\" M6",
+        4,
+        Code::Named("a tool with its offsets"),
+    );
     lost("M17", 4, Code::Word('M', 170));
     lost("G60", 4, Code::Word('G', 600));
     lost("G507", 4, Code::Word('G', 5070));
@@ -164,6 +169,26 @@ fn siemens_has_its_own_meanings() {
     ] {
         lost(&format!("{words}{again}"), 4, Code::Named(name));
     }
+}
+
+/// As a post writes it: the tool by its name, a message, the mark behind a semicolon.
+#[test]
+fn a_whole_program() {
+    let program = format!(
+        "%_N_PART_MPF\nN10 G71 G17 G90 G94 G64\nN20 T=\"MILL\" D1\nN30 MSG(\"corner (R50)\")\n{HEAD}G3 X50 Y50 I=AC(0) J=AC(50) ; corner\n{TAIL}"
+    );
+    let mark = Mark {
+        version: "1".into(),
+        model: "2".into(),
+        options: "3".into(),
+    };
+    let mut out = Vec::new();
+    let options = Options::default();
+    let arcs = compensate_to(program.as_bytes(), &lag(), &options, Some(&mark), &mut out).unwrap();
+    assert!(matches!(arcs[0].fate, Fate::Corrected { .. }), "{arcs:?}");
+    let text = String::from_utf8(out).unwrap();
+    assert!(text.contains("\n; giotto compensate 1 "), "{text}");
+    assert!(marked(text.as_bytes()).is_some());
 }
 
 /// Without a word that is Siemens' alone the reader is the one of the others: G71 is a cycle of lathes there.

@@ -3,7 +3,7 @@ use crate::contour::contour;
 use crate::path::{Kind, moves};
 use crate::siemens_tests::made_up_arcs;
 use crate::tests::lag;
-use crate::{Fate, Left, Options, compensate};
+use crate::{Fate, Left, Mark, Options, compensate, compensate_to, marked};
 
 const HEAD: [&str; 3] = [
     "BEGIN PGM PART MM",
@@ -260,6 +260,33 @@ fn no_run_out_into_a_line_that_is_cut() {
         "{}",
         blocks_of(&whole)
     );
+}
+
+/// The mark is a block of its own, and known again behind its number.
+#[test]
+fn a_corrected_program_is_marked() {
+    let mark = Mark {
+        version: "1".into(),
+        model: "2".into(),
+        options: "3".into(),
+    };
+    let mut out = Vec::new();
+    let text = program(&PART);
+    compensate_to(
+        text.as_bytes(),
+        &lag(),
+        &Options::default(),
+        Some(&mark),
+        &mut out,
+    )
+    .unwrap();
+    let text = String::from_utf8(out).unwrap();
+    assert!(
+        text.starts_with("0 BEGIN PGM PART MM\n1 ; giotto compensate 1 "),
+        "{text}"
+    );
+    let (line, _) = marked(text.as_bytes()).unwrap();
+    assert_eq!(line, 2);
 }
 
 /// Programs of robots are known by their circles, and left.

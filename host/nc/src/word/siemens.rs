@@ -15,6 +15,15 @@ pub(super) enum Named {
     Nothing,
 }
 
+impl Named {
+    /// A tool by its name: which offsets it brings only the control knows.
+    const TOOL: Self = Self::Word {
+        letter: b'T',
+        value: f64::NAN,
+        counts: Counts::InForce,
+    };
+}
+
 /// Commands without arguments that move nothing: look-ahead, jerk, compressors of short lines, feed under cutter compensation.
 const NOTHING: [&str; 22] = [
     "STOPRE",
@@ -77,7 +86,7 @@ pub(super) fn named(text: &[u8]) -> Option<(Named, usize)> {
         b"I1" => VIA[0],
         b"J1" => VIA[1],
         b"K1" => VIA[2],
-        [letter @ (b'X' | b'Y' | b'Z' | b'I' | b'J' | b'K')] => *letter,
+        [letter @ (b'T' | b'X' | b'Y' | b'Z' | b'I' | b'J' | b'K')] => *letter,
         _ => return None,
     };
     let equals = name + blanks(&text[name..]);
@@ -85,6 +94,9 @@ pub(super) fn named(text: &[u8]) -> Option<(Named, usize)> {
         return None;
     }
     let at = equals + 1 + blanks(&text[equals + 1..]);
+    if letter == b'T' {
+        return tool(&text[at..]).map(|length| (Named::TOOL, at + length));
+    }
     let (value, counts, length) = number(&text[at..])?;
     if letter == b'R' && counts != Counts::InForce {
         return None;
@@ -95,6 +107,12 @@ pub(super) fn named(text: &[u8]) -> Option<(Named, usize)> {
         counts,
     };
     Some((word, at + length))
+}
+
+/// Length of the name of a tool, with its quotes.
+fn tool(text: &[u8]) -> Option<usize> {
+    let name = text.strip_prefix(b"\"")?;
+    Some(2 + name.iter().position(|b| *b == b'"')?)
 }
 
 /// `5`, `AC(5)` or `IC(-5)`.
