@@ -1,6 +1,6 @@
 //! A circular move, and how its words become a circle.
 use super::left::{Because, Left};
-use super::word::Line;
+use super::word::{Counts, Line, VIA};
 use std::f64::consts::TAU;
 
 /// A circular move in its plane, mm.
@@ -115,7 +115,8 @@ pub(super) fn circle(
     let [start, end] = ends;
     let unit = modes.unit_mm();
     let [a, b, c] = plane.axes();
-    let offset = |axis: usize| line.word(b"IJK"[axis]).map(|w| w.value * unit);
+    let word = |axis: usize| line.word(b"IJK"[axis]);
+    let offset = |axis: usize| word(axis).map(|w| w.value * unit);
     if line.has(b"IJK"[c]) && offset(c) != Some(0.0) {
         return Err(Left::ThirdCentre);
     }
@@ -128,46 +129,123 @@ pub(super) fn circle(
     let by_radius = |r: f64| radius_centre(start, end, r, ccw);
     let relative = || [0, 1].map(|i| start[i] + offset([a, b][i]).unwrap_or(0.0));
     let absolute = || Some([offset(a)?, offset(b)?]);
+    let said = [a, b].map(|axis| word(axis).map_or(Counts::InForce, |w| w.counts));
+    // Each from where it says so itself; what is missing is the start's.
+    let own = || {
+        [0, 1].map(|i| {
+            let value = offset([a, b][i]).unwrap_or(0.0);
+            match said[i] {
+                Counts::FromOrigin => value,
+                Counts::FromStart | Counts::InForce => start[i] + value,
+            }
+        })
+    };
     let none = offset(a).is_none() && offset(b).is_none();
     let (centre, other) = match line.word(b'R') {
         Some(r) if !same && none => (by_radius(r.value * unit).ok_or(Left::Geometry)?, None),
         Some(_) => return Err(Left::Geometry),
         None if none => return Err(Left::Geometry),
+        None if said != [Counts::InForce; 2] => {
+            // Beside the other form, what stands in force is no rule of any controller.
+            if modes.absolute_centres {
+                return Err(Left::Geometry);
+            }
+            (own(), None)
+        }
         None if modes.absolute_centres => (absolute().ok_or(Left::Geometry)?, None),
         None => (relative(), absolute()),
     };
-    let miss = |centre: [f64; 2]| {
-        let [from, to] = [sub(start, centre), sub(end, centre)].map(|v| v[0].hypot(v[1]));
-        (from, (to - from).abs())
-    };
-    let (radius_mm, off) = miss(centre);
-    if radius_mm < 1e-6 || off > RADIUS_TOLERANCE_MM {
-        let agrees = other.is_some_and(|c| {
-            let (radius, off) = miss(c);
-            radius > 1e-6 && off <= RADIUS_TOLERANCE_MM
-        });
+    let Some(mut found) = about(start, end, centre, ccw) else {
+        let agrees = other.is_some_and(|c| about(start, end, c, ccw).is_some());
         return Err(if agrees {
             Left::AbsoluteCentres
         } else {
             Left::Geometry
         });
+    };
+    found.sweep_rad += found.sweep_rad.signum() * TAU * (turns - 1.0);
+    Ok(found)
+}
+
+/// The arc about a centre; `None` where start and end do not lie on one circle. One that ends where it begins goes once round.
+pub(super) fn about(start: [f64; 2], end: [f64; 2], centre: [f64; 2], ccw: bool) -> Option<Circle> {
+    let [from, to] = [sub(start, centre), sub(end, centre)].map(|v| v[0].hypot(v[1]));
+    if from < 1e-6 || (to - from).abs() > RADIUS_TOLERANCE_MM {
+        return None;
     }
     let angle = |p: [f64; 2]| (p[1] - centre[1]).atan2(p[0] - centre[0]);
     let raw = angle(end) - angle(start);
     let mut sweep = if ccw { raw } else { -raw }.rem_euclid(TAU);
-    if same || sweep < 1e-12 {
+    if (end[0] - start[0]).hypot(end[1] - start[1]) < 1e-9 || sweep < 1e-12 {
         sweep = TAU;
     }
-    sweep += TAU * (turns - 1.0);
-    Ok(Circle {
+    Some(Circle {
         centre,
-        radius_mm,
+        radius_mm: from,
         sweep_rad: if ccw { sweep } else { -sweep },
     })
 }
 
+/// The circle of a `CIP` of Siemens from `start` to `end`: through the point of its I1, J1 or K1 in the plane.
+pub(super) fn circle_through(
+    line: &Line<'_>,
+    plane: Plane,
+    modes: Modes,
+    [start, end]: [[f64; 2]; 2],
+) -> Result<Circle, Left> {
+    let [a, b, c] = plane.axes();
+    // All in the plane, and all from the origin: what is missing is not the same to every release.
+    let said = |letter: u8| {
+        let word = line.word(letter)?;
+        let absolute = match word.counts {
+            Counts::InForce => modes.absolute,
+            Counts::FromOrigin => true,
+            Counts::FromStart => false,
+        };
+        (absolute && word.value.is_finite()).then_some(word.value * modes.unit_mm())
+    };
+    if line.has(b"XYZ"[c]) || line.has(VIA[c]) {
+        return Err(Left::OtherPlane);
+    }
+    let all = [b"XYZ"[a], b"XYZ"[b]].map(said);
+    let (Some(x), Some(y), [Some(_), Some(_)]) = (said(VIA[a]), said(VIA[b]), all) else {
+        return Err(Left::Dialect(
+            "CIP of Siemens without all of its points in G90",
+        ));
+    };
+    let (centre, sweep_rad) = through(start, [x, y], end).ok_or(Left::Geometry)?;
+    Ok(Circle {
+        centre,
+        radius_mm: (start[0] - centre[0]).hypot(start[1] - centre[1]),
+        sweep_rad,
+    })
+}
+
+/// Centre and signed sweep of the arc from `s` through `v` to `e`; `None` for points that are nearly one or nearly on a line.
+pub(super) fn through(s: [f64; 2], v: [f64; 2], e: [f64; 2]) -> Option<([f64; 2], f64)> {
+    let (b, c) = (sub(v, s), sub(e, s));
+    let cross = 2.0 * (b[0] * c[1] - b[1] * c[0]);
+    let (bb, cc) = (b[0] * b[0] + b[1] * b[1], c[0] * c[0] + c[1] * c[1]);
+    if cross.abs() < 1e-9 * (bb + cc) || cc < 1e-12 {
+        return None;
+    }
+    let centre = [
+        s[0] + (c[1] * bb - b[1] * cc) / cross,
+        s[1] + (b[0] * cc - c[0] * bb) / cross,
+    ];
+    let angle = |p: [f64; 2]| (p[1] - centre[1]).atan2(p[0] - centre[0]);
+    let turned = |p: [f64; 2]| (angle(p) - angle(s)).rem_euclid(TAU);
+    let (to_via, to_end) = (turned(v), turned(e));
+    let sweep = if to_via < to_end {
+        to_end
+    } else {
+        to_end - TAU
+    };
+    Some((centre, sweep))
+}
+
 /// Centre from the radius format: R > 0 takes the arc of less than half a turn.
-fn radius_centre(start: [f64; 2], end: [f64; 2], r: f64, ccw: bool) -> Option<[f64; 2]> {
+pub(super) fn radius_centre(start: [f64; 2], end: [f64; 2], r: f64, ccw: bool) -> Option<[f64; 2]> {
     let [dx, dy] = sub(end, start);
     let chord = dx.hypot(dy);
     let square = r * r - chord * chord / 4.0;

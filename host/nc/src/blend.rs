@@ -78,13 +78,55 @@ const STRAIGHT_MM: f64 = 2e-5;
 
 /// The corrected path of `arc` with radius R + δ.
 pub(super) fn pieces(arc: &Arc, delta_mm: f64, entry: Entry, exit: Exit) -> Vec<Piece> {
-    let total = arc.sweep_rad.abs();
-    let side = arc.sweep_rad.signum();
-    let [x, y] = sub(arc.start, arc.centre);
-    let start_angle = y.atan2(x);
-    // Place and direction of travel where the outward offset is `offset` mm and grows by `slope` per mm.
-    let node = |swept: f64, offset: f64, slope: f64| {
-        let (sin, cos) = (start_angle + side * swept).sin_cos();
+    let course = Course::new(arc, delta_mm);
+    let in_rad = entry.step.length_mm / arc.radius_mm;
+    let out_rad = exit.inside_mm() / arc.radius_mm;
+    let mut list = Vec::new();
+    course.enter(&mut list, entry);
+    let swept = course.total - in_rad - out_rad;
+    let next = course.node(course.total - out_rad, delta_mm, 0.0);
+    // P counts begun turns; exactly n turns end where they started and count n.
+    let turns = (swept / std::f64::consts::TAU - 1e-9).ceil().max(1.0) - 1.0;
+    list.push(Piece {
+        more_turns: turns as u32,
+        share: 1.0 - out_rad / course.total,
+        length_mm: swept * (arc.radius_mm + delta_mm),
+        ..course.round(next.0)
+    });
+    match exit {
+        Exit::Held => {}
+        Exit::Inside { step, tail_mm } => course.fade(&mut list, next, step, tail_mm),
+        Exit::RunOut { step, along } => course.run_out(&mut list, next, step, along),
+    }
+    list
+}
+
+/// An arc and its offset.
+struct Course<'a> {
+    arc: &'a Arc,
+    delta_mm: f64,
+    /// Angle that it sweeps, rad, and 1 or −1 for CCW and CW.
+    total: f64,
+    side: f64,
+    start_angle: f64,
+}
+
+impl<'a> Course<'a> {
+    fn new(arc: &'a Arc, delta_mm: f64) -> Self {
+        let [x, y] = sub(arc.start, arc.centre);
+        Self {
+            arc,
+            delta_mm,
+            total: arc.sweep_rad.abs(),
+            side: arc.sweep_rad.signum(),
+            start_angle: y.atan2(x),
+        }
+    }
+
+    /// Place and direction of travel where the outward offset is `offset` mm and grows by `slope` per mm.
+    fn node(&self, swept: f64, offset: f64, slope: f64) -> Stand {
+        let (arc, side) = (self.arc, self.side);
+        let (sin, cos) = (self.start_angle + side * swept).sin_cos();
         let r = arc.radius_mm + offset;
         let outward = slope * arc.radius_mm;
         let raw = [
@@ -96,114 +138,110 @@ pub(super) fn pieces(arc: &Arc, delta_mm: f64, entry: Entry, exit: Exit) -> Vec<
             [arc.centre[0] + r * cos, arc.centre[1] + r * sin],
             raw.map(|v| v / norm),
         )
-    };
-    let in_rad = entry.step.length_mm / arc.radius_mm;
-    let out_rad = exit.inside_mm() / arc.radius_mm;
-    let mut list = Vec::new();
-    let mut last = node(0.0, entry.from_mm, 0.0);
-    if entry.from_mm == 0.0 {
-        last.0 = arc.start;
     }
-    if in_rad > 0.0 {
-        let rise = delta_mm - entry.from_mm;
+
+    /// A block about the arc's centre.
+    fn round(&self, end: [f64; 2]) -> Piece {
+        Piece {
+            end,
+            centre: Some(self.arc.centre),
+            ccw: self.side > 0.0,
+            more_turns: 0,
+            share: 1.0,
+            length_mm: 0.0,
+            beyond: false,
+            speed: 1.0,
+        }
+    }
+
+    /// From the offset at the start to the arc's own.
+    fn enter(&self, list: &mut Vec<Piece>, entry: Entry) {
+        let mut last = self.node(0.0, entry.from_mm, 0.0);
+        if entry.from_mm == 0.0 {
+            last.0 = self.arc.start;
+        }
+        let in_rad = entry.step.length_mm / self.arc.radius_mm;
+        if in_rad > 0.0 {
+            let rise = self.delta_mm - entry.from_mm;
+            for Node {
+                place,
+                value,
+                slope,
+            } in entry.step.shape.nodes()
+            {
+                let next = self.node(
+                    place * in_rad,
+                    entry.from_mm + rise * value,
+                    rise * slope / entry.step.length_mm,
+                );
+                biarc(list, last, next, place * in_rad / self.total);
+                last = next;
+            }
+        }
+    }
+
+    /// Back onto the programmed circle before its end.
+    fn fade(&self, list: &mut Vec<Piece>, mut last: Stand, step: Step, tail_mm: f64) {
+        let (arc, delta_mm) = (self.arc, self.delta_mm);
+        let arc_pieces = list.len();
+        // The programmed end may lie off the circle by the program's rounding; it stays.
+        let [x, y] = sub(arc.end, arc.centre);
+        let end_mm = x.hypot(y) - arc.radius_mm;
+        let fall = end_mm - delta_mm;
         for Node {
             place,
             value,
             slope,
-        } in entry.step.shape.nodes()
+        } in step.shape.nodes()
         {
-            let next = node(
-                place * in_rad,
-                entry.from_mm + rise * value,
-                rise * slope / entry.step.length_mm,
+            let behind = (tail_mm + (1.0 - place) * step.length_mm) / arc.radius_mm;
+            let mut next = self.node(
+                self.total - behind,
+                delta_mm + fall * value,
+                fall * slope / step.length_mm,
             );
-            biarc(&mut list, last, next, place * in_rad / total);
+            if place >= 1.0 && tail_mm == 0.0 {
+                next.0 = arc.end;
+            }
+            biarc(list, last, next, 1.0 - behind / self.total);
             last = next;
         }
-    }
-    let swept = total - in_rad - out_rad;
-    let next = node(total - out_rad, delta_mm, 0.0);
-    // P counts begun turns; exactly n turns end where they started and count n.
-    let turns = (swept / std::f64::consts::TAU - 1e-9).ceil().max(1.0) - 1.0;
-    list.push(Piece {
-        end: next.0,
-        centre: Some(arc.centre),
-        ccw: side > 0.0,
-        more_turns: turns as u32,
-        share: 1.0 - out_rad / total,
-        length_mm: swept * (arc.radius_mm + delta_mm),
-        beyond: false,
-        speed: 1.0,
-    });
-    last = next;
-    match exit {
-        Exit::Held => {}
-        Exit::Inside { step, tail_mm } => {
-            let arc_pieces = list.len();
-            // The programmed end may lie off the circle by the program's rounding; it stays.
-            let [x, y] = sub(arc.end, arc.centre);
-            let end_mm = x.hypot(y) - arc.radius_mm;
-            let fall = end_mm - delta_mm;
-            for Node {
-                place,
-                value,
-                slope,
-            } in step.shape.nodes()
-            {
-                let behind = (tail_mm + (1.0 - place) * step.length_mm) / arc.radius_mm;
-                let mut next = node(
-                    total - behind,
-                    delta_mm + fall * value,
-                    fall * slope / step.length_mm,
-                );
-                if place >= 1.0 && tail_mm == 0.0 {
-                    next.0 = arc.end;
-                }
-                biarc(&mut list, last, next, 1.0 - behind / total);
-                last = next;
-            }
-            if tail_mm > 0.0 {
-                list.push(Piece {
-                    end: arc.end,
-                    centre: Some(arc.centre),
-                    ccw: side > 0.0,
-                    more_turns: 0,
-                    share: 1.0,
-                    length_mm: tail_mm,
-                    beyond: false,
-                    speed: 1.0,
-                });
-            }
-            list[arc_pieces..]
-                .iter_mut()
-                .for_each(|p| p.speed = step.speed);
+        if tail_mm > 0.0 {
+            list.push(Piece {
+                length_mm: tail_mm,
+                ..self.round(arc.end)
+            });
         }
-        Exit::RunOut { step, along } => {
-            let arc_pieces = list.len();
-            // Outward of a CCW arc is to the right of travel.
-            let across = [along[1] * side, -along[0] * side];
-            for Node {
-                place,
-                value,
-                slope,
-            } in step.shape.nodes()
-            {
-                let (way, offset, tilt) = (
-                    place * step.length_mm,
-                    delta_mm * (1.0 - value),
-                    -delta_mm * slope / step.length_mm,
-                );
-                let norm = tilt.hypot(1.0);
-                let place =
-                    std::array::from_fn(|i| arc.end[i] + way * along[i] + offset * across[i]);
-                let direction = std::array::from_fn(|i| (along[i] + tilt * across[i]) / norm);
-                biarc(&mut list, last, (place, direction), 1.0);
-                last = (place, direction);
-            }
-            list[arc_pieces..].iter_mut().for_each(|p| p.beyond = true);
-        }
+        list[arc_pieces..]
+            .iter_mut()
+            .for_each(|p| p.speed = step.speed);
     }
-    list
+
+    /// Onto the line that follows.
+    fn run_out(&self, list: &mut Vec<Piece>, mut last: Stand, step: Step, along: [f64; 2]) {
+        let (arc, delta_mm) = (self.arc, self.delta_mm);
+        let arc_pieces = list.len();
+        // Outward of a CCW arc is to the right of travel.
+        let across = [along[1] * self.side, -along[0] * self.side];
+        for Node {
+            place,
+            value,
+            slope,
+        } in step.shape.nodes()
+        {
+            let (way, offset, tilt) = (
+                place * step.length_mm,
+                delta_mm * (1.0 - value),
+                -delta_mm * slope / step.length_mm,
+            );
+            let norm = tilt.hypot(1.0);
+            let place = std::array::from_fn(|i| arc.end[i] + way * along[i] + offset * across[i]);
+            let direction = std::array::from_fn(|i| (along[i] + tilt * across[i]) / norm);
+            biarc(list, last, (place, direction), 1.0);
+            last = (place, direction);
+        }
+        list[arc_pieces..].iter_mut().for_each(|p| p.beyond = true);
+    }
 }
 
 /// A place and a direction of travel.

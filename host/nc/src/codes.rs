@@ -1,6 +1,6 @@
 //! What the G- and M-codes of LinuxCNC, Grbl, Fanuc, Haas, Marlin and their like do to the state of a program.
 use super::state::{FeedMode, Plane};
-use super::word::UNKNOWN_TENTHS;
+use super::word::{CIP_TENTHS, UNKNOWN_TENTHS};
 
 /// What a G-code does.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,7 +62,7 @@ pub(super) enum Mode {
 /// What a G-code does, by its tenths and by whether axis words stand beside it; `printer` as for [`m`].
 pub(super) fn g(tenths: i64, axes: bool, printer: bool) -> G {
     match tenths {
-        0 | 10 | 20 | 30 => G::Motion(tenths),
+        0 | 10 | 20 | 30 | CIP_TENTHS => G::Motion(tenths),
         40 => G::Dwell,
         // G5.1 Q1, G05 P10000: look-ahead of Fanuc; with axis words splines of LinuxCNC.
         50..=53 if axes => G::Cycle,
@@ -118,6 +118,23 @@ pub(super) fn g(tenths: i64, axes: bool, printer: bool) -> G {
         70 | 960..=999 | 1030 | 1870 => G::Nothing,
         _ => G::Unknown,
     }
+}
+
+/// What a G-code of Siemens does that means something else, or nothing, to the others.
+pub(super) fn siemens(tenths: i64) -> Option<G> {
+    Some(match tenths {
+        710 | 7100 => G::Inch(false),
+        // The unit of places, and by G700 that of the feed as well.
+        700 | 7000 => G::DoubtfulUnit,
+        600 => G::ExactStop(true),
+        6010 | 6020 | 6030 => G::Nothing,
+        640 | 6410..=6450 => G::ExactStop(false),
+        // At corners under cutter radius compensation.
+        4500 | 4510 => G::Nothing,
+        5000 | 5050..=5990 => G::WorkOffset,
+        1530 => G::Away,
+        _ => return None,
+    })
 }
 
 /// What an M-code does.
@@ -189,6 +206,14 @@ mod tests {
         assert_eq!(g(690, false, false), G::Closes(Mode::Rotation));
         assert_eq!(g(1234, false, false), G::Unknown);
         assert_eq!(g(UNKNOWN_TENTHS, false, false), G::Unknown);
+    }
+
+    #[test]
+    fn siemens_has_its_own() {
+        assert_eq!(siemens(710), Some(G::Inch(false)));
+        assert_eq!(siemens(6420), Some(G::ExactStop(false)));
+        assert_eq!(siemens(5070), Some(G::WorkOffset));
+        assert_eq!(siemens(20), None);
     }
 
     #[test]

@@ -34,13 +34,17 @@ impl Plan {
         share(self.entry.step.remaining_mm).max(exit)
     }
 
-    pub(super) fn fate(&self, arc: &Arc, blocks: usize, led: Led) -> Fate {
+    pub(super) fn fate(&self, arc: &Arc, pieces: &[Piece], led: Led) -> Fate {
+        let slower = pieces.iter().filter(|p| p.speed < 1.0);
+        // The sum of nothing is −0.
+        let lost_mm = slower.fold(0.0, |sum, p| sum + p.length_mm * (1.0 / p.speed - 1.0));
         Fate::Corrected {
             radius_mm: arc.radius_mm,
             feed_mm_s: arc.feed_mm_s,
             delta_mm: self.twin.delta_mm,
-            blocks,
+            blocks: pieces.len(),
             joint_share: self.joint_share(),
+            slower_s: lost_mm / arc.feed_mm_s,
             led,
         }
     }
@@ -116,6 +120,21 @@ pub(super) fn decide(visits: &mut [Visit<'_>], law: &Law<'_>) -> Vec<Option<Resu
             return plans;
         }
     }
+}
+
+/// The same for motions that are no lines of RS-274.
+pub(super) fn decide_actions(actions: &[Action], law: &Law<'_>) -> Vec<Option<Result<Plan, Left>>> {
+    let nothing = Line {
+        text: b"",
+        end: b"",
+        words: Vec::new(),
+        sort: Sort::Plain,
+    };
+    let mut visits: Vec<Visit<'_>> = actions
+        .iter()
+        .map(|action| Visit::new(0, nothing.clone(), *action, law))
+        .collect();
+    decide(&mut visits, law)
 }
 
 fn twin(arc: &Arc, law: &Law<'_>) -> Result<Twin, Left> {

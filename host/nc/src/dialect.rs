@@ -26,6 +26,9 @@ pub(super) fn arc(text: &[u8]) -> Option<&'static str> {
     if first == "CIP" || numbered {
         return Some("CIP of Siemens");
     }
+    if (first == "CT" || first.starts_with('N') && second == "CT") && body.contains('X') {
+        return Some("CT of Siemens");
+    }
     let motion = words
         .iter()
         .any(|w| matches!(*w, "G2" | "G3" | "G02" | "G03"));
@@ -64,6 +67,7 @@ mod tests {
                 Some("a circular motion of a Fanuc robot"),
             ),
             ("N40 CIP X10 Y0 I1=5 J1=5", Some("CIP of Siemens")),
+            ("N5 CT X10 Y5", Some("CT of Siemens")),
             (
                 "G2 X10 Y0 I=AC(5) J=AC(0)",
                 Some("an arc with AC(), AR= or TURN= of Siemens"),

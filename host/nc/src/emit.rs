@@ -4,7 +4,7 @@ use super::blend::Piece;
 use super::correct::Plan;
 use super::digits::push_number;
 use super::state::{Arc, FeedMode, Plane, Shared, sub};
-use super::word::{Line, Word};
+use super::word::{Counts, Line, VIA, Word};
 
 /// Writes the blocks that take the place of arcs.
 pub(super) struct Writer {
@@ -137,7 +137,8 @@ impl<'a> Block<'a> {
 
     /// A word of the arc in the program's own digits, where it holds as it stands.
     fn kept(&self, letter: u8) -> Option<&'a [u8]> {
-        let word = self.line.word(letter).filter(|_| self.arc.modes.absolute)?;
+        let holds = |w: &&Word| self.arc.modes.absolute && w.counts != Counts::FromStart;
+        let word = self.line.word(letter).filter(holds)?;
         Some(self.line.text[word.range.start + 1..word.range.end].trim_ascii())
     }
 
@@ -270,6 +271,7 @@ fn first(
         b"XYZ".contains(&w.letter)
             || [b"IJK"[a], b"IJK"[b]].contains(&w.letter)
             || matches!(w.letter, b'R' | b'P' | b'E' | b'A' | b'B' | b'C')
+            || VIA.contains(&w.letter)
             || (w.letter == b'F' && new_feed)
     };
     // Without its leading blank.

@@ -9,7 +9,7 @@ use super::flow::{Order, order};
 use super::inverse::Inverse;
 use super::lead::{self, FreeSide, Leads, Led};
 use super::state::{Action, Arc, Reading, State};
-use super::word::{self, Line, Sort, Word};
+use super::word::{self, CIP_TENTHS, Line, Sort, Word};
 use super::{Fate, Left, Options, Report};
 use giotto::model_file::ModelFile;
 use std::collections::{BTreeMap, HashSet};
@@ -46,6 +46,7 @@ impl<'a> Engine<'a> {
             }
             visit.free_side = self.free_side;
         }
+        self.keep_through(&visit.line);
         let wall = visit.is_wall();
         self.window.push(visit);
         if wall {
@@ -60,6 +61,20 @@ impl<'a> Engine<'a> {
             self.release(last, sink)?;
         }
         Ok(())
+    }
+
+    /// A block without a code of its own goes on with the `CIP` before it, which has to stay in force then.
+    fn keep_through(&mut self, line: &Line<'_>) {
+        let moves = |line: &Line<'_>| line.has_any(b"XYZIJKijk");
+        if !moves(line) || line.words.iter().any(Word::is_motion) {
+            return;
+        }
+        if let Some(before) = self.window.iter_mut().rfind(|v| moves(&v.line))
+            && before.line.has_g(&[CIP_TENTHS])
+            && before.twin.is_some()
+        {
+            before.twin = Some(Err(Left::Dialect("CIP of Siemens that stays in force")));
+        }
     }
 
     /// Decides what is held back and lets go of all before `keep`.
@@ -80,7 +95,7 @@ impl<'a> Engine<'a> {
                         text.clear();
                         self.writer
                             .arc(&visit.line, &arc, &plan, &pieces, &mut text);
-                        let fate = plan.fate(&arc, pieces.len(), led);
+                        let fate = plan.fate(&arc, &pieces, led);
                         sink(&visit.line, visit.index, Some(&text), Some(fate))?;
                     }
                     (_, plan) => {
@@ -137,12 +152,15 @@ fn from_its_start(arc: &Arc) -> Arc {
     }
 }
 
-fn reading(options: &Options, followed: bool) -> Reading {
+/// How to read a program whose calls are followed or not.
+pub(super) fn reading(program: &[u8], options: &Options, followed: bool) -> Reading {
+    let siemens = word::is_siemens(program);
     Reading {
         absolute_centres: options.absolute_centres,
         printer: options.printer,
         harmless: options.harmless.as_slice().into(),
         followed,
+        siemens,
     }
 }
 
@@ -164,7 +182,7 @@ pub(super) fn run(
     match order(program) {
         Order::Straight => {
             let mut engine = Engine::new(program, &inverse, options);
-            let mut state = State::new(reading(options, false));
+            let mut state = State::new(reading(program, options, false));
             for (index, line) in word::lines(program).enumerate() {
                 let action = state.step(index + 1, &line);
                 let visit = Visit::new(index, line, action, &engine.law);
@@ -210,7 +228,7 @@ fn followed(
         let mut written: BTreeMap<usize, Written> = BTreeMap::new();
         let mut differ = HashSet::new();
         let mut engine = Engine::new(program, inverse, options);
-        let mut state = State::new(reading(options, true));
+        let mut state = State::new(reading(program, options, true));
         let mut keep = |_: &Line<'_>, index: usize, text: Option<&[u8]>, fate: Option<Fate>| {
             let text = text.map(<[u8]>::to_vec);
             match written.get(&index) {

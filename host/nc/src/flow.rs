@@ -49,136 +49,182 @@ struct Call {
     more: u32,
 }
 
+/// The order of the lines; `None` where it cannot be told.
 fn follow(lines: &[Line<'_>]) -> Option<Vec<usize>> {
-    let mut programs: HashMap<Vec<u8>, usize> = HashMap::new();
-    let mut subs: HashMap<Vec<u8>, usize> = HashMap::new();
-    let mut numbers: HashMap<i64, usize> = HashMap::new();
-    for (i, line) in lines.iter().enumerate() {
-        match line.sort {
-            Sort::Flow(Keyword::Sub) => _ = subs.insert(line.o_name()?, i),
-            Sort::Flow(Keyword::Other(_)) => return None,
-            Sort::Plain if line.has(b'O') => _ = programs.insert(line.o_name()?, i),
-            _ => {}
-        }
-        if let Some(n) = line.word(b'N') {
-            numbers.entry(n.tenths()).or_insert(i);
-        }
-    }
-    let mut order = Vec::new();
-    let mut calls: Vec<Call> = Vec::new();
-    let mut at = 0;
-    let mut seen_number = false;
-    while let Some(line) = lines.get(at) {
-        if order.len() > MOST_VISITS * lines.len() + 1000 || calls.len() > 100 {
+    let mut walk = Walk {
+        lines,
+        places: Places::of(lines)?,
+        order: Vec::new(),
+        calls: Vec::new(),
+        at: 0,
+        seen_number: false,
+    };
+    while let Some(line) = lines.get(walk.at) {
+        if walk.order.len() > MOST_VISITS * lines.len() + 1000 || walk.calls.len() > 100 {
             return None;
         }
-        match line.sort {
-            Sort::Flow(Keyword::Sub) => {
+        let goes_on = match line.sort {
+            Sort::Flow(keyword) => walk.keyword(line, keyword)?,
+            _ => walk.line(line)?,
+        };
+        if !goes_on {
+            return Some(walk.order);
+        }
+    }
+    walk.calls.is_empty().then_some(walk.order)
+}
+
+/// Lines that calls lead to.
+struct Places {
+    programs: HashMap<Vec<u8>, usize>,
+    subs: HashMap<Vec<u8>, usize>,
+    numbers: HashMap<i64, usize>,
+}
+
+impl Places {
+    /// `None` where something jumps.
+    fn of(lines: &[Line<'_>]) -> Option<Self> {
+        let mut places = Self {
+            programs: HashMap::new(),
+            subs: HashMap::new(),
+            numbers: HashMap::new(),
+        };
+        for (i, line) in lines.iter().enumerate() {
+            match line.sort {
+                Sort::Flow(Keyword::Sub) => _ = places.subs.insert(line.o_name()?, i),
+                Sort::Flow(Keyword::Other(_)) => return None,
+                Sort::Plain if line.has(b'O') => _ = places.programs.insert(line.o_name()?, i),
+                _ => {}
+            }
+            if let Some(n) = line.word(b'N') {
+                places.numbers.entry(n.tenths()).or_insert(i);
+            }
+        }
+        Some(places)
+    }
+}
+
+/// A program as it is run. Its steps say whether it goes on; `None`: nobody can tell.
+struct Walk<'a> {
+    lines: &'a [Line<'a>],
+    places: Places,
+    order: Vec<usize>,
+    calls: Vec<Call>,
+    at: usize,
+    /// A number of a program was passed.
+    seen_number: bool,
+}
+
+impl Walk<'_> {
+    fn keyword(&mut self, line: &Line<'_>, keyword: Keyword) -> Option<bool> {
+        match keyword {
+            Keyword::Sub => {
                 // A definition is passed over.
                 let name = line.o_name();
-                let end = lines[at..]
+                let end = self.lines[self.at..]
                     .iter()
                     .position(|l| l.sort == Sort::Flow(Keyword::EndSub) && l.o_name() == name)?;
-                at += end + 1;
-                continue;
+                self.at += end + 1;
             }
-            Sort::Flow(Keyword::EndSub) => {
-                order.push(at);
-                at = calls.pop()?.back;
-                continue;
+            Keyword::EndSub => {
+                self.order.push(self.at);
+                self.at = self.calls.pop()?.back;
             }
-            Sort::Flow(Keyword::Call) => {
-                order.push(at);
-                let begin = *subs.get(&line.o_name()?)? + 1;
-                calls.push(Call {
-                    back: at + 1,
-                    begin,
-                    more: 0,
-                });
-                at = begin;
-                continue;
+            Keyword::Call => {
+                self.order.push(self.at);
+                let begin = *self.places.subs.get(&line.o_name()?)? + 1;
+                self.call(begin, 0);
             }
-            _ => {}
+            Keyword::Other(_) => return None,
         }
+        Some(true)
+    }
+
+    /// Runs from `begin`, and `more` times again, before what stands behind the present line.
+    fn call(&mut self, begin: usize, more: u32) {
+        self.calls.push(Call {
+            back: self.at + 1,
+            begin,
+            more,
+        });
+        self.at = begin;
+    }
+
+    fn line(&mut self, line: &Line<'_>) -> Option<bool> {
         let steering = line
             .words
             .iter()
             .filter(|w| w.letter == b'M')
             .map(|w| (w, codes::m(w.tenths(), false)))
             .find(|(_, m)| matches!(m, M::Call | M::Return | M::Ends));
-        let skipped = line.sort == Sort::Optional;
+        if steering.is_some() && line.sort == Sort::Optional {
+            return None;
+        }
         match steering {
-            Some(_) if skipped => return None,
             Some((_, M::Ends)) => {
-                order.push(at);
-                return Some(order);
+                self.order.push(self.at);
+                return Some(false);
             }
-            Some((_, M::Return)) => {
-                if line.has(b'P') {
-                    return None;
-                }
-                order.push(at);
-                let Some(call) = calls.last_mut() else {
-                    // The main program begins anew.
-                    return Some(order);
-                };
-                if call.more > 0 {
-                    call.more -= 1;
-                    at = call.begin;
-                } else {
-                    at = call.back;
-                    calls.pop();
-                }
-                continue;
-            }
+            Some((_, M::Return)) => return self.leave(line),
             Some((word, _)) => {
-                order.push(at);
-                let (begin, times) = target(line, word.tenths() == 970, &programs, &numbers)?;
-                at += 1;
+                self.order.push(self.at);
+                let (begin, times) = target(line, word.tenths() == 970, &self.places)?;
                 if times > 0 {
-                    calls.push(Call {
-                        back: at,
-                        begin,
-                        more: times - 1,
-                    });
-                    at = begin;
+                    self.call(begin, times - 1);
+                } else {
+                    self.at += 1;
                 }
-                continue;
+                return Some(true);
             }
             None => {}
         }
         if line.has(b'O') {
-            if seen_number && calls.is_empty() {
+            if self.seen_number && self.calls.is_empty() {
                 // The next program of the file.
-                return Some(order);
+                return Some(false);
             }
-            seen_number = true;
+            self.seen_number = true;
         }
-        order.push(at);
-        at += 1;
+        self.order.push(self.at);
+        self.at += 1;
+        Some(true)
     }
-    calls.is_empty().then_some(order)
+
+    /// M99.
+    fn leave(&mut self, line: &Line<'_>) -> Option<bool> {
+        if line.has(b'P') {
+            return None;
+        }
+        self.order.push(self.at);
+        let Some(call) = self.calls.last_mut() else {
+            // The main program begins anew.
+            return Some(false);
+        };
+        if call.more > 0 {
+            call.more -= 1;
+            self.at = call.begin;
+        } else {
+            self.at = call.back;
+            self.calls.pop();
+        }
+        Some(true)
+    }
 }
 
 /// Line that a call begins at, and how often it is run.
-fn target(
-    line: &Line<'_>,
-    local: bool,
-    programs: &HashMap<Vec<u8>, usize>,
-    numbers: &HashMap<i64, usize>,
-) -> Option<(usize, u32)> {
+fn target(line: &Line<'_>, local: bool, places: &Places) -> Option<(usize, u32)> {
     let p = line
         .word(b'P')
         .filter(|p| p.value >= 0.0 && p.value.fract() == 0.0)?;
     let number = p.value as u64;
-    let named = |n: u64| programs.get(n.to_string().as_bytes()).copied();
+    let named = |n: u64| places.programs.get(n.to_string().as_bytes()).copied();
     let times = match line.word(b'L') {
         Some(l) if l.value >= 0.0 && l.value.fract() == 0.0 && l.value < 1e4 => l.value as u32,
         Some(_) => return None,
         None => 1,
     };
     if local {
-        return numbers.get(&p.tenths()).map(|i| (*i, times));
+        return places.numbers.get(&p.tenths()).map(|i| (*i, times));
     }
     // Fanuc: M98 P30100 runs O100 three times.
     let packed = || {

@@ -114,6 +114,8 @@ pub enum Left {
     ProgramFlow(Because),
     #[error("behind {0}, which changes what coordinates mean")]
     Coordinates(Because),
+    #[error("{0} stands in the program, whose blocks may run in other coordinates")]
+    OtherCoordinates(Because),
     #[error("behind {0}, whose meaning is not known; `--harmless {code}` if it moves nothing", code = .0.code)]
     UnknownCode(Because),
     #[error("behind {0}, which is not understood")]

@@ -1,7 +1,7 @@
 //! Programs for machines: arcs rewritten with the inverse correction, everything else to the letter; or read as the
 //! segments that a controller runs ([`program`]).
 //!
-//! RS-274 as LinuxCNC and Grbl speak it, and plain RAPID ([`rapid`]). An arc of radius R at feed f becomes one of the radius that the machine
+//! RS-274 as LinuxCNC, Grbl and Siemens speak it, Klartext of Heidenhain ([`heidenhain`]), and plain RAPID ([`rapid`]). An arc of radius R at feed f becomes one of the radius that the machine
 //! turns into R, with tangent transitions where it meets its neighbours (`blend`); the blocks of lines are not
 //! touched. What cannot be corrected within bounds stays as it was, with a reason.
 //!
@@ -9,30 +9,36 @@
 //! and belong to the controller's table. Checked by the plant, by the `gcode` crate and by LinuxCNC's interpreter; no
 //! corrected program has been run on a real machine.
 #![forbid(unsafe_code)]
+#![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 mod arc;
 mod blend;
 mod chain;
 pub mod check;
 mod codes;
+pub mod contour;
 mod correct;
 mod dialect;
 mod digits;
 mod emit;
 mod engine;
 mod flow;
+pub mod heidenhain;
 mod inverse;
 mod joint;
 mod lead;
 mod least_squares;
 mod left;
 mod mark;
+pub mod path;
 #[cfg(test)]
 mod plan_tests;
 pub mod program;
 #[cfg(test)]
 mod proof;
 pub mod rapid;
+#[cfg(test)]
+mod siemens_tests;
 mod state;
 mod steps;
 #[cfg(test)]
@@ -120,6 +126,8 @@ pub enum Fate {
         blocks: usize,
         /// Largest share of `delta_mm` that is expected to remain as an error where the arc meets its neighbours.
         joint_share: f64,
+        /// Time by which the last stretch before a stop takes longer, s.
+        slower_s: f64,
         /// Its leads.
         led: Led,
     },
@@ -152,7 +160,7 @@ pub fn is_program(program: &[u8]) -> bool {
         word::Sort::Flow(_) | word::Sort::Setting => true,
         word::Sort::Unread => dialect::arc(line.text).is_some(),
     };
-    word::lines(program).any(block)
+    heidenhain::is_klartext(program) || word::lines(program).any(block)
 }
 
 /// Rewrites the arcs of a program. The text need not be UTF-8; bytes outside rewritten arcs are copied.
@@ -204,8 +212,17 @@ pub fn compensate_to(
     mark: Option<&Mark>,
     out: &mut dyn io::Write,
 ) -> io::Result<Vec<Report>> {
+    if heidenhain::is_klartext(program) {
+        return heidenhain::compensate_to(program, model, options, mark, out);
+    }
     let mut arcs = Vec::new();
-    let mut copy = mark::Marking::new(program, mark, "(", ")");
+    // Brackets hold no comment of Siemens.
+    let [open, close] = if word::is_siemens(program) {
+        ["; ", ""]
+    } else {
+        ["(", ")"]
+    };
+    let mut copy = mark::Marking::new(program, mark, open, close);
     engine::run(program, model, options, &mut |line, index, text, fate| {
         engine::report(&mut arcs, index, fate);
         copy.line(line.text.len() + line.end.len(), text, out)

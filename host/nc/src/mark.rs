@@ -35,7 +35,9 @@ pub fn marked(program: &[u8]) -> Option<(usize, String)> {
             .rsplit(|b| *b == b'\n')
             .next()
             .unwrap_or_default();
-        matches!(line.trim_ascii(), b"(" | b";" | b"!")
+        // Behind the number of a block of Klartext.
+        let digits = line.iter().take_while(|b| b.is_ascii_digit()).count();
+        matches!(line[digits..].trim_ascii(), b"(" | b";" | b"!")
     })?;
     let line = 1 + memchr::memchr_iter(b'\n', &program[..at]).count();
     let words = program[at..]

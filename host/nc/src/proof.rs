@@ -302,7 +302,11 @@ fn module(nominal: &[Vec<Stretch>]) -> String {
 
 /// Where the robot goes by a module; a stop ends a chain.
 fn module_chains(program: &[u8]) -> Vec<Vec<Stretch>> {
-    chains_of(super::rapid::actions(program).into_iter())
+    chains_of(
+        super::rapid::actions(program)
+            .into_iter()
+            .map(|(_, action)| action),
+    )
 }
 
 #[test]

@@ -179,7 +179,7 @@ fn other_dialects_are_named() {
         ("12 C X+30 Y+10 DR+ F500", "a circle of Heidenhain"),
         ("CIRC {X 10, Y 5}, {X 20, Y 0}", "CIRC of KUKA"),
         ("9:C P[1]", "a circular motion of a Fanuc robot"),
-        ("CIP X10 Y0 I1=5 J1=5", "CIP of Siemens"),
+        ("CIP X10 Y0 I1=AC(R1) J1=5", "CIP of Siemens"),
     ] {
         assert_eq!(left(&format!("{line}\n")), Left::Dialect(name));
         assert!(is_program(line.as_bytes()), "{line}");

@@ -4,16 +4,17 @@
 //! of its frame, with one orientation throughout, is corrected as an arc of G-code is and becomes several; every
 //! other line is copied byte by byte. What decides at run time (IF, FOR, calls, VAR and PERS targets) is not
 //! guessed at: the arcs behind it stay as they were. Written from the manuals; no robot has run the output.
+mod data;
+mod instruction;
 mod read;
 #[cfg(test)]
 mod tests;
 
 use super::blend::{self, Piece};
 use super::check::Trouble;
-use super::correct::{Law, Plan, Visit, decide};
+use super::correct::{Law, Plan, decide_actions};
 use super::mark::{self, Mark};
 use super::state::{Action, Arc};
-use super::word::{Line, Sort};
 use super::{Compensated, Fate, Led, Options, Report, inverse::Inverse};
 use giotto::model_file::ModelFile;
 use read::{Motion, Reader};
@@ -141,23 +142,13 @@ pub fn compensate(program: &[u8], model: &ModelFile, options: &Options) -> Compe
             motions.push((i, None));
         }
     }
-    let nothing = Line {
-        text: b"",
-        end: b"",
-        words: Vec::new(),
-        sort: Sort::Plain,
-    };
     let law = Law {
         inverse: &Inverse::new(model, options),
         options,
         least_mm: LEAST_MM,
         tail_mm: 0.0,
     };
-    let mut visits: Vec<Visit<'_>> = actions
-        .iter()
-        .map(|action| Visit::new(0, nothing.clone(), *action, &law))
-        .collect();
-    let plans = decide(&mut visits, &law);
+    let plans = decide_actions(&actions, &law);
     let mut out = Compensated {
         program: Vec::new(),
         arcs: Vec::new(),
@@ -181,7 +172,7 @@ pub fn compensate(program: &[u8], model: &ModelFile, options: &Options) -> Compe
                 );
                 out.program.extend_from_slice(&text);
                 from = pieces.last().map(|p| p.end);
-                Some(plan.fate(arc, pieces.len(), Led::Not))
+                Some(plan.fate(arc, &pieces, Led::Not))
             }
             (action, plan, _) => {
                 out.program.extend_from_slice(line);
@@ -199,15 +190,16 @@ pub fn compensate(program: &[u8], model: &ModelFile, options: &Options) -> Compe
     out
 }
 
-/// What the lines of a module do, with the stops between them.
-#[cfg(test)]
-pub(super) fn actions(program: &[u8]) -> Vec<Action> {
+/// What the lines of a module do, by their number, with the stops between them.
+pub(super) fn actions(program: &[u8]) -> Vec<(usize, Action)> {
     let mut reader = Reader::default();
-    let read = program
-        .split_inclusive(|b| *b == b'\n')
-        .map(|line| reader.step(line));
-    read.flat_map(|read| std::iter::once(read.action).chain(read.stops.then_some(Action::Other)))
-        .collect()
+    let mut list = Vec::new();
+    for (index, line) in program.split_inclusive(|b| *b == b'\n').enumerate() {
+        let read = reader.step(line);
+        list.push((index + 1, read.action));
+        list.extend(read.stops.then_some((index + 1, Action::Stop)));
+    }
+    list
 }
 
 /// The instructions that take the place of an arc.
@@ -220,81 +212,35 @@ fn blocks(
     line: &[u8],
     end: &str,
 ) -> Vec<u8> {
-    let indent = line
-        .iter()
-        .take_while(|b| b.is_ascii_whitespace())
-        .count()
-        .min(line.len());
-    let target = |[x, y]: [f64; 2]| {
-        format!(
-            "[[{},{},{}],{}]",
-            number(x),
-            number(y),
-            motion.height,
-            motion.pose
-        )
-    };
-    let speed_of = |piece: &Piece| match plan.twin.feed_factor * piece.speed {
-        1.0 => motion.speed.clone(),
-        factor => format!(
-            "[{},{}]",
-            number(arc.feed_mm_s * factor),
-            motion.other_speeds
-        ),
-    };
-    let passing = if motion.zone.eq_ignore_ascii_case("fine") {
-        "z0"
-    } else {
-        &motion.zone
-    };
+    let indent = line.iter().take_while(|b| b.is_ascii_whitespace()).count();
     let mut text = Vec::new();
     let mut from = start;
     for (k, piece) in pieces.iter().enumerate() {
         let last = k + 1 == pieces.len();
-        let speed = speed_of(piece);
-        // The end of the arc, if it is where it was, as it was written.
-        let to = if last && piece.end == arc.end {
-            motion.to.clone()
-        } else {
-            target(piece.end)
+        let stretch = Stretch {
+            from,
+            piece,
+            motion,
+            speed: match plan.twin.feed_factor * piece.speed {
+                1.0 => motion.speed.clone(),
+                factor => format!(
+                    "[{},{}]",
+                    number(arc.feed_mm_s * factor),
+                    motion.other_speeds
+                ),
+            },
+            // The end of the arc, if it is where it was, as it was written.
+            to: if last && piece.end == arc.end {
+                motion.to.clone()
+            } else {
+                motion.target(piece.end)
+            },
+            zone: if last { &motion.zone } else { motion.passing() },
         };
-        let zone = if last { motion.zone.as_str() } else { passing };
-        text.extend_from_slice(&line[..indent]);
-        let with = &motion.tool;
-        let mut codes = Vec::new();
-        let turn_rad = turn(from, piece);
-        match piece.centre {
-            Some(centre) if turn_rad >= LEAST_TURN_RAD => {
-                // One instruction goes round no more than 240°.
-                let halves = if turn_rad > MOST_TURN_RAD { 2 } else { 1 };
-                let step = 0.5 * turn_rad / f64::from(halves);
-                for half in 0..halves {
-                    let via = target(turned(from, piece, centre, step * f64::from(2 * half + 1)));
-                    let (end, zone) = if half + 1 == halves {
-                        (to.clone(), zone)
-                    } else {
-                        let angle = step * f64::from(2 * half + 2);
-                        (target(turned(from, piece, centre, angle)), passing)
-                    };
-                    codes.push(format!("MoveC {via},{end},{speed},{zone},{with};"));
-                }
-            }
-            Some(centre) => {
-                let chords = chords(piece, turn_rad, plan.twin.delta_mm);
-                for k in 1..chords {
-                    let angle = turn_rad * f64::from(k) / f64::from(chords);
-                    let place = target(turned(from, piece, centre, angle));
-                    codes.push(format!("MoveL {place},{speed},{passing},{with};"));
-                }
-                codes.push(format!("MoveL {to},{speed},{zone},{with};"));
-            }
-            None => codes.push(format!("MoveL {to},{speed},{zone},{with};")),
-        }
+        let codes = stretch.codes(plan.twin.delta_mm);
         let count = codes.len();
         for (c, code) in codes.into_iter().enumerate() {
-            if c > 0 {
-                text.extend_from_slice(&line[..indent]);
-            }
+            text.extend_from_slice(&line[..indent]);
             text.extend_from_slice(code.as_bytes());
             if last && c + 1 == count {
                 // A comment and the end of the line stay.
@@ -306,6 +252,80 @@ fn blocks(
         from = piece.end;
     }
     text
+}
+
+impl Motion {
+    fn target(&self, [x, y]: [f64; 2]) -> String {
+        format!(
+            "[[{},{},{}],{}]",
+            number(x),
+            number(y),
+            self.height,
+            self.pose
+        )
+    }
+
+    /// The zone of what is passed on the way.
+    fn passing(&self) -> &str {
+        if self.zone.eq_ignore_ascii_case("fine") {
+            "z0"
+        } else {
+            &self.zone
+        }
+    }
+}
+
+/// A piece of an arc as it is to be written.
+struct Stretch<'a> {
+    from: [f64; 2],
+    piece: &'a Piece,
+    motion: &'a Motion,
+    speed: String,
+    to: String,
+    zone: &'a str,
+}
+
+impl Stretch<'_> {
+    /// Its instructions.
+    fn codes(&self, delta_mm: f64) -> Vec<String> {
+        let Self {
+            from,
+            piece,
+            motion,
+            speed,
+            to,
+            zone,
+        } = self;
+        let (with, passing) = (&motion.tool, motion.passing());
+        let Some(centre) = piece.centre else {
+            return vec![format!("MoveL {to},{speed},{zone},{with};")];
+        };
+        let at = |angle: f64| motion.target(turned(*from, piece, centre, angle));
+        let turn_rad = turn(*from, piece);
+        let mut codes = Vec::new();
+        if turn_rad < LEAST_TURN_RAD {
+            let chords = chords(piece, turn_rad, delta_mm);
+            for k in 1..chords {
+                let place = at(turn_rad * f64::from(k) / f64::from(chords));
+                codes.push(format!("MoveL {place},{speed},{passing},{with};"));
+            }
+            codes.push(format!("MoveL {to},{speed},{zone},{with};"));
+            return codes;
+        }
+        // One instruction goes round no more than 240°.
+        let halves = if turn_rad > MOST_TURN_RAD { 2 } else { 1 };
+        let step = 0.5 * turn_rad / f64::from(halves);
+        for half in 0..halves {
+            let via = at(step * f64::from(2 * half + 1));
+            let (end, zone) = if half + 1 == halves {
+                (to.clone(), *zone)
+            } else {
+                (at(step * f64::from(2 * half + 2)), passing)
+            };
+            codes.push(format!("MoveC {via},{end},{speed},{zone},{with};"));
+        }
+        codes
+    }
 }
 
 /// Angle that an arc turns from `from`, rad.

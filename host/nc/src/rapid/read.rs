@@ -1,8 +1,9 @@
 //! Lines of a RAPID module as motions.
+use super::super::arc::through;
 use super::super::left::{Because, Code, Left};
 use super::super::state::{Action, Arc, FeedMode, Modes, Plane, Straight};
-use std::collections::HashMap;
-use std::f64::consts::TAU;
+use super::data::{Data, Target};
+use super::instruction::{arguments, code};
 
 /// What a line does, and how it is written if it is an arc that may be rewritten.
 pub(super) struct Read {
@@ -28,13 +29,6 @@ pub(super) struct Motion {
     pub(super) rest: usize,
 }
 
-/// A robtarget.
-#[derive(Clone, Debug, PartialEq)]
-struct Target {
-    place: [f64; 3],
-    pose: String,
-}
-
 /// Where the robot stands.
 #[derive(Clone, Debug, PartialEq)]
 struct Stand {
@@ -45,8 +39,7 @@ struct Stand {
 /// State of the reading.
 #[derive(Default)]
 pub(super) struct Reader {
-    targets: HashMap<String, Target>,
-    speeds: HashMap<String, [String; 2]>,
+    data: Data,
     stand: Option<Stand>,
     blocked: Option<Left>,
     /// What made the place unknown last.
@@ -56,14 +49,6 @@ pub(super) struct Reader {
 
 /// Heights that differ by less are one plane, mm.
 const FLAT_MM: f64 = 1e-3;
-/// The predefined speeds v5 … v7000, mm/s.
-const PREDEFINED: [u32; 25] = [
-    5, 10, 20, 30, 40, 50, 60, 80, 100, 150, 200, 300, 400, 500, 600, 800, 1000, 1500, 2000, 2500,
-    3000, 4000, 5000, 6000, 7000,
-];
-/// What goes with a predefined speed.
-const PREDEFINED_REST: &str = "500,5000,1000";
-
 impl Read {
     fn of(action: Action) -> Self {
         Self {
@@ -94,7 +79,7 @@ impl Reader {
                 Read::of(Action::Nothing)
             }
             "CONST" | "LOCAL" => {
-                self.declare(trimmed);
+                self.data.declare(trimmed);
                 Read::of(Action::Nothing)
             }
             "PROC" | "ENDPROC" | "FUNC" | "ENDFUNC" | "TRAP" | "ENDTRAP" => {
@@ -153,8 +138,8 @@ impl Reader {
             "MoveC",
         )?;
         let start = self.stand.as_ref()?.target.place;
-        let via = self.target(list.first()?)?.place;
-        Some([start, via, self.target(list.get(1)?)?.place])
+        let via = self.data.target(list.first()?)?.place;
+        Some([start, via, self.data.target(list.get(1)?)?.place])
     }
 
     fn because(&self, code: Code) -> Because {
@@ -201,7 +186,7 @@ impl Reader {
                 tool
             };
             Some(Stand {
-                target: self.target(list.get(skip)?)?,
+                target: self.data.target(list.get(skip)?)?,
                 tool: list.get(tool)?.clone(),
             })
         };
@@ -263,82 +248,6 @@ impl Reader {
         }))
     }
 
-    /// `CONST robtarget name := [...];` or `CONST speeddata name := [...];`
-    fn declare(&mut self, text: &str) {
-        let Some((left, right)) = text.split_once(":=") else {
-            return;
-        };
-        let words: Vec<&str> = left.split_whitespace().collect();
-        let literal = right.trim().trim_end_matches(';').trim();
-        let [kind, name] = match words[..] {
-            [c, kind, name] if c.eq_ignore_ascii_case("CONST") => [kind, name],
-            [l, c, kind, name]
-                if l.eq_ignore_ascii_case("LOCAL") && c.eq_ignore_ascii_case("CONST") =>
-            {
-                [kind, name]
-            }
-            _ => return,
-        };
-        let name = name.to_ascii_lowercase();
-        if kind.eq_ignore_ascii_case("robtarget") {
-            if let Some(target) = literal_target(literal) {
-                self.targets.insert(name, target);
-            }
-        } else if kind.eq_ignore_ascii_case("speeddata")
-            && let Some(speed) = literal_speed(literal)
-        {
-            self.speeds.insert(name, speed);
-        }
-    }
-
-    fn target(&self, text: &str) -> Option<Target> {
-        let offset = text
-            .get(..5)
-            .filter(|head| head.eq_ignore_ascii_case("Offs("))
-            .and_then(|head| text[head.len()..].strip_suffix(')'));
-        if text.starts_with('[') {
-            literal_target(text)
-        } else if let Some(inside) = offset {
-            let (base, by) = inside.split_once(',')?;
-            let by: Option<Vec<f64>> = by
-                .split(',')
-                .map(|n| n.parse().ok().filter(|v: &f64| v.is_finite()))
-                .collect();
-            let by: [f64; 3] = by?.try_into().ok()?;
-            let mut target = self.targets.get(&base.to_ascii_lowercase()).cloned()?;
-            (0..3).for_each(|i| target.place[i] += by[i]);
-            Some(target)
-        } else {
-            self.targets.get(&text.to_ascii_lowercase()).cloned()
-        }
-    }
-
-    /// Speed of the tool point, mm/s, and the words for the other speeds.
-    fn speed(&self, text: &str) -> Option<(f64, String)> {
-        let (name, own) = match text.split_once('\\') {
-            Some((name, switch)) => {
-                let (key, value) = switch.split_once(":=")?;
-                let value = key
-                    .trim()
-                    .eq_ignore_ascii_case("V")
-                    .then(|| value.trim().parse::<f64>().ok())??;
-                (name.trim(), Some(value))
-            }
-            None => (text, None),
-        };
-        let [v, rest] = if name.starts_with('[') {
-            literal_speed(name)?
-        } else if let Some(found) = self.speeds.get(&name.to_ascii_lowercase()) {
-            found.clone()
-        } else {
-            let digits = name.strip_prefix(['v', 'V'])?;
-            let v: u32 = digits.parse().ok().filter(|v| PREDEFINED.contains(v))?;
-            [v.to_string(), PREDEFINED_REST.to_owned()]
-        };
-        let v = own.or_else(|| v.parse().ok())?;
-        (v > 0.0).then_some((v, rest))
-    }
-
     fn straight(&mut self, text: &str) -> Read {
         let Some(list) = arguments(text, "MoveL").filter(|a| a.len() == 4) else {
             self.lose("a line that is not plain");
@@ -346,13 +255,13 @@ impl Reader {
         };
         let stops = list[2].eq_ignore_ascii_case("fine");
         let before = self.stand.take();
-        let stand = self.target(&list[0]).map(|target| Stand {
+        let stand = self.data.target(&list[0]).map(|target| Stand {
             target,
             tool: list[3].clone(),
         });
         self.lose("a place that only the controller knows");
         self.stand = stand;
-        let feed_mm_s = self.speed(&list[1]).map_or(f64::NAN, |(v, _)| v);
+        let feed_mm_s = self.data.speed(&list[1]).map_or(f64::NAN, |(v, _)| v);
         Read {
             stops,
             ..self.passed(before, true, Some(feed_mm_s))
@@ -366,7 +275,7 @@ impl Reader {
             .ok_or(Left::Expression)?;
         let [via, to, speed, zone, tool] = [&list[0], &list[1], &list[2], &list[3], &list[4]];
         let before = self.stand.take();
-        let target = self.target(to);
+        let target = self.data.target(to);
         self.stand = target.clone().map(|target| Stand {
             target,
             tool: tool.clone(),
@@ -381,7 +290,7 @@ impl Reader {
         if let Some(left) = self.blocked {
             return lost(left);
         }
-        let (Some(via), Some(end)) = (self.target(via), target) else {
+        let (Some(via), Some(end)) = (self.data.target(via), target) else {
             return lost(Left::Expression);
         };
         let because = match &before {
@@ -391,43 +300,13 @@ impl Reader {
         let Some(Stand { target: start, .. }) = before.filter(|b| b.tool == *tool) else {
             return lost(Left::UnknownPosition(because));
         };
-        let Some((feed_mm_s, other_speeds)) = self.speed(speed) else {
-            return lost(Left::UnknownFeed(None));
+        let Some((feed_mm_s, other_speeds)) = self.data.speed(speed) else {
+            let name = Code::Named("a speed that only the controller knows");
+            return lost(Left::UnknownFeed(Some(self.because(name))));
         };
-        if start.pose != end.pose {
-            return lost(Left::Orientation);
-        }
-        let height = end.place[2];
-        if [&start, &via]
-            .iter()
-            .any(|t| (t.place[2] - height).abs() > FLAT_MM)
-        {
-            return lost(Left::OtherPlane);
-        }
-        let flat = |t: &Target| [t.place[0], t.place[1]];
-        let Some((centre, sweep_rad)) = through(flat(&start), flat(&via), flat(&end)) else {
-            return lost(Left::Geometry);
-        };
-        let radius_mm = (start.place[0] - centre[0]).hypot(start.place[1] - centre[1]);
-        let modes = Modes {
-            inch: false,
-            absolute: true,
-            absolute_centres: false,
-            feed_mode: FeedMode::PerMinute,
-        };
-        let arc = Arc {
-            plane: Plane::Xy,
-            start: flat(&start),
-            end: flat(&end),
-            centre,
-            radius_mm,
-            sweep_rad,
-            lift: None,
-            shared: [None; 4],
-            exact_stop: None,
-            feed_mm_s,
-            feed_word: feed_mm_s,
-            modes,
+        let arc = match flat_arc(&start, &via, &end, feed_mm_s) {
+            Ok(arc) => arc,
+            Err(left) => return lost(left),
         };
         let motion = Motion {
             to: to.clone(),
@@ -435,7 +314,7 @@ impl Reader {
             other_speeds,
             zone: zone.clone(),
             tool: tool.clone(),
-            height: height.to_string(),
+            height: end.place[2].to_string(),
             pose: end.pose,
             rest: text.rfind(';').map_or(text.len(), |at| at + 1),
         };
@@ -447,91 +326,34 @@ impl Reader {
     }
 }
 
-/// A line without its comment and its end; marks in strings are no comments.
-fn code(line: &[u8]) -> &[u8] {
-    let mut inside = false;
-    let end = line.iter().position(|b| {
-        inside ^= *b == b'"';
-        *b == b'!' && !inside
-    });
-    line[..end.unwrap_or(line.len())].trim_ascii_end()
-}
-
-/// The arguments of a single instruction, blanks around and inside literals taken out.
-fn arguments(text: &str, name: &str) -> Option<Vec<String>> {
-    let body = text.get(name.len()..)?.strip_suffix(';')?;
-    if !body.starts_with(char::is_whitespace) || body.contains([';', '"']) {
-        return None;
+/// The arc through three targets in one height and with one orientation.
+fn flat_arc(start: &Target, via: &Target, end: &Target, feed_mm_s: f64) -> Result<Arc, Left> {
+    if start.pose != end.pose {
+        return Err(Left::Orientation);
     }
-    let (mut depth, mut list) = (0, vec![String::new()]);
-    for c in body.chars().filter(|c| !c.is_whitespace()) {
-        match c {
-            '[' | '(' => depth += 1,
-            ']' | ')' => depth -= 1,
-            ',' if depth == 0 => {
-                list.push(String::new());
-                continue;
-            }
-            _ => {}
-        }
-        list.last_mut()?.push(c);
+    let aside = |t: &Target| (t.place[2] - end.place[2]).abs() > FLAT_MM;
+    if aside(start) || aside(via) {
+        return Err(Left::OtherPlane);
     }
-    (depth == 0).then_some(list)
-}
-
-fn literal_target(text: &str) -> Option<Target> {
-    let text: String = text.chars().filter(|c| !c.is_whitespace()).collect();
-    let inner = text.strip_prefix("[[")?.strip_suffix("]]")?;
-    let (place, rest) = inner.split_once("],")?;
-    let numbers: Option<Vec<f64>> = place
-        .split(',')
-        .map(|n| n.parse().ok().filter(|v: &f64| v.is_finite()))
-        .collect();
-    let place = numbers?.try_into().ok()?;
-    let pose = format!("{rest}]");
-    // Four numbers of orientation, four of configuration, six of external axes.
-    let counts: Vec<usize> = pose
-        .split("],[")
-        .map(|part| {
-            part.trim_matches(['[', ']'])
-                .split(',')
-                .filter(|n| n.parse::<f64>().is_ok())
-                .count()
-        })
-        .collect();
-    (counts == [4, 4, 6]).then_some(Target { place, pose })
-}
-
-fn literal_speed(text: &str) -> Option<[String; 2]> {
-    let text: String = text.chars().filter(|c| !c.is_whitespace()).collect();
-    let (v, rest) = text.strip_prefix('[')?.strip_suffix(']')?.split_once(',')?;
-    let all = std::iter::once(v).chain(rest.split(','));
-    (all.clone().count() == 4 && all.clone().all(|n| n.parse::<f64>().is_ok()))
-        .then(|| [v.into(), rest.into()])
-}
-
-/// Centre and signed sweep of the arc from `s` through `v` to `e`.
-fn through(s: [f64; 2], v: [f64; 2], e: [f64; 2]) -> Option<([f64; 2], f64)> {
-    let (b, c) = ([v[0] - s[0], v[1] - s[1]], [e[0] - s[0], e[1] - s[1]]);
-    let cross = 2.0 * (b[0] * c[1] - b[1] * c[0]);
-    let (bb, cc) = (b[0] * b[0] + b[1] * b[1], c[0] * c[0] + c[1] * c[1]);
-    // Three points that are nearly one, or nearly on a line: no circle to speak of.
-    if cross.abs() < 1e-9 * (bb + cc) || cc < 1e-12 {
-        return None;
-    }
-    let centre = [
-        s[0] + (c[1] * bb - b[1] * cc) / cross,
-        s[1] + (b[0] * cc - c[0] * bb) / cross,
-    ];
-    let angle = |p: [f64; 2]| (p[1] - centre[1]).atan2(p[0] - centre[0]);
-    let turned = |p: [f64; 2]| (angle(p) - angle(s)).rem_euclid(TAU);
-    let (to_via, to_end) = (turned(v), turned(e));
-    Some((
+    let [start, via, end] = [start, via, end].map(|t| [t.place[0], t.place[1]]);
+    let (centre, sweep_rad) = through(start, via, end).ok_or(Left::Geometry)?;
+    Ok(Arc {
+        plane: Plane::Xy,
+        start,
+        end,
         centre,
-        if to_via < to_end {
-            to_end
-        } else {
-            to_end - TAU
+        radius_mm: (start[0] - centre[0]).hypot(start[1] - centre[1]),
+        sweep_rad,
+        lift: None,
+        shared: [None; 4],
+        exact_stop: None,
+        feed_mm_s,
+        feed_word: feed_mm_s,
+        modes: Modes {
+            inch: false,
+            absolute: true,
+            absolute_centres: false,
+            feed_mode: FeedMode::PerMinute,
         },
-    ))
+    })
 }

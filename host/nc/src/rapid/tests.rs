@@ -191,11 +191,11 @@ fn reasons_to_leave_an_arc() {
     );
     assert_eq!(
         left(|m| m.replace("v300, z0", "vmax, z0")),
-        Left::UnknownFeed(None)
+        Left::UnknownFeed(named(18, "a speed that only the controller knows"))
     );
     assert_eq!(
         left(|m| m.replace("v300, z0", "v300\\T:=5, z0")),
-        Left::UnknownFeed(None)
+        Left::UnknownFeed(named(18, "a speed that only the controller knows"))
     );
     assert_eq!(
         left(|m| m.replace("    MoveC p3", "    grip;\n    MoveC p3")),
@@ -220,7 +220,7 @@ fn reasons_to_leave_an_arc() {
     assert_eq!(left(|m| m.replace("v300, z0", "v10, z0")), Left::Negligible);
     assert_eq!(
         left(|m| m.replace("v300, z0", "[nan,1,1,1], z0")),
-        Left::UnknownFeed(None)
+        Left::UnknownFeed(named(18, "a speed that only the controller knows"))
     );
 }
 
