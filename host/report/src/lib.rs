@@ -12,6 +12,7 @@
 //! | `each_cause_alone` | what each cause does to each circle by itself |
 //! | `portrait` | one profile as a small picture |
 //! | `pages`, `page.html` | comparison and history |
+//! | `program_page`, `plan_view` | a corrected program |
 //! | `hash` | identity of the data |
 //! | `template.html`, `style.css` | the page |
 #![forbid(unsafe_code)]
@@ -28,9 +29,11 @@ mod misfit_map;
 mod number;
 mod page_content;
 mod pages;
+pub mod plan_view;
 mod plots;
 mod polar;
 mod portrait;
+pub mod program_page;
 #[cfg(test)]
 mod tests;
 mod verdict;

@@ -7,40 +7,42 @@ use giotto::units;
 use serde::Serialize;
 
 #[derive(Serialize)]
-struct Page {
-    title: String,
-    parts: Vec<Part>,
-    version: &'static str,
+pub(super) struct Page {
+    pub(super) title: String,
+    pub(super) parts: Vec<Part>,
+    pub(super) version: &'static str,
 }
 
 #[derive(Serialize)]
-struct Part {
-    title: String,
-    words: Vec<String>,
-    tables: Vec<Table>,
-    charts: Vec<Drawn>,
+pub(super) struct Part {
+    pub(super) title: String,
+    pub(super) words: Vec<String>,
+    pub(super) tables: Vec<Table>,
+    pub(super) charts: Vec<Drawn>,
 }
 
 #[derive(Serialize)]
-struct Table {
-    caption: String,
-    header: Vec<&'static str>,
-    rows: Vec<Row>,
+pub(super) struct Table {
+    pub(super) caption: String,
+    pub(super) header: Vec<&'static str>,
+    pub(super) rows: Vec<Row>,
+    /// Its words may go over several lines.
+    pub(super) wraps: bool,
 }
 
 #[derive(Serialize)]
-struct Row {
-    cells: Vec<String>,
-    marked: bool,
+pub(super) struct Row {
+    pub(super) cells: Vec<String>,
+    pub(super) marked: bool,
 }
 
 #[derive(Serialize)]
-struct Drawn {
-    svg: String,
-    caption: String,
+pub(super) struct Drawn {
+    pub(super) svg: String,
+    pub(super) caption: String,
 }
 
-fn render(page: &Page) -> Result<String, ReportError> {
+pub(super) fn render(page: &Page) -> Result<String, ReportError> {
     let mut environment = minijinja::Environment::new();
     environment.set_undefined_behavior(minijinja::UndefinedBehavior::Strict);
     environment.add_template("style.css", include_str!("style.css"))?;
@@ -119,6 +121,7 @@ fn causes(c: &Comparison) -> Table {
         caption: "Causes; – where one was not found".into(),
         header: vec!["Cause", "before", "after", "change", "95 %", "unit", ""],
         rows: c.causes.iter().map(row).collect(),
+        wraps: false,
     }
 }
 
@@ -144,6 +147,7 @@ fn figures(c: &Comparison) -> Table {
         caption: "Figures, µm; the same instrument is assumed for both".into(),
         header: vec!["Figure", "before", "after", "change", "95 %", ""],
         rows: c.figures.iter().map(row).collect(),
+        wraps: false,
     }
 }
 
@@ -214,6 +218,7 @@ fn campaigns(machine: &History) -> Table {
             "no name",
         ],
         rows: machine.campaigns.iter().map(row).collect(),
+        wraps: false,
     }
 }
 
