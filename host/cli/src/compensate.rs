@@ -1,7 +1,9 @@
 //! `giotto compensate`: rewrite the arcs of an NC program with the inverse correction.
 mod output_file;
+mod page;
 mod summary;
 
+use super::destination::{Destination, Kind as FileKind};
 use super::{Failure, Output};
 use giotto::model_file::ModelFile;
 use giotto_nc::check::Controller;
@@ -9,13 +11,14 @@ use giotto_nc::{self, Code, Fate, FreeSide, Keep, Leads, Led, Mark, Options, Rep
 use output_file::OutputFile;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use summary::Summary;
 
 /// Arguments of `giotto compensate`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// NC program, RS-274 as LinuxCNC, Grbl, Fanuc and Haas speak it; or a plain RAPID module.
+    /// NC program, RS-274 as LinuxCNC, Grbl, Fanuc, Haas and Siemens speak it; Klartext of Heidenhain; or a plain RAPID module.
     #[arg(value_name = "IN.nc")]
     program: PathBuf,
     /// Model of the machine, from `giotto fit` or `giotto diagnose`.
@@ -45,7 +48,8 @@ pub struct Args {
     /// A code of the machine's own that moves nothing, as M150 or G77; may be given again.
     #[arg(long, value_name = "CODE", value_parser = |text: &str| text.parse::<Code>())]
     harmless: Vec<Code>,
-    /// Keep F to the last where an arc ends at a stop; up to a quarter of a lag's correction then remains there.
+    /// Keep F to the last where an arc ends at a stop; up to a quarter of a lag's correction then remains there. So it is
+    /// for `--for laser` and `--for printer`, whose beam or melt goes by the feed.
     #[arg(long)]
     full_feed_to_stops: bool,
     /// Full circles that begin or end at a stop get leads of their own on the free side, which is that of `--inside` or
@@ -58,6 +62,9 @@ pub struct Args {
     /// The circles with leads are walls of bosses: the outside is free, by the circle's own diameter.
     #[arg(long, requires = "lead")]
     outside: bool,
+    /// Write a page: the part drawn, arcs by their correction, what was left and why, contour error before and after.
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
     /// Hold the output against the rules of the controller it is for; exit 5 where it would be refused.
     #[arg(long, value_enum)]
     check: Option<Target>,
@@ -83,11 +90,11 @@ enum LeadArg {
 
 #[derive(clap::ValueEnum, Clone, Copy, Debug)]
 enum Purpose {
-    /// Light axes: 5000 mm/s², changes up to 0.3 mm.
+    /// Light axes: 5000 mm/s², changes up to 0.3 mm; F is kept to the last.
     Laser,
     /// 2000 mm/s², changes up to 0.2 mm.
     Mill,
-    /// 3000 mm/s², M-codes of Marlin and Klipper.
+    /// 3000 mm/s², M-codes of Marlin and Klipper; F is kept to the last.
     Printer,
     /// 2000 mm/s², changes up to 2 mm.
     Robot,
@@ -123,7 +130,9 @@ impl Args {
             absolute_centres: self.centres == Centres::Absolute,
             printer: matches!(self.purpose, Some(Purpose::Printer)),
             harmless: self.harmless.clone(),
-            slow_to_stops: !self.full_feed_to_stops,
+            // Power and melt are set for the feed: half of it burns, or leaves a blob.
+            slow_to_stops: !self.full_feed_to_stops
+                && !matches!(self.purpose, Some(Purpose::Laser | Purpose::Printer)),
             leads: match (self.lead, self.inside, self.outside) {
                 (None, ..) => Leads::No,
                 (Some(LeadArg::Tangent), true, _) => Leads::On(FreeSide::Inside),
@@ -211,6 +220,8 @@ struct Arc {
     #[serde(skip_serializing_if = "Option::is_none")]
     joint_remaining_um: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    slower_s: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     lead: Option<&'static str>,
     #[serde(skip_serializing_if = "Option::is_none")]
     left: Option<String>,
@@ -229,16 +240,44 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     }
     let model = ModelFile::load(&args.model)?;
     let mark = args.mark(&options)?;
-    let place = OutputFile::at(&args.output, &[&args.program, &args.model])?;
+    let inputs = [args.program.as_path(), args.model.as_path()];
+    let place = OutputFile::at(&args.output, &inputs)?;
+    let report = Destination::maybe(
+        args.report.as_deref(),
+        FileKind::Html,
+        &[inputs[0], inputs[1], args.output.as_path()],
+    )?;
     let mut arcs = Vec::new();
+    // The page is made of the output, which a pipe does not give back.
+    let mut kept = Vec::new();
     place.write(|file| {
-        arcs = if giotto_nc::rapid::is_rapid(&program) {
-            giotto_nc::rapid::compensate_to(&program, &model, &options, Some(&mark), file)?
-        } else {
-            giotto_nc::compensate_to(&program, &model, &options, Some(&mark), file)?
+        let correct = |to: &mut dyn Write| {
+            if giotto_nc::rapid::is_rapid(&program) {
+                giotto_nc::rapid::compensate_to(&program, &model, &options, Some(&mark), to)
+            } else {
+                giotto_nc::compensate_to(&program, &model, &options, Some(&mark), to)
+            }
         };
-        Ok(())
+        if report.is_some() {
+            arcs = correct(&mut kept)?;
+            file.write_all(&kept)
+        } else {
+            arcs = correct(file)?;
+            Ok(())
+        }
     })?;
+    if let Some(report) = &report {
+        let page = page::Page {
+            args: &args,
+            options: &options,
+            model: &model,
+            program: &program,
+            output: &kept,
+            arcs: &arcs,
+        };
+        report.write(page.html()?)?;
+        out.note(format_args!("wrote {}", report.path().display()));
+    }
     if out.json {
         out.document(&document(&arcs, &model))?;
     } else {
@@ -340,6 +379,7 @@ fn document(arcs: &[Report], model: &ModelFile) -> Document {
                 change_um: None,
                 blocks: None,
                 joint_remaining_um: None,
+                slower_s: None,
                 lead: None,
                 left: None,
             };
@@ -354,6 +394,7 @@ fn document(arcs: &[Report], model: &ModelFile) -> Document {
                     delta_mm,
                     blocks,
                     joint_share,
+                    slower_s,
                     led,
                 } => Arc {
                     radius_mm: Some(radius_mm),
@@ -361,6 +402,7 @@ fn document(arcs: &[Report], model: &ModelFile) -> Document {
                     change_um: Some(delta_mm * 1e3),
                     blocks: Some(blocks),
                     joint_remaining_um: Some(joint_share * delta_mm.abs() * 1e3),
+                    slower_s: (slower_s > 0.0).then_some(slower_s),
                     lead: match led {
                         Led::Not => None,
                         Led::Tangent => Some("tangent"),

@@ -232,3 +232,88 @@ fn mended(folder: &Path, probe: &str) {
         );
     }
 }
+
+/// The page of a corrected program: nothing on the console, and on a phone no word or drawing wider than the screen.
+#[test]
+fn the_page_of_a_program_fits_a_phone() {
+    let Some(browser) = chromium() else {
+        eprintln!("skipped: no chromium on this machine (apt-get install chromium)");
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let page = program_page(folder.path());
+    let html = std::fs::read_to_string(&page).unwrap();
+    let framed = folder.path().join("phone.html");
+    let quoted = html.replace('&', "&amp;").replace('"', "&quot;");
+    std::fs::write(
+        &framed,
+        format!(
+            r#"<!doctype html><iframe style="width:390px;height:3000px;border:0" srcdoc="{quoted}"></iframe><script>
+addEventListener("load", () => {{
+  const d = document.querySelector("iframe").contentDocument;
+  const wide = [...d.querySelectorAll("body *")].filter((e) => !e.closest(".scroll") && !e.closest("svg") && e.getBoundingClientRect().right > 391);
+  const small = [...d.querySelectorAll("svg.plan text")].filter((t) => t.getBoundingClientRect().height < 9);
+  const out = document.createElement("pre");
+  out.id = "probe"; out.textContent = `wide ${{wide.map((e) => e.outerHTML.slice(0, 80))}} small ${{small.length}} drawn ${{d.querySelectorAll("svg.plan path.stroke").length}}`;
+  document.body.append(out);
+}});</script>"#
+        ),
+    )
+    .unwrap();
+    let (dom, log) = browse(browser, &framed, &folder.path().join("profile"));
+    assert!(!log.contains("CONSOLE"), "{log}");
+    let probe = dom.split("<pre id=\"probe\">").nth(1).unwrap();
+    let probe = probe.split("</pre>").next().unwrap();
+    let drawn: usize = probe.rsplit(' ').next().unwrap().parse().unwrap();
+    assert!(probe.starts_with("wide  small 0 ") && drawn >= 4, "{probe}");
+}
+
+/// Corrects a small part with one arc that is left, and checks what can be checked without a browser.
+fn program_page(folder: &Path) -> PathBuf {
+    let at = |name: &str| folder.join(name).to_str().unwrap().to_owned();
+    std::fs::write(
+        at("model.toml"),
+        "format = 2\ncampaign = \"lab\"\nmachine = \"mill <1>\"\n[servo]\nkind = \"lag\"\nkv_per_s = 25.0\n\
+         [valid]\nradius_mm = [1.0, 300.0]\nfeed_mm_s = [1.0, 100.0]\n",
+    )
+    .unwrap();
+    std::fs::write(
+        at("part<b>.nc"),
+        "G21 G17 G90 F1500\nG0 X0 Y0\nG1 X20\nG3 X30 Y10 J10\nG1 Y30\nG3 X20 Y40 I-10\nG1 X0\nG0 Z5\nG41 D1\nG3 X-10 Y30 J-10\nG40\nM2\n",
+    )
+    .unwrap();
+    giotto(&[
+        "compensate",
+        &at("part<b>.nc"),
+        "--model",
+        &at("model.toml"),
+        "-o",
+        &at("out.nc"),
+        "--report",
+        &at("part.html"),
+    ]);
+    let html = std::fs::read_to_string(at("part.html")).unwrap();
+    for scheme in [
+        "http:", "https:", "src=", "url(", "@import", "<script", "<b>",
+    ] {
+        assert!(!html.contains(scheme), "{scheme}");
+    }
+    for words in [
+        "2 of 3 arcs corrected",
+        "What was left, and why",
+        "cutter radius compensation is on since G41 in line 9",
+        "2 arcs in the plane XY",
+        "class=\"stroke left-arc\"",
+        "class=\"stroke d5\"",
+        "largest contour error before and after",
+    ] {
+        assert!(html.contains(words), "{words} in\n{html}");
+    }
+    PathBuf::from(at("part.html"))
+}
+
+#[test]
+fn the_page_of_a_program_is_one_file_and_says_what_was_left() {
+    let folder = tempfile::tempdir().unwrap();
+    program_page(folder.path());
+}
