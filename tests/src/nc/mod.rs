@@ -48,7 +48,7 @@ pub struct Outcome {
     pub corrected: usize,
     /// Arcs that were left.
     pub left: usize,
-    /// The original runs to its end.
+    /// The original runs to its end; not asked where nothing was corrected.
     pub runs: bool,
     /// Why arcs were left, in words.
     pub reasons: Vec<String>,
@@ -68,13 +68,14 @@ pub fn judge(rs274: &canon::Rs274, seed: u64) -> Result<Outcome, String> {
     let wrong = |what: String| {
         format!("seed {seed}: {what}\n--- original\n{program}\n--- corrected\n{output}")
     };
-    let before = rs274.run(&program).map_err(|e| wrong(e.to_string()))?;
     let corrected = result
         .arcs
         .iter()
         .filter(|a| matches!(a.fate, giotto_nc::Fate::Corrected { .. }))
         .count();
+    let mut before = canon::Canon::default();
     if corrected > 0 {
+        before = rs274.run(&program).map_err(|e| wrong(e.to_string()))?;
         let after = rs274.run(&output).map_err(|e| wrong(e.to_string()))?;
         canon::compare(&before, &after, options.keep == Keep::Omega).map_err(wrong)?;
         if options.keep == Keep::Feed {
@@ -86,7 +87,7 @@ pub fn judge(rs274: &canon::Rs274, seed: u64) -> Result<Outcome, String> {
     Ok(Outcome {
         corrected,
         left: result.arcs.len() - corrected,
-        runs: before.error.is_none(),
+        runs: corrected > 0 && before.error.is_none(),
         reasons: result
             .arcs
             .iter()
