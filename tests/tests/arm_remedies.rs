@@ -255,6 +255,7 @@ fn wrong(fault: &Fault, seed: u64) -> Option<String> {
 }
 
 #[test]
+#[ignore = "written, and not yet run to its end: run it by name before it counts"]
 fn turned_as_the_finding_says_the_arm_comes_nearer_to_a_sound_one() {
     let all: Vec<Fault> = [1.0, -1.0].into_iter().flat_map(faults).collect();
     let joints = giotto::causes::ALL.iter().map(|model| model.words().id);
