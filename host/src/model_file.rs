@@ -171,7 +171,8 @@ impl ModelFile {
             Some(found) if !matches!(found.parse(), Ok(FLAT_FORMAT | FORMAT)) => {
                 return Err(text.format_error(found, FORMAT));
             }
-            None if text.top("servo").is_none() => {
+            // What is no TOML at all is said with its place below.
+            None if text.top("servo").is_none() && text.parse::<toml::Table>().is_ok() => {
                 return Err(text.missed(&[], "this is no model", EXPECTED));
             }
             Some(_) | None => {}

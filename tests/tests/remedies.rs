@@ -170,7 +170,7 @@ fn of_the_machine(sign: f64, out: &mut Vec<Fault>) {
             }
         }
     });
-    higher.left = 0.7;
+    higher.left = 0.9;
     out.push(higher);
     if sign > 0.0 {
         out.push(fault("vibration", &[], 0, |m| {

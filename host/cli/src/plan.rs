@@ -142,6 +142,35 @@ pub(super) fn name(id: &str) -> String {
 /// More causes than this are named as what they are: nearly all.
 const MANY: usize = 6;
 
+fn runs(plan: &Plan) -> Table {
+    let mut table = Table::new();
+    table
+        .load_style(presets::NOTHING)
+        .set_header(["run", "R mm", "f mm/s", "direction", "for"]);
+    for (i, step) in plan.runs.iter().enumerate() {
+        table.add_row([
+            (i + 1).to_string(),
+            step.radius_mm.to_string(),
+            step.feed_mm_s.to_string(),
+            match step.direction {
+                Direction::Ccw => "ccw",
+                Direction::Cw => "cw",
+            }
+            .to_string(),
+            match step.purpose {
+                Purpose::Test => "",
+                Purpose::Reference => "reference",
+            }
+            .to_string(),
+        ]);
+    }
+    table
+        .column_iter_mut()
+        .take(3)
+        .for_each(|column| column.set_cell_alignment(CellAlignment::Right));
+    table
+}
+
 fn show(plan: &Plan, cannot_tell: &[String], asked: bool, out: Output) {
     for class in &plan.open {
         if class.members.len() > MANY && !cannot_tell.is_empty() {
@@ -175,32 +204,7 @@ fn show(plan: &Plan, cannot_tell: &[String], asked: bool, out: Output) {
         out.tell(0, nothing(plan));
         return;
     }
-    let mut table = Table::new();
-    table
-        .load_style(presets::NOTHING)
-        .set_header(["run", "R mm", "f mm/s", "direction", "for"]);
-    for (i, step) in plan.runs.iter().enumerate() {
-        table.add_row([
-            (i + 1).to_string(),
-            step.radius_mm.to_string(),
-            step.feed_mm_s.to_string(),
-            match step.direction {
-                Direction::Ccw => "ccw",
-                Direction::Cw => "cw",
-            }
-            .to_string(),
-            match step.purpose {
-                Purpose::Test => "",
-                Purpose::Reference => "reference",
-            }
-            .to_string(),
-        ]);
-    }
-    table
-        .column_iter_mut()
-        .take(3)
-        .for_each(|column| column.set_cell_alignment(CellAlignment::Right));
-    out.say(&table);
+    out.say(runs(plan));
     for s in &plan.separations {
         let [a, b] = &s.pair;
         out.tell(

@@ -49,7 +49,7 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         match import::add(std::slice::from_ref(&file), &folder, &options, &|_, _| {}) {
             Ok(added) => {
                 added.iter().for_each(|a| tell(a, &options, out));
-                last.take(&options, added.iter().map(|a| a.direction).last(), file);
+                last.take(&options, added.last().map(|a| a.direction), file);
             }
             Err(error) => {
                 let help = error.help();

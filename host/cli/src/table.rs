@@ -160,17 +160,11 @@ fn larger_first(pair: [String; 2], value: f32) -> ([String; 2], f32) {
     }
 }
 
-/// A term as a person says it; what stands in the table is the machine's error, the controller does the opposite.
-fn in_words(term: &Term<f32>) -> String {
+/// A difference of two slides as a person says it; `None` for another term.
+fn of_pair(term: &Term<f32>) -> Option<String> {
     let n = |value: f32, factor: f64| number(f64::from(value) * factor);
-    let of = |actuator: Actuator| actuator.name().to_uppercase();
-    let pair = |plane: Plane| plane.axes().map(of);
-    match *term {
-        Term::RadiusOffset { offset_m } => format!("radius offset {} µm", n(offset_m, 1e6)),
-        Term::ScaleError { relative } => format!("scale error {} µm/m", n(relative, 1e6)),
-        Term::AxisScale { actuator, relative } => {
-            format!("scale error of {} {} µm/m", of(actuator), n(relative, 1e6))
-        }
+    let pair = |plane: Plane| plane.axes().map(|axis| axis.name().to_uppercase());
+    Some(match *term {
         Term::ScaleMismatch { plane, relative } => {
             let ([a, b], size) = larger_first(pair(plane), relative);
             format!(
@@ -199,6 +193,24 @@ fn in_words(term: &Term<f32>) -> String {
             let size = n(size, 1e6);
             format!("bandwidth mismatch, {a} rounds off its motion more than {b}: κ2 by {size} ms²")
         }
+        _ => return None,
+    })
+}
+
+/// A term as a person says it; what stands in the table is the machine's error, the controller does the opposite.
+fn in_words(term: &Term<f32>) -> String {
+    let n = |value: f32, factor: f64| number(f64::from(value) * factor);
+    let of = |actuator: Actuator| actuator.name().to_uppercase();
+    match *term {
+        Term::RadiusOffset { offset_m } => format!("radius offset {} µm", n(offset_m, 1e6)),
+        Term::ScaleError { relative } => format!("scale error {} µm/m", n(relative, 1e6)),
+        Term::AxisScale { actuator, relative } => {
+            format!("scale error of {} {} µm/m", of(actuator), n(relative, 1e6))
+        }
+        Term::ScaleMismatch { .. }
+        | Term::Squareness { .. }
+        | Term::ServoMismatch { .. }
+        | Term::BandwidthMismatch { .. } => of_pair(term).unwrap_or_default(),
         Term::Backlash { actuator, step_m } => {
             format!("backlash of {} {} µm", of(actuator), n(step_m, 1e6))
         }

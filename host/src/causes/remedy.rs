@@ -195,7 +195,6 @@ mod tests {
                 for axis in 0..2 {
                     let value = sign * contract;
                     let seat = cause.model().seat();
-                    let place = seat == Seat::One;
                     let site = match seat {
                         Seat::One => Site::One(Actuator::SLIDES[axis]),
                         Seat::Pair => Site::Pair(Plane::Xy),
@@ -212,10 +211,10 @@ mod tests {
                     machine.friction = [Some(Friction::default()); 3];
                     cause.model().apply(&effect, &mut machine);
                     let before = misfit(&machine, &ideal, seat == Seat::Pair);
-                    let names: &[&str] = if place {
-                        &[["x", "y"][axis]]
-                    } else {
-                        &["x", "y"]
+                    let names: &[&str] = match seat {
+                        Seat::One => &[["x", "y"][axis]],
+                        Seat::Pair => &["x", "y"],
+                        _ => &[],
                     };
                     let words = remedy(cause, names, value);
                     turn(&mut machine, knob, &words, axis, contract * factor);

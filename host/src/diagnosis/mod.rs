@@ -73,7 +73,7 @@ use crate::campaign::{Campaign, Run};
 use crate::model_file::ModelFile;
 use crate::simulation::machine::MachineError;
 use claims::Stated;
-use delay::explain_all;
+use delay::{Explanation, explain_all};
 use duration::Durations;
 use explained::Explained;
 use footing::Footing;
@@ -248,15 +248,7 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
         &durations,
         baseline.start.repeatability_m,
     );
-    let mut explanation = explain_all(&survey, &baseline.start, baseline.delay_s);
-    let like_arm = like_arm::is_like_arm(&explanation.found);
-    if like_arm {
-        like_arm::take_out_slides(&mut explanation.found);
-    }
-    by_slide::split(&mut explanation.found);
-    if ground.measured_scatter {
-        omnibus::take_out_pieces(&mut explanation.found);
-    }
+    let (mut explanation, like_arm) = explained(&survey, &baseline, &ground);
     let clamp = match durations {
         Durations::Clamped(clamp) if !like_arm && !known::knows_clamp(&baseline.known) => {
             Some(clamp)
@@ -317,6 +309,20 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
     };
     recommend(&mut diagnosis, like_arm);
     Ok(diagnosis)
+}
+
+/// What explains the survey, without causes that it cannot carry, and whether the machine looks like an arm.
+fn explained(survey: &Survey, baseline: &Simulation, ground: &Footing) -> (Explanation, bool) {
+    let mut explanation = explain_all(survey, &baseline.start, baseline.delay_s);
+    let like_arm = like_arm::is_like_arm(&explanation.found);
+    if like_arm {
+        like_arm::take_out_slides(&mut explanation.found);
+    }
+    by_slide::split(&mut explanation.found);
+    if ground.measured_scatter {
+        omnibus::take_out_pieces(&mut explanation.found);
+    }
+    (explanation, like_arm)
 }
 
 /// Adds the one thing to do.

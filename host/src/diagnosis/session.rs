@@ -95,7 +95,8 @@ mod tests {
 
     fn campaign() -> Campaign {
         let plan = "[machine]\nboth = { kv_per_s = 50.0 }\nsquareness_um_per_m = 60.0\n\
-             [grid]\nradii_mm = [50.0, 100.0, 150.0]\nfeeds_mm_s = [20.0, 100.0, 300.0]";
+             [grid]\nradii_mm = [50.0, 100.0, 150.0]\nfeeds_mm_s = [20.0, 100.0, 300.0]\n\
+             [instrument]\nsetup_um = [20.0, -10.0]";
         let plan = Plan::parse(plan, Path::new("plan.toml")).unwrap();
         simulation::campaign(&plan, 1)
     }

@@ -77,6 +77,28 @@ struct Clean<'a> {
     turn_s: f64,
 }
 
+/// The spectrum of each run.
+fn spectra(clean: &[Clean<'_>], spread: &Spread) -> Vec<Spectrum> {
+    let mut planner = FftPlanner::new();
+    let transforms: BTreeMap<usize, Arc<dyn Fft<f64>>> = clean
+        .iter()
+        .map(|clean| padded(clean.samples.len()))
+        .map(|length| (length, planner.plan_fft_forward(length)))
+        .collect();
+    clean
+        .par_iter()
+        .filter_map(|clean| {
+            let transform = transforms.get(&padded(clean.samples.len()))?;
+            Some(Spectrum::of(
+                clean.samples,
+                clean.turn_s,
+                transform,
+                spread.noise_m2,
+            ))
+        })
+        .collect()
+}
+
 /// Looks for a tone in what the other explanations leave.
 pub fn find(runs: &[Prepared], residual: &Column, spread: &Spread) -> Option<Tone> {
     let clean: Vec<Clean<'_>> = runs
@@ -88,24 +110,7 @@ pub fn find(runs: &[Prepared], residual: &Column, spread: &Spread) -> Option<Ton
         })
         .filter(|clean| clean.turn_s <= LONGEST_TURN_S && clean.samples.len() >= 64)
         .collect();
-    let mut planner = FftPlanner::new();
-    let transforms: BTreeMap<usize, Arc<dyn Fft<f64>>> = clean
-        .iter()
-        .map(|clean| padded(clean.samples.len()))
-        .map(|length| (length, planner.plan_fft_forward(length)))
-        .collect();
-    let spectra: Vec<Spectrum> = clean
-        .par_iter()
-        .filter_map(|clean| {
-            let transform = transforms.get(&padded(clean.samples.len()))?;
-            Some(Spectrum::of(
-                clean.samples,
-                clean.turn_s,
-                transform,
-                spread.noise_m2,
-            ))
-        })
-        .collect();
+    let spectra = spectra(&clean, spread);
     let longest = spectra.iter().map(|s| s.turn_s).fold(0.0, f64::max);
     let highest = spectra.iter().map(|s| s.nyquist_hz).fold(0.0, f64::max);
     if spectra.len() < 4 || longest <= 0.0 {

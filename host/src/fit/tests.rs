@@ -389,7 +389,7 @@ fn a_radius_that_is_not_there_is_named() {
     let words = error.unwrap_err().to_string();
     assert_eq!(
         words,
-        "no run has a radius of 200 mm; the campaign has [100.0, 150.0, 300.0] mm"
+        "no run has a radius of 200 mm; the campaign has 100, 150, 300 mm"
     );
     assert!(matches!(
         RadiusFit::new(&[], Options::default()).unwrap_err(),
