@@ -77,10 +77,8 @@ groups! {
     arms_taken_for_slides: ArmAsSlides, 2;
     small_sessions_of_nothing: SmallNull, 5;
     delay_unknown: Delay, 4;
-    #[ignore = "not met: one of twelve gets a vibration beside what is unexplained"]
     waves_of_any_order_and_law: Wave, 6;
     arcs: Arc, 5;
-    #[ignore = "not met: a wrong feed that the clock allows is not named"]
     one_spoilt_run: Spoilt, 6;
     a_common_override: Override, 4;
     from_rest_to_rest: Ramps, 4;
@@ -89,6 +87,5 @@ groups! {
     arms_with_one_fault: ArmSingle, 7;
     arms_at_four_places: ArmPlaces, 2;
     arms_with_two_faults: ArmPair, 2;
-    #[ignore = "not met: four runs show nothing of a scale mismatch of three times the noise"]
     small_sessions: Small, 5;
 }
