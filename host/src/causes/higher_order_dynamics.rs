@@ -12,7 +12,7 @@ const WORDS: Words = Words {
     id: "higher_order_dynamics",
     name: "higher-order dynamics",
     unit: "s^4",
-    what: "the radius shrinks faster than the square of the speed: the chain behind the command is not one servo lag",
+    what: "the size of the circles does not follow the square of the speed alone: the chain behind the command is not one servo lag",
     usual: "flexible joints or drives, a loop tuned with little damping, filters in series",
     adjust: "use the extended model; if the gain may be changed, raise the damping or lower the acceleration of small fast circles",
     positive: "at the highest speeds circles come out larger than the lag alone would make them: the machine swings out; lower the \
