@@ -339,7 +339,7 @@ fn motion_beside(i: usize, after: bool, visits: &[Visit<'_>]) -> Option<(usize, 
                 if visit.line.sort == Sort::Plain
                     && words.iter().all(|w| b"NF".contains(&w.letter)) =>
             {
-                clean &= words.iter().all(|w| w.letter == b'N');
+                clean &= words.iter().all(|w| w.letter == b'N') && !visit.line.speaks();
             }
             Action::Nothing | Action::Stop | Action::Other | Action::LostArc(_) => return None,
             // M0, M1, M2, M30, M60 in a block act at its end.

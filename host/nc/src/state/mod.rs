@@ -325,10 +325,15 @@ impl State {
                 start,
                 end: self.position,
                 absolute: self.now.absolute == Some(true),
-                bare: line.words.iter().all(|w| {
-                    (matches!(w.letter, b'N' | b'X' | b'Y' | b'Z') && w.counts == Counts::InForce)
-                        || (w.letter == b'G' && w.tenths() == 10)
-                }) && self.now.feed_mode == Some(FeedMode::PerMinute)
+                // A number in the middle of a block is no number to every controller.
+                bare: line.words.iter().skip(1).all(|w| w.letter != b'N')
+                    && !line.speaks()
+                    && line.words.iter().all(|w| {
+                        (matches!(w.letter, b'N' | b'X' | b'Y' | b'Z')
+                            && w.counts == Counts::InForce)
+                            || (w.letter == b'G' && w.tenths() == 10)
+                    })
+                    && self.now.feed_mode == Some(FeedMode::PerMinute)
                     && self.open_modes().next().is_none()
                     && self.blocked.is_none()
                     && self.now.cutter_compensation.is_none(),

@@ -130,9 +130,8 @@ impl State {
             }
             G::AbsoluteCentres(absolute) => self.now.absolute_centres = Some(absolute),
             G::Feed(mode) => {
-                if self.now.feed_mode != Some(mode) {
-                    self.lose_feed(code);
-                }
+                // LinuxCNC takes the feed away even where the mode was in force already.
+                self.lose_feed(code);
                 self.now.feed_mode = Some(mode);
             }
             G::CutterCompensation(on) => self.now.cutter_compensation = on.then_some(because),

@@ -103,6 +103,28 @@ pub(super) enum Keyword {
 }
 
 impl Line<'_> {
+    /// Whether a comment acts where it stands: a message, a print, a log.
+    pub(super) fn speaks(&self) -> bool {
+        const ACTING: [&[u8]; 9] = [
+            b"MSG",
+            b"DEBUG",
+            b"PRINT",
+            b"LOG",
+            b"PROBEOPEN",
+            b"PROBECLOSE",
+            b"PY",
+            b"ABORT",
+            b"ACTIVE",
+        ];
+        let inside = |at: usize| {
+            let words = self.text[at + 1..].trim_ascii_start();
+            ACTING.iter().any(|name| {
+                words.len() >= name.len() && words[..name.len()].eq_ignore_ascii_case(name)
+            })
+        };
+        (0..self.text.len()).any(|at| matches!(self.text[at], b'(' | b';') && inside(at))
+    }
+
     /// The word of a letter; `None` if there is none or more than one.
     pub(super) fn word(&self, letter: u8) -> Option<&Word> {
         let mut found = self.words.iter().filter(|w| w.letter == letter);
