@@ -557,3 +557,38 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn what_acts_between_an_arc_and_its_line_keeps_its_place() {
+    let corrected = |between: &str, line: &str| {
+        let head = "G21 G17 G90\nG0 X-20 Y0\nG1 X0 Y0 F6000\n";
+        let program = format!("{head}G3 X50 Y50 I0 J50\n{between}{line}M2\n");
+        run(&program, &Options::default()).0
+    };
+    // The last block before what acts ends where the arc did, or beyond it on the line.
+    let ends_at_the_arc = |text: &str, mark: &str| {
+        let before = text.split(mark).next().unwrap();
+        before
+            .trim_end()
+            .lines()
+            .last()
+            .unwrap()
+            .contains("X50 Y50 ")
+    };
+    let line = "G1 Y80\n";
+    assert!(!ends_at_the_arc(&corrected("(here)\n", line), "(here)"));
+    assert!(ends_at_the_arc(&corrected("(MSG, here)\n", line), "(MSG"));
+    assert!(ends_at_the_arc(
+        &corrected("( print, #1)\n", line),
+        "( print"
+    ));
+    assert!(ends_at_the_arc(
+        &corrected("", "G1 X50 N7 Y80\n"),
+        "G1 X50 N7"
+    ));
+    // A feed mode said again takes the feed away.
+    assert_eq!(
+        left("G21 G17 G90 G94\nG1 X0 Y0 F3000\nG94\nG3 X50 Y50 I0 J50\nG1 Y80\nM2\n"),
+        Left::UnknownFeed(Some(because(3, 'G', 940)))
+    );
+}
