@@ -265,7 +265,7 @@ fn verdict(folder: &Path, out: Output) -> Result<(), Failure> {
     out.say("");
     show_runs(&report, out);
     out.say("");
-    let [circle, cause, _] = giotto_report::sentences(&diagnosis, Some(&report));
+    let [circle, cause, _] = giotto_report::sentences(&campaign, &diagnosis);
     out.tell(0, circle);
     out.tell(0, cause);
     next(&campaign, &diagnosis, folder, out);

@@ -84,7 +84,7 @@ impl<'a> PageContent<'a> {
             name: campaign.name.clone(),
             machine: campaign.machine.clone(),
             grid: grid(campaign, &radii),
-            verdict: verdict::sentences(d, report.as_ref()),
+            verdict: verdict::sentences(campaign, d),
             causes: d
                 .findings
                 .iter()
@@ -130,9 +130,8 @@ impl<'a> PageContent<'a> {
                 campaign,
                 d,
                 &alone,
-                report
-                    .as_ref()
-                    .and_then(verdict::worst)
+                verdict::worst(d)
+                    .map(|worst| &campaign.runs[worst.index])
                     .map(|run| (run.radius_m, run.feed_m_s)),
             ),
         }

@@ -183,7 +183,7 @@ fn a_poor_campaign_gets_a_page_that_says_what_is_missing() {
     };
     let diagnosis = diagnose(&campaign, &options).unwrap();
     let page = html(&campaign, &diagnosis).unwrap();
-    let sentences = super::verdict::sentences(&diagnosis, None);
+    let sentences = super::verdict::sentences(&campaign, &diagnosis);
     assert!(
         page.contains("Nothing can be named from these runs"),
         "{sentences:?} {:?} {:?}",

@@ -1,43 +1,86 @@
 //! The verdict in three sentences: how the worst circle looks, why, and what to do.
 use super::number::{fixed, plain};
-use giotto::analysis::{Report, RunAnalysis};
+use giotto::campaign::{Campaign, Direction};
 use giotto::causes::Cause;
+use giotto::diagnosis::picture::RunPicture;
 use giotto::diagnosis::recommendation::{self, Action};
 use giotto::diagnosis::status::Status;
 use giotto::diagnosis::{Diagnosis, Estimate};
 use giotto::units::{self, Shown};
-use giotto_shared::Direction;
 
 /// The verdict in three sentences for a person: how the worst circle looks, why, and what to do.
-pub fn sentences(d: &Diagnosis, report: Option<&Report>) -> [String; 3] {
-    [misfit(report), cause(d), action(d)]
+pub fn sentences(campaign: &Campaign, d: &Diagnosis) -> [String; 3] {
+    [misfit(campaign, d), cause(d), action(d)]
 }
 
-/// The run whose form is worst.
-pub fn worst(report: &Report) -> Option<&RunAnalysis> {
-    let runs = report.runs.iter();
-    runs.max_by(|a, b| a.out_of_roundness_m.total_cmp(&b.out_of_roundness_m))
+/// The circle whose form is worst, with the noise averaged away: on a raw circle the loudest noise would win.
+#[derive(Clone, Copy, Debug)]
+pub struct Worst {
+    /// Index of the run in the campaign.
+    pub index: usize,
+    /// Largest less smallest of its means of 2°, m.
+    pub form_m: f64,
 }
 
-/// The circle whose form is worst, and how far off all circles are in size.
-fn misfit(report: Option<&Report>) -> String {
-    let worst = report.and_then(worst);
-    let Some(worst) = worst else {
+/// See [`Worst`]; nothing where no run was looked at.
+pub fn worst(d: &Diagnosis) -> Option<Worst> {
+    let form = |run: &RunPicture| {
+        let known = || run.profile_m[0].iter().flatten().copied();
+        let [low, high] = known().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
+            [low.min(v), high.max(v)]
+        });
+        (low <= high).then_some(Worst {
+            index: run.index,
+            form_m: high - low,
+        })
+    };
+    let runs = d.picture.iter().filter_map(form);
+    runs.max_by(|a, b| a.form_m.total_cmp(&b.form_m))
+}
+
+/// The circle that is furthest off in size, where that is more than any form, and the circle whose form is worst.
+fn misfit(campaign: &Campaign, d: &Diagnosis) -> String {
+    let Some(worst) = worst(d) else {
         return "No circle goes through these samples.".to_string();
     };
-    let way = match worst.direction {
-        Direction::Ccw => "counter-clockwise",
-        Direction::Cw => "clockwise",
+    let of = |index: usize| {
+        let run = &campaign.runs[index];
+        let way = match run.direction {
+            Direction::Ccw => "counter-clockwise",
+            Direction::Cw => "clockwise",
+        };
+        format!(
+            "radius {} mm at {} mm/s {way}",
+            plain(run.radius_m * 1e3),
+            plain(run.feed_m_s * 1e3)
+        )
     };
-    let size = worst.radius_error_m * 1e6;
-    let too = if size < 0.0 { "small" } else { "large" };
-    format!(
-        "The circle with the worst form, radius {} mm at {} mm/s {way}, is out of round by {} µm and {} µm too {too}.",
-        plain(worst.radius_m * 1e3),
-        plain(worst.feed_m_s * 1e3),
-        fixed(worst.out_of_roundness_m * 1e6, 1),
-        fixed(size.abs(), 1),
-    )
+    let off = |size_m: f64| {
+        let too = if size_m < 0.0 { "small" } else { "large" };
+        format!("{} µm too {too}", fixed(size_m.abs() * 1e6, 1))
+    };
+    let form = format!(
+        "{}, is out of round by {} µm",
+        of(worst.index),
+        fixed(worst.form_m * 1e6, 1)
+    );
+    let sizes = || d.picture.iter().map(|run| (run.index, run.size_m[0]));
+    let furthest = sizes().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+    let own = sizes().find(|(index, _)| *index == worst.index);
+    match (furthest, own) {
+        (Some((index, size_m)), _) if index != worst.index && size_m.abs() > worst.form_m => {
+            format!(
+                "A circle of {} is {}; the one with the worst form, {form}.",
+                of(index),
+                off(size_m)
+            )
+        }
+        (_, Some((_, size_m))) => format!(
+            "The circle with the worst form, {form} and {}.",
+            off(size_m)
+        ),
+        _ => format!("The circle with the worst form, {form}."),
+    }
 }
 
 fn cause(d: &Diagnosis) -> String {

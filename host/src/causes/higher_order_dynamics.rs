@@ -15,10 +15,11 @@ const WORDS: Words = Words {
     what: "the size of the circles does not follow the square of the speed alone: the chain behind the command is not one servo lag",
     usual: "flexible joints or drives, a loop tuned with little damping, filters in series",
     adjust: "use the extended model; if the gain may be changed, raise the damping or lower the acceleration of small fast circles",
-    positive: "at the highest speeds circles come out larger than the lag alone would make them: the machine swings out; lower the \
-                   feed-forward, or the jerk and acceleration of the path",
-    negative: "at the highest speeds circles shrink more than the lag alone would make them: raise the velocity feed-forward, or \
-                   shorten the acceleration filters",
+    // Of the size at lower speeds, not of a lag: circles that grow with speed have none.
+    positive: "at the highest speeds circles come out larger than their size at lower speeds foretells: the machine swings out; lower \
+                   the feed-forward, or the jerk and acceleration of the path",
+    negative: "at the highest speeds circles come out smaller than their size at lower speeds foretells: shorten the acceleration \
+                   filters, or raise the damping of the loop",
     elsewhere: None,
     never_told_from: &[],
     next: "smaller radii at the highest safe speed, and a step or line test with an accelerometer",

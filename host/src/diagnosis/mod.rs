@@ -307,7 +307,7 @@ fn within_pool(campaign: &Campaign, options: &Options) -> Result<Diagnosis, Diag
         model,
         findings: stated.findings,
     };
-    recommend(&mut diagnosis, like_arm);
+    recommend(&mut diagnosis, options.model.is_some(), like_arm);
     Ok(diagnosis)
 }
 
@@ -325,9 +325,13 @@ fn explained(survey: &Survey, baseline: &Simulation, ground: &Footing) -> (Expla
     (explanation, like_arm)
 }
 
-/// Adds the one thing to do.
-fn recommend(diagnosis: &mut Diagnosis, like_arm: bool) {
+/// Adds the one thing to do; `given` says whether it started from a model of the user's.
+fn recommend(diagnosis: &mut Diagnosis, given: bool, like_arm: bool) {
     diagnosis.recommendation = recommendation::of(diagnosis);
+    if given && diagnosis.recommendation.action == recommendation::Action::Nothing {
+        diagnosis.recommendation.words =
+            "nothing is to be added to the given model: it explains these circles".to_owned();
+    }
     if like_arm {
         diagnosis.unexplained.present = true;
         diagnosis.recommendation = like_arm::recommendation();

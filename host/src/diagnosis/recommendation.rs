@@ -66,7 +66,7 @@ pub fn of(d: &Diagnosis) -> Recommendation {
             (false, None, Some(missing)) => say(Action::Measure, missing.clone(), Some(PLAN)),
             _ => say(
                 Action::Nothing,
-                "nothing is to be done beyond the radius model, which giotto fit makes where the circles shrink with speed".into(),
+                "nothing is to be done beyond the radius model, which giotto fit makes where the circles change with speed".into(),
                 None,
             ),
         };
