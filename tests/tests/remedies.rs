@@ -240,15 +240,16 @@ fn turn(machine: &mut Machine, words: &str, slides: &[usize]) {
             "{real} is called {found}: {words}"
         );
     };
-    if words.contains("feed-forward") {
+    let response = side(
+        words,
+        "lower the feed-forward",
+        "shorten the acceleration filters",
+    );
+    if let Some(side) = response {
         return for axis in &mut machine.axes {
-            match side(
-                words,
-                "lower the feed-forward",
-                "raise the velocity feed-forward",
-            ) {
-                Some(1.0) => axis.feed_forward -= 0.3,
-                _ => axis.average_s *= 0.5,
+            match side > 0.0 {
+                true => axis.feed_forward -= 0.3,
+                false => axis.average_s *= 0.5,
             }
         };
     }
