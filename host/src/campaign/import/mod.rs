@@ -9,6 +9,7 @@
 //! | `leica`, `spatial_analyzer`, `rtde`, `kflop` | one file a format with a layout of its own |
 //! | `named` | columns known by the words and units of a header (exports, logs, other languages, the contract's own) |
 //! | `xml` | logs in XML as tables |
+//! | `plain_text` | carriage returns and grouped thousands as plain rows |
 //! | `columns` | columns named on the command line |
 //! | `recognise` | a file by its first lines |
 //! | `rows` | the rows of a file, SI, block by block |
@@ -36,6 +37,7 @@ mod leica;
 mod motion;
 mod named;
 mod place;
+mod plain_text;
 mod recognise;
 mod ring;
 mod rows;

@@ -2,6 +2,7 @@
 //! rows without the time that the lines above them give) is brought into that shape in memory.
 use super::detect::{Detected, Format, detect};
 use super::layout::{Head, Layout, Quantity, latin1, split};
+use super::plain_text;
 use super::rows::{EXPECTED, Slice};
 use super::xml;
 use crate::campaign::{CampaignError, Place, Problem};
@@ -43,6 +44,13 @@ pub(super) fn rows_of(path: &Path, reading: Reading<'_>) -> Result<Slice, Campai
     if let Some(order) = wide(&head) {
         let bytes = std::fs::read(path).map_err(io)?;
         text = Some(narrow(&bytes, order).into_bytes().into());
+    }
+    if let Some(plain) = text.as_deref().and_then(plain_text::of) {
+        text = Some(plain.into());
+    } else if text.is_none() && plain_text::of(&head).is_some() {
+        // Groups that begin behind the head are rare and refused by their row.
+        let bytes = std::fs::read(path).map_err(io)?;
+        text = plain_text::of(&bytes).map(Into::into);
     }
     let first = text.as_deref().unwrap_or(&head).trim_ascii_start();
     if first.starts_with(b"<") && reading.format != Format::B5r {

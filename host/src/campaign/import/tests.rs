@@ -536,6 +536,8 @@ fn headers_in_every_shape_are_understood() {
         ("preamble", table("Test,Circular\nDate,2024-05-02\nFeed (mm/min),3000\n\nTime (s),X (mm),Y (mm)", &plain, ",").into(), true, ""),
         ("french", comma(table("Temps [s];Axe X [mm];Axe Y [mm]", &plain, ";")).into(), true, ""),
         ("italian", comma(table("Tempo (s);X (mm);Y (mm);", &plain, ";")).into(), true, ""),
+        ("carriage returns", table("Time (s),X (mm),Y (mm)", &plain, ",").replace('\n', "\r").into(), true, ""),
+        ("grouped", table("Time (s)\tX (mm)\tY (mm)", &rows(&|_, p| vec![p[0], p[1] + 1000.0, p[2] + 1000.0]), "\t").replace("\t1", "\t1,").into(), true, ""),
         ("UTF-16", utf16(&table("Time (s)\tX (mm)\tY (mm)", &plain, "\t")), true, ""),
         ("UTF-16 German", utf16(&comma(table("Zeit [s];X [mm];Y [mm]", &plain, ";"))), true, ""),
         ("ISO", iso(&|t| format!("2024-05-02T09:00:{:06.3}Z", 20.0 + t)).into(), true, ""),
