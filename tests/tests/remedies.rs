@@ -28,8 +28,6 @@ struct Fault {
     planes: Vec<Plane>,
     /// Share of the misfit that may be left.
     left: f64,
-    /// Size in the contract's unit where circles do not name it: its words are then asked for.
-    said: Option<f64>,
     machine: Machine,
 }
 
@@ -54,7 +52,6 @@ fn fault(cause: &'static str, slides: &[usize], plane: usize, put: impl Fn(&mut 
         slides: slides.to_vec(),
         planes: vec![Plane::ALL[plane]],
         left: 0.35,
-        said: None,
         machine,
     }
 }
@@ -66,17 +63,14 @@ fn of_slides(sign: f64, out: &mut Vec<Fault>) {
         out.push(fault("backlash", &[a], plane, |m| {
             m.axes[a].backlash_m = sign * 12e-6;
         }));
-        let mut spike = fault("reversal_spike", &[a], plane, |m| {
+        out.push(fault("reversal_spike", &[a], plane, |m| {
             m.axes[a].friction = Some(Friction {
                 peak_m: sign * 15e-6,
                 decay_s: 0.03,
                 rise_s: 0.003,
                 presliding_m: 5e-6,
             });
-        });
-        // A compensation that is set too high makes no pulse that the diagnosis calls friction.
-        spike.said = (sign < 0.0).then_some(-15.0);
-        out.push(spike);
+        }));
         out.push(fault("cyclic_error", &[a], plane, |m| {
             m.geometry.cyclic[a] = Some(Cyclic {
                 amplitude_m: 6e-6,
@@ -377,10 +371,9 @@ fn wrong(fault: &Fault, seed: u64) -> Option<String> {
     let found = diagnose(&campaign, &Options::default()).unwrap();
     let named = |f: &&Finding| f.cause.id() == fault.cause && names(f) == fault.slides;
     let what = format!("{} of {:?}, seed {seed}", fault.cause, fault.slides);
-    let remedy = match (fault.said, found.findings.iter().find(named)) {
-        (Some(size), _) => said(fault, size),
-        (None, Some(finding)) => finding.remedy.clone(),
-        (None, None) => {
+    let remedy = match found.findings.iter().find(named) {
+        Some(finding) => finding.remedy.clone(),
+        None => {
             let all: Vec<String> = found.findings.iter().map(Finding::title).collect();
             return Some(format!("{what}: found is {all:?}"));
         }
@@ -400,18 +393,6 @@ fn wrong(fault: &Fault, seed: u64) -> Option<String> {
         let [before, after] = [before, after].map(|m| m * 1e6);
         format!("{what}: {before:.2} -> {after:.2} µm: {remedy}")
     })
-}
-
-/// The words for a fault of this size.
-fn said(fault: &Fault, size: f64) -> String {
-    let mut all = giotto::causes::ALL.iter().map(|model| model.cause());
-    let cause = all.find(|cause| cause.id() == fault.cause).unwrap();
-    let slides: Vec<&str> = fault
-        .slides
-        .iter()
-        .map(|slide| ["x", "y", "z"][*slide])
-        .collect();
-    giotto::causes::remedy::remedy(cause, &slides, size)
 }
 
 /// What the best lag leaves of the sizes of the circles, rms, m: what is beyond it has a higher order.

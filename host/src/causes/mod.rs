@@ -220,6 +220,11 @@ pub trait CauseModel: Sync {
         value.is_finite()
     }
 
+    /// Whether it can have such a value beside these causes on the same actuator.
+    fn allows_beside(&self, value: f64, _others: &[Cause]) -> bool {
+        self.allows(value)
+    }
+
     /// Whether it can take on the form of other things: beside much that is unexplained it needs to be larger.
     fn flexible(&self) -> bool {
         !self.shape_names().is_empty()

@@ -1,5 +1,5 @@
 //! Friction turns its sign where an axis reverses, and the loop needs time to follow: an outward pulse after
-//! the reversal, `r = A·p(t)·|cosψ|` for X, `|sinψ|` for Y.
+//! the reversal (inward where a friction compensation is set too high), `r = A·p(t)·|cosψ|` for X, `|sinψ|` for Y.
 //!
 //! The friction does not jump: over a presliding travel x0 it goes as 1 − 2e^{−x/x0} (Dahl; LuGre without a
 //! Stribeck dip, doi 10.1109/9.376053). The loop answers a step of it with e^{−t/decay} − e^{−t/rise}, scaled
@@ -15,7 +15,7 @@ const WORDS: Words = Words {
     id: "reversal_spike",
     name: "reversal spike",
     unit: "um",
-    what: "a short outward spike just after an axis turns round, of the same height at every speed",
+    what: "a short spike just after an axis turns round, of the same height at every speed: outward by friction, inward where its compensation is set too high",
     usual: "friction of guides and drives against a loop that integrates slowly",
     adjust: "lubricate; raise the integral gain; set the friction (quadrant) compensation of that axis",
     positive: "{a} lags by up to {size} just after it turns back: raise its friction compensation by {size}, or lubricate the guide",
@@ -118,10 +118,11 @@ impl CauseModel for ReversalSpike {
         *presliding_m = presliding_m.abs().clamp(PRESLIDINGS_M[0], PRESLIDINGS_M[1]);
     }
 
-    // Friction opposes the new direction: the spike is outward. An inward one is another thing, the shoulder of a step
-    // for the most part.
-    fn allows(&self, peak_um: f64) -> bool {
-        peak_um > 0.0
+    /// Friction opposes the new direction: the spike is outward. An inward one is a compensation that is set too high, unless
+    /// the actuator has play or sticks: then it is the shoulder of that step for the most part.
+    fn allows_beside(&self, peak_um: f64, others: &[Cause]) -> bool {
+        let steps = [Cause::Backlash, Cause::StickSlip, Cause::LateralPlay];
+        peak_um > 0.0 || !others.iter().any(|other| steps.contains(other))
     }
 
     fn signature(

@@ -11,6 +11,7 @@ use super::{
 };
 use crate::campaign::Campaign;
 use crate::causes::Cause;
+use giotto_shared::Actuator;
 
 /// What is said.
 pub(super) struct Stated {
@@ -49,9 +50,18 @@ pub(super) fn state(
     );
     // Where the scatter is assumed, an interval that holds zero shows nothing.
     let shown = |[low, high]: [f64; 2]| footing.measured_scatter || !(low <= 0.0 && high >= 0.0);
+    let all: Vec<(Cause, Vec<Actuator>)> = findings
+        .iter()
+        .map(|finding| (finding.cause, finding.actuators.clone()))
+        .collect();
     findings.retain(|finding| {
+        let on_same = all
+            .iter()
+            .filter(|(_, actuators)| actuators.iter().any(|a| finding.actuators.contains(a)));
+        let others: Vec<Cause> = on_same.map(|(cause, _)| *cause).collect();
+        let value = finding.estimate.value;
         finding.probability > status::TIE
-            && finding.cause.model().allows(finding.estimate.value)
+            && finding.cause.model().allows_beside(value, &others)
             && shown(finding.estimate.ci95)
     });
     let unexplained = if footing.measured_scatter {

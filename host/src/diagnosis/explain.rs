@@ -366,8 +366,11 @@ fn bar_impossible(found: &mut Explained, weights: &[f64], barred: &mut Vec<usize
             .copied()
             .find(|&item| match &found.items[item].kind {
                 // A phase takes the sign of an amplitude.
-                Kind::Cause { cause, .. } => {
-                    cause.model().columns() == 1 && !cause.model().allows(amount(item))
+                Kind::Cause { cause, site, .. } => {
+                    cause.model().columns() == 1
+                        && !cause
+                            .model()
+                            .allows_beside(amount(item), &found.causes_on(*site, item))
                 }
                 Kind::Pattern(_) => false,
             });

@@ -10,6 +10,7 @@ use super::spread::Spread;
 use super::survey::{Lag, Prepared, Response};
 use super::tangent::Tangents;
 use super::tone::Tone;
+use crate::causes::{Cause, Site};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
@@ -63,6 +64,21 @@ impl Explained {
             .iter()
             .copied()
             .filter(|item| self.items[*item].listed() && !self.tied.contains(item))
+    }
+
+    /// The causes beside `item` that concern an actuator of this site: chosen ones, and teeth.
+    pub fn causes_on(&self, site: Site, item: usize) -> Vec<Cause> {
+        let own = site.actuators();
+        let chosen = self.chosen.iter().filter(|other| **other != item);
+        let named = chosen.filter_map(|other| match &self.items[*other].kind {
+            Kind::Cause { cause, site, .. } => {
+                let shared = site.actuators().iter().any(|a| own.contains(a));
+                shared.then_some(*cause)
+            }
+            Kind::Pattern(_) => None,
+        });
+        let teeth = self.teeth.iter().filter(|teeth| own.contains(&teeth.axis));
+        named.chain(teeth.map(|_| Cause::StickSlip)).collect()
     }
 
     /// Enters explanations, each chosen from so many starting shapes; gives their numbers.

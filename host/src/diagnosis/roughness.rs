@@ -2,7 +2,8 @@
 //!
 //! Teeth have no fixed place, so power is looked at: second differences of neighbouring samples, over bins of
 //! the speed of one axis. The first quarter second after a reversal is left out, since a friction spike is
-//! steep there too. Where teeth are found, the other explanations do not look.
+//! steep there too. A step at a fixed place is one edge a stroke, teeth are many. Where teeth are found, the other explanations
+//! do not look.
 use super::spread::Spread;
 use super::survey::Prepared;
 use giotto_shared::Actuator;
@@ -38,6 +39,10 @@ const SMOOTH: f64 = 1.3;
 const PARTLY: f64 = 1.15;
 /// Variance ratio of the slow parts of runs that have fast parts too.
 const CONTRAST: f64 = 1.25;
+
+/// Share of the roughness that other edges than the steepest of each stroke hold at least: of two teeth a stroke one is left,
+/// of a step at a place nothing.
+const MANY_EDGES: f64 = 0.15;
 
 /// Looks for teeth on every axis that moves.
 pub fn find(runs: &[Prepared], residual: &[Vec<f64>], spread: &Spread) -> Vec<Teeth> {
@@ -83,6 +88,9 @@ fn find_on(
 ) -> Option<Teeth> {
     let power = powers(axis, runs, residual, spread, known);
     let (reached, significance) = rough_up_to(&power)?;
+    if !power.has_many_edges_below(reached) {
+        return None;
+    }
     let below_m_s = FIRST_EDGE_M_S * 2f64.powf(0.5 * reached as f64);
     if !contrast(axis, below_m_s, runs, residual, spread.noise_m2) {
         return None;
@@ -101,6 +109,8 @@ fn find_on(
 struct Powers {
     /// Sum in each bin as a multiple of the noise.
     ratios: [f64; BINS],
+    /// Of it, what the steepest edge of each stroke holds.
+    steepest: [f64; BINS],
     /// Samples in each bin.
     counts: [f64; BINS],
 }
@@ -112,6 +122,15 @@ impl Powers {
         let ratio = self.ratios[bin];
         (ratio, (ratio - 1.0) * (self.counts[bin] / 6.0).sqrt())
     }
+
+    /// Whether there is more to the bins below one than the steepest edge of each stroke: a machine that sticks jumps many
+    /// times, a step at a place once a stroke.
+    fn has_many_edges_below(&self, reached: usize) -> bool {
+        let slow = || 0..reached.min(BINS);
+        let excess = |bin: usize| (self.ratios[bin] - 1.0) * self.counts[bin];
+        let beside = |bin: usize| (self.ratios[bin] - self.steepest[bin] - 1.0) * self.counts[bin];
+        slow().map(beside).sum::<f64>() > MANY_EDGES * slow().map(excess).sum::<f64>()
+    }
 }
 
 /// Roughness of what is left by the speed of an axis, away from its reversals.
@@ -122,14 +141,18 @@ fn powers(
     spread: &Spread,
     known: &[Teeth],
 ) -> Powers {
-    let (sums, counts) = runs
+    let sums = runs
         .par_iter()
         .zip(residual)
         .map(|(run, left)| {
-            let (mut sums, mut counts) = ([0.0; BINS], [0.0; BINS]);
+            let mut sums = Sums::default();
             let strokes = run.view.strokes_of(axis);
+            let mut edges = Edges::default();
             for i in 1..left.len().min(strokes.len()).saturating_sub(1) {
                 let share = strokes[i].share;
+                if share < strokes[i - 1].share {
+                    edges.close(&mut sums);
+                }
                 let facing = run.view.direction[i][axis.index()].abs();
                 // A step at the reversal itself shows beside it, if the lag is off.
                 let beside = share.min(1.0 - share) * std::f64::consts::PI < BESIDE_RAD;
@@ -142,27 +165,54 @@ fn powers(
                 }
                 if let Some(bin) = bin_of(axis_speed(run, axis, i)) {
                     // Clipped: a few wild samples are not roughness.
-                    sums[bin] += ((left[i - 1] - 2.0 * left[i] + left[i + 1]).powi(2) / 6.0)
+                    let square = ((left[i - 1] - 2.0 * left[i] + left[i + 1]).powi(2) / 6.0)
                         .min(400.0 * spread.noise_m2);
-                    counts[bin] += 1.0;
+                    edges.of_stroke.push((i, bin, square));
                 }
             }
-            (sums, counts)
+            edges.close(&mut sums);
+            sums
         })
-        .reduce(
-            || ([0.0; BINS], [0.0; BINS]),
-            |a, b| {
-                (
-                    std::array::from_fn(|k| a.0[k] + b.0[k]),
-                    std::array::from_fn(|k| a.1[k] + b.1[k]),
-                )
-            },
-        );
+        .reduce(Sums::default, |a, b| Sums {
+            all: std::array::from_fn(|k| a.all[k] + b.all[k]),
+            count: std::array::from_fn(|k| a.count[k] + b.count[k]),
+            steepest: std::array::from_fn(|k| a.steepest[k] + b.steepest[k]),
+        });
+    let noise = |bin: usize| (sums.count[bin] * spread.noise_m2).max(f64::MIN_POSITIVE);
     Powers {
-        ratios: std::array::from_fn(|bin| {
-            sums[bin] / (counts[bin] * spread.noise_m2).max(f64::MIN_POSITIVE)
-        }),
-        counts,
+        ratios: std::array::from_fn(|bin| sums.all[bin] / noise(bin)),
+        steepest: std::array::from_fn(|bin| sums.steepest[bin] / noise(bin)),
+        counts: sums.count,
+    }
+}
+
+/// What is summed over the strokes of all runs, by bin.
+#[derive(Default)]
+struct Sums {
+    all: [f64; BINS],
+    count: [f64; BINS],
+    /// Of `all`, what the steepest edge of each stroke holds.
+    steepest: [f64; BINS],
+}
+
+/// Squared second differences of one stroke, with their samples and bins.
+#[derive(Default)]
+struct Edges {
+    of_stroke: Vec<(usize, usize, f64)>,
+}
+
+impl Edges {
+    /// Counts a stroke.
+    fn close(&mut self, sums: &mut Sums) {
+        let steepest = self.of_stroke.iter().max_by(|a, b| a.2.total_cmp(&b.2));
+        let steepest = steepest.map(|edge| edge.0);
+        for (sample, bin, square) in self.of_stroke.drain(..) {
+            sums.all[bin] += square;
+            sums.count[bin] += 1.0;
+            if steepest.is_some_and(|at| at.abs_diff(sample) <= 1) {
+                sums.steepest[bin] += square;
+            }
+        }
     }
 }
 
