@@ -4,6 +4,7 @@
 //! The speed falls in three pieces: the acceleration turns to that of braking at the limit of jerk, stays there, and returns
 //! to none so that it reaches it with the speed. Numbers are single precision, per tick: increments of a path, never places.
 
+use super::FARTHEST_NM;
 use core::f32::consts::PI;
 
 /// Velocity below which there is nothing to brake, nm per tick.
@@ -69,6 +70,10 @@ pub(super) struct Brake {
 fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     let ([ax, ay, az], [bx, by, bz]) = (a, b);
     ax * bx + ay * by + az * bz
+}
+
+pub(super) fn size(v: [f32; 3]) -> f32 {
+    libm::sqrtf(dot(v, v))
 }
 
 fn combined(a: [f32; 3], p: f32, b: [f32; 3], q: f32) -> [f32; 3] {
@@ -199,6 +204,34 @@ impl Brake {
         }
         whole
     }
+}
+
+/// Whether a path that is led from a place at a velocity (nm per tick), which changes (nm per tick²), can stop within the
+/// coordinates, wherever it goes and one tick later. Mostly one comparison: few are so near their end.
+pub(super) fn has_room(
+    limits: Limits,
+    place: [i32; 3],
+    velocity: [i32; 3],
+    change: [i32; 3],
+) -> bool {
+    /// Farther from the end of the coordinates than any brake is long.
+    const FAR_NM: u32 = FARTHEST_NM as u32 / 2;
+    let most = place.iter().fold(0, |most, nm| nm.unsigned_abs().max(most));
+    if most < FAR_NM {
+        return true;
+    }
+    let Limits {
+        acceleration, jerk, ..
+    } = limits;
+    // At most: as `farthest_nm`, straight outward and with what is left if all of the change is across.
+    let speed = size(velocity.map(|nm| nm as f32));
+    let growth = size(change.map(|nm| nm as f32)).min(acceleration);
+    let top = speed + growth * (1.0 + 0.5 * growth / jerk);
+    let growing = growth / jerk * top;
+    let left = libm::sqrtf(acceleration * acceleration - growth * growth);
+    let left = left.max(LEAST_SHARE * acceleration);
+    let braked = 0.5 * top * (top / left + left / jerk);
+    most as f32 + 2.0 * top + growing + braked < FARTHEST_NM as f32
 }
 
 /// Farthest that a brake leads outward, nm, from a velocity and its change; `outward` is a unit vector. All per tick.

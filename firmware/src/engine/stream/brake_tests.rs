@@ -203,3 +203,34 @@ fn however_rough_the_set_points_no_step_is_longer_than_the_feed() {
         }
     }
 }
+
+/// What has room stops within the coordinates, whatever way it goes and turns, also when the brake begins a tick later.
+#[test]
+fn what_has_room_stops_within_the_coordinates() {
+    let limits = plan_with(Operator::default()).limits;
+    let outward = [1.0, 0.0, 0.0];
+    let mut rooms = [0; 2];
+    for place in (1_400..2_126).step_by(20) {
+        for speed in (0..=1_000_000).step_by(125_000) {
+            for [out, up] in [[1.0, 0.0], [0.6, 0.8], [0.0, 1.0], [-0.8, 0.6], [-1.0, 0.0]] {
+                for [x, y] in [[0, 0], [4000, 0], [0, 4000], [-3000, 3000], [5000, 0]] {
+                    let velocity = [out, up, 0.0].map(|part| (part * f64::from(speed)) as i32);
+                    let place_nm = place * 1_000_000;
+                    let change = [x, y, 0];
+                    let room = brake::has_room(limits, [place_nm, 0, 0], velocity, change);
+                    rooms[usize::from(room)] += 1;
+                    let later = [0, 1, 2].map(|i| (velocity[i] + change[i]) as f32);
+                    let change = change.map(|nm| nm as f32);
+                    let accelerations = [limits.acceleration, limits.jerk];
+                    let way = farthest_nm(accelerations, later, change, outward);
+                    let end = f64::from(place_nm) + f64::from(later[0].max(0.0) + way);
+                    assert!(
+                        !room || end <= f64::from(FARTHEST_NM),
+                        "{place} {velocity:?} {change:?}: {end}"
+                    );
+                }
+            }
+        }
+    }
+    assert!(rooms.iter().all(|count| *count > 500), "{rooms:?}");
+}
