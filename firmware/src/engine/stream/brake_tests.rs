@@ -126,25 +126,27 @@ fn every_stop_keeps_the_limits_and_the_distance() {
     }
 }
 
+/// Largest acceleration, m/s², and jerk, m/s³.
+fn largest(places: &[[f64; 3]]) -> [f64; 2] {
+    let rates = |places: &[[f64; 3]]| -> Vec<_> {
+        let rate = |w: &[[f64; 3]]| difference(w[1], w[0]).map(|d| d / DT);
+        places.windows(2).map(rate).collect()
+    };
+    let acceleration = rates(&rates(places));
+    let most = |v: &[[f64; 3]]| v.iter().copied().map(size).fold(0.0, f64::max);
+    [most(&acceleration), most(&rates(&acceleration))]
+}
+
 fn within_limits(places: &[[f64; 3]], curved: bool, what: &str) {
-    let velocity: Vec<_> = places
-        .windows(2)
-        .map(|w| difference(w[1], w[0]).map(|d| d / DT))
-        .collect();
-    let acceleration: Vec<_> = velocity
-        .windows(2)
-        .map(|w| difference(w[1], w[0]).map(|d| d / DT))
-        .collect();
-    let jerk = acceleration
-        .windows(2)
-        .map(|w| size(difference(w[1], w[0])) / DT);
+    let [acceleration, jerk] = largest(places);
     // Rounding to nanometres: 4 nm of a second difference, 8 of a third.
-    let most = acceleration.iter().copied().map(size).fold(0.0, f64::max);
-    assert!(most < ACCELERATION + 0.01, "{what}: {most} m/s²");
-    let most = jerk.fold(0.0, f64::max);
+    assert!(
+        acceleration < ACCELERATION + 0.01,
+        "{what}: {acceleration} m/s²"
+    );
     // That of the curvature comes on top.
     let bar = if curved { 1.25 } else { 1.02 };
-    assert!(most < JERK * bar + 10.0, "{what}: {most} m/s³");
+    assert!(jerk < JERK * bar + 10.0, "{what}: {jerk} m/s³");
 }
 
 /// On the circle until it stands, to a few micrometres.
@@ -169,6 +171,28 @@ fn a_stop_follows_the_curvature() {
         // Along the tangent it would be half a millimetre at least.
         assert!(way * way / 0.2 > 3e-4);
     }
+}
+
+/// A swing to and fro across a steady feed: dying where it turns back, it is carried on ever faster out of its sharpest turn.
+#[test]
+fn a_brake_out_of_a_sharp_turn_keeps_the_acceleration() {
+    fn swing(t: f64) -> [f64; 3] {
+        let faded = smoothstep((t / 0.5).min(1.0)).value;
+        [
+            length(t, 0.02),
+            faded * 0.01 * (1.0 - (15.0 * t).cos()),
+            0.0,
+        ]
+    }
+    let mut most = 0.0f64;
+    for at in (600..1100).step_by(3) {
+        for dies in [false, true] {
+            let places = stopped(swing, at, dies);
+            most = most.max(largest(&places)[0]);
+        }
+    }
+    std::println!("{most} m/s² at most");
+    assert!(most < ACCELERATION, "{most}");
 }
 
 /// A sender that goes to and fro at the largest feed, or starts at it at once, and dies or is stopped.
