@@ -13,8 +13,9 @@
 //! ```
 use crate::corrector::{Corrector, Counters, Input, Output};
 use crate::law::LawError;
+use crate::marks;
 use crate::settings::JOINTS;
-use core::sync::atomic::Ordering::{Acquire, Relaxed, Release};
+use core::sync::atomic::Ordering::Relaxed;
 use core::sync::atomic::{AtomicI32, AtomicU8, AtomicU32};
 use giotto_shared::table::MAX_IMAGE_BYTES;
 
@@ -146,12 +147,14 @@ impl Taker {
     /// Returns whether the program asks to stop.
     pub fn take(&mut self, page: &Page, corrector: &mut Corrector) -> bool {
         corrector.set_bypass(page.bypass.load(Relaxed) != 0);
-        let offered = page.offered.load(Acquire);
-        if u32::from(offered) != page.taken.load(Relaxed) && corrector.takes_table() {
-            let verdict = self.look(page, corrector);
-            page.verdict.store(verdict, Relaxed);
-            page.taken.store(u32::from(offered), Release);
-        }
+        marks::take(&page.offered, &page.taken, || {
+            let takes = corrector.takes_table();
+            if takes {
+                let verdict = self.look(page, corrector);
+                page.verdict.store(verdict, Relaxed);
+            }
+            takes
+        });
         let stop = page.stop.load(Relaxed);
         let asked = stop != self.stop;
         self.stop = stop;
@@ -206,27 +209,27 @@ impl Taker {
         let state = bits
             .iter()
             .fold(0, |all, (on, bit)| if *on { all | bit } else { all });
-        page.begun.store(counters.ticks, Release);
-        page.state.store(state, Relaxed);
-        page.latency_ns.store((latency_s * 1e9) as u32, Relaxed);
         let raw = corrector.slides_m(input);
         let went = corrector.slides_m(&Input {
             command: output.command,
             ..*input
         });
-        for ((to, from), metres) in page
-            .raw_nm
-            .iter()
-            .zip(&page.corrected_nm)
-            .zip(raw.iter().zip(went))
-        {
-            to.store(nm(*metres.0), Relaxed);
-            from.store(nm(metres.1), Relaxed);
-        }
-        page.offset_cuts.store(counters.offset_cuts, Relaxed);
-        page.slew_cuts.store(counters.slew_cuts, Relaxed);
-        page.resets.store(counters.resets, Relaxed);
-        page.ended.store(counters.ticks, Release);
+        marks::write(&page.begun, &page.ended, counters.ticks, || {
+            page.state.store(state, Relaxed);
+            page.latency_ns.store((latency_s * 1e9) as u32, Relaxed);
+            for ((to, from), metres) in page
+                .raw_nm
+                .iter()
+                .zip(&page.corrected_nm)
+                .zip(raw.iter().zip(went))
+            {
+                to.store(nm(*metres.0), Relaxed);
+                from.store(nm(metres.1), Relaxed);
+            }
+            page.offset_cuts.store(counters.offset_cuts, Relaxed);
+            page.slew_cuts.store(counters.slew_cuts, Relaxed);
+            page.resets.store(counters.resets, Relaxed);
+        });
     }
 }
 

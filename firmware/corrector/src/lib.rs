@@ -17,6 +17,7 @@
 //! | `guard` | the bounds of offset and slew, the soft limits |
 //! | `corrector` | one tick |
 //! | `handover` | words shared with the program that serves the protocol |
+//! | `marks` | how they are written and read without waiting |
 //!
 //! Promises, each with its test in `tests`: never enabled, the output is the input bit for bit; the offset never jumps,
 //! whatever the planner, the operator or a new table does; nothing panics, allocates, locks or asks for the time.
@@ -33,6 +34,7 @@ mod guard;
 pub mod handover;
 mod history;
 mod law;
+pub mod marks;
 mod senses;
 mod settings;
 mod voice;

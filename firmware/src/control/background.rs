@@ -335,7 +335,7 @@ where
             next: 0,
             ahead,
             batches: 0,
-            hold_ticks: plan.hold_ticks().saturating_add(1),
+            hold_ticks: plan.longest_gap(),
             limits: plan.limits(),
         });
         self.shared.set_program(true);

@@ -162,6 +162,8 @@ impl Shared {
             word.store(nm, Relaxed);
         }
         self.position.store(KNOWN, Relaxed);
+        // The interrupt that sees the wish sees the place.
+        compiler_fence(Ordering::Release);
         self.asked.fetch_or(DECLARE, Relaxed);
     }
 

@@ -7,7 +7,8 @@ use super::shared::{CLEAR, DECLARE, Shared};
 use crate::engine::{Executor, Fault, Output, Stream, StreamState};
 use crate::server::TimedSetPoint;
 use core::ops::Deref;
-use core::sync::atomic::Ordering::Relaxed;
+use core::sync::atomic::Ordering::{Acquire, Relaxed};
+use core::sync::atomic::compiler_fence;
 use giotto_shared::wire::{MotionState, SetPoint};
 
 /// What the timer interrupt owns.
@@ -187,6 +188,7 @@ where
     #[inline(never)]
     fn asked(&mut self) {
         let asked = self.shared.asked.swap(0, Relaxed);
+        compiler_fence(Acquire);
         if asked & CLEAR != 0 {
             self.executor.clear_fault();
         }

@@ -32,6 +32,7 @@
 //! feed changes on an arc. At constant feed the set-points are those of κ2 and κ4 alone.
 pub mod bench;
 mod config;
+mod descent;
 mod engage;
 mod executor;
 mod guard;

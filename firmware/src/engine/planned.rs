@@ -1,4 +1,5 @@
 //! A segment in the form that the tick runs: integers only, everything that could fail already done.
+use super::descent::Slowing;
 use super::profile_terms::Extra;
 use super::ramp::Shapes;
 use giotto_shared::fixed::{mulh, mulh_add, mulh_sub};
@@ -163,12 +164,14 @@ pub(crate) fn turn(radial: i32, tangential: i32, c: i32, s: i32) -> (i32, i32) {
 }
 
 /// A segment ready to run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Planned {
     pub(crate) axes: [Axis; 3],
     /// The law in the rising ramp.
     pub(crate) rise: Law,
     pub(crate) timing: Timing,
+    /// What a stop of it may take.
+    pub(crate) slowing: Slowing,
     pub(crate) kind: Kind,
     /// A zone of the table applies.
     pub(crate) corrected: bool,
@@ -197,6 +200,7 @@ impl Planned {
         self.axes = [*x, *y, *z];
         self.rise = from.rise;
         self.timing = from.timing;
+        self.slowing = from.slowing;
         self.kind = from.kind;
         self.corrected = from.corrected;
         self.extended = from.extended;

@@ -7,18 +7,20 @@
 //! before, bit for bit, and so is corrected while the correction is disengaged.
 //!
 //! A set-point that is missing, late or further from the one before than the feed allows is replaced by carrying on
-//! at the last velocity and acceleration, for [`StreamPlan::hold_ticks`] at most ("hold"); a set-point that comes in that time is
-//! joined without a step. After that the path comes to rest along its last curvature, within acceleration and jerk, while
+//! at the last velocity and acceleration, for [`StreamPlan::hold_ticks`] at most ("hold"). Two set-points in a row that come in that
+//! time say where the path is and how fast: it is joined without a step of either, near the end of the coordinates only if there
+//! is room to stop on the way. After that the path comes to rest along its last curvature, within acceleration and jerk, while
 //! the correction is ramped out, and [`StreamState::Fault`] is latched. Nothing jumps at any time.
 mod brake;
+mod join;
 mod plan;
 
 use super::engage::Engage;
 use super::guard::Guard;
-use super::ramp::{Clock, POLYNOMIAL, clock_step, shapes};
 use super::{Counters, Output, flag};
 use brake::{Before, Brake};
 use core::sync::atomic::{Ordering, compiler_fence};
+use join::Join;
 
 pub(crate) use brake::farthest_nm;
 pub(super) use plan::StreamNeeds;
@@ -28,8 +30,8 @@ pub use plan::StreamPlan;
 pub const PLACES: usize = 32;
 /// Farthest coordinate that a brake may lead to, nm: with the largest offset of an image it is still a place.
 pub(crate) const FARTHEST_NM: i32 = 2_126_000_000;
-/// Ticks over which a set-point that comes after a gap is joined.
-const JOIN_TICKS: u32 = 32;
+/// Set-points in a row that are carried over after a gap, until they say how fast they go.
+pub(crate) const SEEN_TICKS: u32 = 2;
 
 /// One programmed set-point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,13 +89,13 @@ pub struct Stream<const N: usize = PLACES> {
     change: [i32; 3],
     state: StreamState,
     sequence: u16,
-    missing: u32,
+    /// Ticks that were carried on.
+    carried: u32,
     /// Ticks until everything is at rest.
     settling: u32,
-    /// Distance from what came to what is taken, after a gap, and how much of it is left.
-    bias_nm: [i32; 3],
-    joining: bool,
-    join: Clock,
+    /// After a gap: the set-point that came in the tick before, and the way to it.
+    came_nm: Option<[i32; 3]>,
+    join: Option<Join>,
     brake: Brake,
     engage: Engage,
     counters: StreamCounters,
@@ -133,11 +135,10 @@ impl<const N: usize> Stream<N> {
             change: [0; 3],
             state: StreamState::Ended,
             sequence: 0,
-            missing: 0,
+            carried: 0,
             settling: 0,
-            bias_nm: [0; 3],
-            joining: false,
-            join: Clock::default(),
+            came_nm: None,
+            join: None,
             brake: Brake::default(),
             guard: Guard::new(0, 0),
             engage: Engage::new(1, false),
@@ -168,8 +169,9 @@ impl<const N: usize> Stream<N> {
         self.guard = Guard::new(plan.offset_nm, plan.slew_nm);
         self.guard.watch(bypass);
         (self.place, self.regular, self.sequence) = (0, u32::from(sequence), sequence);
-        (self.velocity, self.change, self.bias_nm) = ([0; 3], [0; 3], [0; 3]);
-        (self.missing, self.settling, self.joining) = (0, 0, false);
+        (self.velocity, self.change) = ([0; 3], [0; 3]);
+        (self.carried, self.settling) = (0, 0);
+        (self.came_nm, self.join) = (None, None);
         self.state = StreamState::Running;
     }
 
@@ -257,7 +259,7 @@ impl<const N: usize> Stream<N> {
             self.look_back();
         }
         let [x, y, z] = self.irregular(sample);
-        let regular = self.state == StreamState::Running && !self.joining;
+        let regular = self.state == StreamState::Running && self.join.is_none();
         self.regular = if regular {
             u32::from(self.sequence)
         } else {
@@ -372,66 +374,83 @@ impl<const N: usize> Stream<N> {
             }
             None => None,
         };
-        let Some(position) = usable else {
-            self.counters.missing = self.counters.missing.wrapping_add(1);
-            self.missing = self.missing.wrapping_add(1);
-            self.state = StreamState::Holding;
-            if self.missing > self.plan.hold_ticks {
-                self.engage.set(false);
-                self.guard.watch(true);
-                self.begin_rest(StreamState::Stopping);
-                return self.brake();
-            }
-            return self.carry_on();
-        };
-        if self.state == StreamState::Holding {
-            let expected = self.carry_on();
-            for ((b, e), p) in self.bias_nm.iter_mut().zip(expected).zip(position) {
-                *b = e.wrapping_sub(p);
-            }
-            self.joining = true;
-            self.join = Clock::rising(clock_step(JOIN_TICKS));
-            (self.state, self.missing) = (StreamState::Running, 0);
-            return expected;
+        self.counters.missing = self
+            .counters
+            .missing
+            .wrapping_add(u32::from(usable.is_none()));
+        match usable {
+            Some(position) if self.state == StreamState::Running => self.joined(position),
+            _ => self.bridge(usable),
         }
-        self.joined(position)
     }
 
-    /// A set-point on the way from where the gap was bridged to what comes in.
-    fn joined(&mut self, position: [i32; 3]) -> [i32; 3] {
-        let (x, end) = self.join.rise();
-        self.joining = !end;
-        let left = if end {
-            0
-        } else {
-            i32::MAX - shapes(&POLYNOMIAL, x).s_q31
-        };
-        let mut taken = position;
-        for (t, b) in taken.iter_mut().zip(self.bias_nm) {
-            *t = t.wrapping_add((i64::from(b).wrapping_mul(i64::from(left)) >> 31) as i32);
+    /// A tick of a gap, or one in which set-points come again.
+    fn bridge(&mut self, usable: Option<[i32; 3]>) -> [i32; 3] {
+        self.state = StreamState::Holding;
+        self.join = None;
+        self.carried = self.carried.wrapping_add(1);
+        let before = core::mem::replace(&mut self.came_nm, usable);
+        let seen = if usable.is_some() { SEEN_TICKS } else { 0 };
+        if self.carried > self.plan.hold_ticks.wrapping_add(seen) {
+            return self.starve();
         }
-        let last = self.last_nm();
-        for ((v, t), last) in self.velocity.iter_mut().zip(taken).zip(last) {
-            *v = t.wrapping_sub(last);
+        let taken = self.carry_on();
+        if let (Some(before), Some(now)) = (before, usable) {
+            let (mut apart, mut rate) = ([0; 3], self.velocity);
+            for axis in 0..3 {
+                apart[axis] = taken[axis].wrapping_sub(now[axis]);
+                rate[axis] = rate[axis].wrapping_sub(now[axis].wrapping_sub(before[axis]));
+            }
+            self.join = Join::begin(apart, rate, self.plan.limits);
+            if self.join.is_some() {
+                (self.state, self.carried) = (StreamState::Running, 0);
+            }
         }
         taken
     }
 
-    /// Near enough to where the path was going: as far as the feed allows, each tick of the gap. While a gap is bridged or
-    /// joined the path is not quite where the set-points are: a tick more.
+    /// A set-point on the way from where the gap was bridged to what comes in.
+    fn joined(&mut self, position: [i32; 3]) -> [i32; 3] {
+        let last = self.last_nm();
+        if !brake::has_room(self.plan.limits, last, self.velocity, self.change) {
+            return self.starve();
+        }
+        let added = self.join.as_mut().and_then(Join::next_nm);
+        if added.is_none() {
+            self.join = None;
+        }
+        self.came_nm = self.join.as_ref().map(|_| position);
+        let mut taken = position;
+        for axis in 0..3 {
+            taken[axis] = taken[axis].wrapping_add(added.map_or(0, |added| added[axis]));
+            let velocity = taken[axis].wrapping_sub(last[axis]);
+            self.change[axis] = velocity.wrapping_sub(self.velocity[axis]);
+            self.velocity[axis] = velocity;
+        }
+        taken
+    }
+
+    /// Set-points stay away, or lead where no stop is within the coordinates.
+    fn starve(&mut self) -> [i32; 3] {
+        self.engage.set(false);
+        self.guard.watch(true);
+        self.begin_rest(StreamState::Stopping);
+        self.brake()
+    }
+
+    /// Near enough to the one before, or to where the path was going: as far as the feed allows, each tick of the gap. While a gap
+    /// is bridged the path is not quite where the set-points are: a tick more.
     fn plausible(&self, s: &StreamSample) -> bool {
-        let apart = self.missing > 0 || self.joining;
-        let ticks = if apart {
-            self.missing.saturating_add(2)
-        } else {
-            1
+        let (from, ticks) = match self.came_nm {
+            Some(came) => (came, 1),
+            None if self.carried > 0 => (self.last_nm(), self.carried.saturating_add(2)),
+            None => (self.last_nm(), 1),
         };
         let most = self.plan.step_nm.saturating_mul(ticks);
-        let last = self.last_nm();
         s.position_nm
             .iter()
-            .zip(last)
-            .all(|(p, last)| p.wrapping_sub(last).unsigned_abs() <= most)
+            .zip(from)
+            .all(|(p, from)| p.wrapping_sub(from).unsigned_abs() <= most)
     }
 
     fn carry_on(&mut self) -> [i32; 3] {

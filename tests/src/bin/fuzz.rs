@@ -33,10 +33,11 @@ struct Args {
 /// Executions that a thread takes at once.
 const BLOCK: u64 = 256;
 
-/// The first execution in which a defect shows, if there is one.
-fn first_defect(target: &Target, args: &Args, threads: usize) -> Option<u64> {
+/// The first execution in which a defect shows, if there is one, and what was counted.
+fn first_defect(target: &Target, args: &Args, threads: usize) -> (Option<u64>, u64) {
     let noise = Noise::new(target);
     let (next, first) = (AtomicU64::new(0), AtomicU64::new(u64::MAX));
+    let counted = AtomicU64::new(0);
     // Blocks are taken in order, and each is run until a defect before it is known.
     let work = || loop {
         let begin = next.fetch_add(BLOCK, Relaxed);
@@ -45,9 +46,10 @@ fn first_defect(target: &Target, args: &Args, threads: usize) -> Option<u64> {
                 break;
             }
             let bytes = noise.bytes(args.seed.wrapping_add(execution));
-            if catch_unwind(|| (target.run)(&bytes)).is_err() {
-                first.fetch_min(execution, Relaxed);
-            }
+            match catch_unwind(|| (target.run)(&bytes)) {
+                Ok(count) => counted.fetch_add(count, Relaxed),
+                Err(_) => first.fetch_min(execution, Relaxed),
+            };
         }
         if begin >= args.executions.min(first.load(Relaxed)) {
             return;
@@ -60,7 +62,7 @@ fn first_defect(target: &Target, args: &Args, threads: usize) -> Option<u64> {
         work();
     });
     let first = first.into_inner();
-    (first != u64::MAX).then_some(first)
+    ((first != u64::MAX).then_some(first), counted.into_inner())
 }
 
 fn main() -> ExitCode {
@@ -76,7 +78,9 @@ fn main() -> ExitCode {
     for target in targets {
         if let Some(path) = &args.replay {
             match std::fs::read(path) {
-                Ok(bytes) => (target.run)(&bytes),
+                Ok(bytes) => {
+                    (target.run)(&bytes);
+                }
                 Err(error) => {
                     eprintln!("error: {}: {error}", path.display());
                     return ExitCode::from(3);
@@ -85,7 +89,8 @@ fn main() -> ExitCode {
             continue;
         }
         let started = Instant::now();
-        if let Some(execution) = first_defect(target, &args, threads) {
+        let (defect, counted) = first_defect(target, &args, threads);
+        if let Some(execution) = defect {
             let seed = args.seed.wrapping_add(execution);
             eprintln!(
                 "target {}, seed {seed}: bytes {:02x?}",
@@ -95,8 +100,12 @@ fn main() -> ExitCode {
             return ExitCode::from(5);
         }
         let seconds = started.elapsed().as_secs_f64();
+        let of = match counted {
+            0 => String::new(),
+            _ => format!(" of {counted} requests and ticks"),
+        };
         println!(
-            "{}: {} executions from seed {}, no defect ({seconds:.1} s, {threads} threads)",
+            "{}: {} executions{of} from seed {}, no defect ({seconds:.1} s, {threads} threads)",
             target.name, args.executions, args.seed
         );
     }

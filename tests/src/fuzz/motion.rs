@@ -254,8 +254,8 @@ impl Drive {
     }
 }
 
-/// Drives it; how many set-points it made.
-fn drive(bytes: &[u8]) -> u64 {
+/// Drives it and looks; how many requests and ticks that were.
+pub fn drive(bytes: &[u8]) -> u64 {
     let mut script = Script(bytes);
     let mut talk = Talk::new(false);
     talk.bench.watched = true;
@@ -293,17 +293,12 @@ fn drive(bytes: &[u8]) -> u64 {
     }
     // Whatever is left runs out without its host.
     drive.talk.bench.ticks(1600, false);
-    drive.talk.bench.watch().seen
+    drive.talk.bench.watch().counted
 }
 
 /// Drives it and looks.
 pub fn run(bytes: &[u8]) {
     drive(bytes);
-}
-
-/// Set-points that an execution makes.
-pub fn ticks(bytes: &[u8]) -> u64 {
-    drive(bytes)
 }
 
 /// A circle that is stopped, and one without its host; a program; a stream that starves, is cleared and goes on; one at the end of

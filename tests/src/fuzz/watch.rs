@@ -36,13 +36,14 @@ pub struct Watch {
     /// Ticks since the host was heard, and since it asked for a stop.
     silent: u32,
     stopped: Option<u32>,
-    /// Set-points looked at.
-    pub seen: u64,
+    /// Requests and ticks so far.
+    pub counted: u64,
 }
 
 impl Watch {
     /// A request was sent.
     pub fn heard(&mut self) {
+        self.counted += 1;
         self.silent = 0;
     }
 
@@ -66,7 +67,7 @@ impl Watch {
 
     /// The next set-point.
     pub fn look(&mut self, output: &Output) {
-        self.seen += 1;
+        self.counted += 1;
         let Some(last) = self.last.replace(*output) else {
             return;
         };

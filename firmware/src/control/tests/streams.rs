@@ -474,3 +474,51 @@ fn room_to_stop_counts_what_speed_and_curvature_add() {
         }
     }
 }
+
+/// A gap near the end of the coordinates, the path faster when it comes back than when it went: joined or braked, it never leaves them
+/// nor is it held there.
+#[test]
+fn a_gap_near_the_end_of_the_coordinates_leaves_room_to_stop() {
+    for ahead_mm in (100..500).step_by(20) {
+        let start = [2_100_000_000 - ahead_mm * 1_000_000, 0, 0];
+        let mut bench = bench();
+        bench.desk.declare(start).unwrap();
+        bench.ticks(1);
+        bench.path.clear();
+        bench.desk.begin_stream(1.0, 20).unwrap();
+        // It sets off with 4 m/s² behind the last set-point that comes, is braked to rest and stays.
+        let place = |n: usize| {
+            let t = n.saturating_sub(100) as f64 * 1e-3;
+            let (up, down) = (t.min(0.2), (t - 0.2).clamp(0.0, 0.2));
+            let way = 2.0 * up * up + down * (0.8 - 2.0 * down);
+            [start[0] + (way * 1e9).round() as i32, 0, 0]
+        };
+        let (mut steps, mut sent) = (Steps::from(start), 0);
+        let mut send = |bench: &mut Bench, up_to: usize| {
+            while sent < up_to {
+                let (before, mut chunk) = (steps, Chunk::new());
+                assert!(steps.write(place(sent), &mut chunk));
+                match bench.desk.points(&chunk) {
+                    Ok(()) => sent += 1,
+                    Err(MotionRefusal::QueueFull) => {
+                        steps = before;
+                        return;
+                    }
+                    Err(_) => sent = usize::MAX,
+                }
+            }
+        };
+        // Until the last one before it sets off has been taken, and four ticks of nothing.
+        while bench.now().missing_set_points < 4 {
+            send(&mut bench, 101);
+            bench.ticks(1);
+        }
+        for _ in 0..1000 {
+            send(&mut bench, 1000);
+            bench.ticks(1);
+        }
+        bench.until_at_rest();
+        assert!(roughest(&bench) < 5.15, "{ahead_mm}: {}", roughest(&bench));
+        assert!(bench.path.iter().all(|place| place[0] < 2_126_000_000));
+    }
+}

@@ -4,7 +4,7 @@
 use super::phase::{ramp_phase, scaled};
 use super::{Executor, Mode};
 use crate::engine::planned::turn;
-use crate::engine::ramp::shapes;
+use crate::engine::ramp::{Shapes, shapes};
 use crate::engine::{Output, flag};
 use core::sync::atomic::{Ordering, compiler_fence};
 use giotto_shared::angle::sincos_with;
@@ -53,13 +53,41 @@ impl Executor {
             &self.segment.rise
         };
         let phase_q32 = ramp_phase(self.phase, step, law.end_term(&shape));
-        let (radial, tangential) = law.gain(&shape);
+        self.arc_shaped::<TERMS>(&shape, FALLING, phase_q32)
+    }
+
+    /// A stop: as a ramp, at the rate of its own.
+    #[inline(always)]
+    pub(super) fn arc_stop<const TERMS: bool>(&mut self) -> Output {
+        if self.stopped() {
+            return self.arc_standstill();
+        }
+        let (step, shape) = self.stop_tick();
+        self.phase = self.phase.wrapping_add(step);
+        compiler_fence(Ordering::AcqRel);
+        self.arc_shaped::<TERMS>(&shape, self.falls, (self.phase >> 32) as u32)
+    }
+
+    /// At a phase and with the shapes of a ramp.
+    #[inline(always)]
+    fn arc_shaped<const TERMS: bool>(
+        &mut self,
+        shape: &Shapes,
+        falls: bool,
+        phase_q32: u32,
+    ) -> Output {
+        let law = if falls {
+            &self.fall
+        } else {
+            &self.segment.rise
+        };
+        let (radial, tangential) = law.gain(shape);
         let (c, s) = sincos_with(self.sincos, phase_q32);
         let (re, im) = turn(radial, tangential, c, s);
         let [x, y, z] = &self.segment.axes;
         let mut wanted = [x.turned(re, im), y.turned(re, im), z.turned(re, im)];
         if TERMS {
-            let turning = if FALLING {
+            let turning = if falls {
                 shape.w4_q31.wrapping_neg()
             } else {
                 shape.w4_q31
@@ -118,7 +146,7 @@ impl Executor {
     /// The last tick: at its end exactly.
     #[inline(never)]
     fn arc_standstill(&mut self) -> Output {
-        let terms = self.mode == Mode::TermFall;
+        let terms = matches!(self.mode, Mode::TermFall | Mode::TermStop);
         self.mode = Mode::Rest;
         // A stop and a feed hold end elsewhere than was planned.
         let planned = self.end == self.segment.timing.end && self.pausing.is_none();

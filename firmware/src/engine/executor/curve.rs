@@ -1,6 +1,6 @@
-//! Ticks of any curve: lines, helices, and a stop in a rising ramp of anything.
+//! Ticks of any curve: lines and helices.
+use super::Executor;
 use super::phase::{ramp_phase, scaled};
-use super::{Executor, Mode};
 use crate::engine::planned::{Kind, turn};
 use crate::engine::ramp::{Shapes, shapes};
 use crate::engine::{Output, flag};
@@ -71,20 +71,13 @@ impl Executor {
     }
 
     #[inline(never)]
-    pub(super) fn both(&mut self) -> Output {
-        let (x, end) = self.clock.rise();
-        let (later, _) = self.second.rise();
-        if end {
-            // The rising ramp is over: what remains is the falling one alone.
-            self.clock = self.second.mirrored();
-            self.mode = Mode::Fall;
-            let shape = shapes(&self.ramp, self.clock.here());
-            return self.ramp_at(&shape, true);
+    pub(super) fn any_stop(&mut self) -> Output {
+        if self.stopped() {
+            return self.standstill();
         }
-        self.ramp_at(
-            &shapes(&self.ramp, x).minus(shapes(&self.ramp, later)),
-            false,
-        )
+        let (step, shape) = self.stop_tick();
+        self.advance(step);
+        self.shaped(&shape, self.falls, (self.phase >> 32) as u32)
     }
 
     /// One tick of a ramp on any curve.
@@ -98,6 +91,17 @@ impl Executor {
             &self.segment.rise
         };
         let phase_q32 = ramp_phase(self.phase, step, law.end_term(shape));
+        self.shaped(shape, falling, phase_q32)
+    }
+
+    /// At a phase and with the shapes of a ramp.
+    #[inline(always)]
+    fn shaped(&mut self, shape: &Shapes, falling: bool, phase_q32: u32) -> Output {
+        let law = if falling {
+            &self.fall
+        } else {
+            &self.segment.rise
+        };
         let (c, s, mut wanted);
         if self.segment.kind == Kind::Line {
             let along = law.along(shape);

@@ -22,14 +22,16 @@
 //!
 //! A segment is begun in three ticks: taken, its sides, the offset that it starts with. In one they took 2441.
 //!
-//! Lines, helices and stops in a ramp run in `curve`, what is between motions in `transitions`; between two ticks of 8 kHz at
+//! Lines and helices run in `curve`, stops begin in `stop`, what is between motions is in `transitions`; between two ticks of 8 kHz at
 //! 25 MHz are 3125.
 mod arc;
 mod curve;
 mod pause;
 mod phase;
+mod stop;
 mod transitions;
 
+use crate::engine::descent::Descent;
 use crate::engine::engage::Engage;
 use crate::engine::guard::Guard;
 use crate::engine::hysteresis::Sides;
@@ -86,9 +88,12 @@ enum Mode {
     Rise,
     /// Any segment in a falling ramp.
     Fall,
-    /// Stopped while rising: the rising ramp runs on, a falling one is laid over it. Each has four continuous
-    /// derivatives, so their sum has; it never runs backwards because the second is never ahead of the first.
-    Both,
+    /// An arc without profile terms, stopped.
+    ArcStop,
+    /// The same with profile terms.
+    TermStop,
+    /// Any segment, stopped.
+    Stop,
 }
 
 /// The engine's fast half: what runs in the timer interrupt.
@@ -111,7 +116,9 @@ pub struct Executor {
     end: u64,
     /// Whole turns, for the rise of a helix.
     turns: i32,
-    second: Clock,
+    /// A stop: its way to rest, and whether it began in a falling ramp.
+    descent: Descent,
+    falls: bool,
     /// Programmed position where it stands or last stood.
     rest_nm: [i32; 3],
     /// Offset wanted there, before engagement, and what the next segment wants there.
@@ -152,7 +159,8 @@ impl Executor {
             counters: Counters::default(),
             end: 0,
             turns: 0,
-            second: Clock::default(),
+            descent: Descent::default(),
+            falls: false,
             rest_nm: position_nm,
             rest_offset_nm: [0; 3],
             target_nm: [0; 3],
@@ -260,36 +268,6 @@ impl Executor {
         self.idle()
     }
 
-    /// Stops within the limits, beginning with the next tick; what is queued is thrown away.
-    pub fn stop(&mut self) {
-        if self.stopping() {
-            return;
-        }
-        self.halting = true;
-        (self.held, self.pausing) = (false, None);
-        self.epoch = self.epoch.wrapping_add(1);
-        self.counters.stops = self.counters.stops.wrapping_add(1);
-        let timing = &self.segment.timing;
-        match self.mode {
-            Mode::ArcCruise | Mode::TermCruise | Mode::Cruise => {
-                let distance = (timing.step >> 1).wrapping_mul(u64::from(timing.ramp_ticks));
-                self.end = self.phase.wrapping_add(distance);
-                self.begin_fall();
-            }
-            Mode::ArcRise | Mode::TermRise | Mode::Rise => {
-                // ∫ of the two ramps together: one step for each tick between their starts.
-                let apart = self.clock.elapsed();
-                self.end = self
-                    .from
-                    .wrapping_add(timing.step.wrapping_mul(u64::from(apart)));
-                self.second = Clock::rising(timing.clock_step);
-                self.mode = if apart == 0 { Mode::Rest } else { Mode::Both };
-            }
-            // At the end of a settling or dwelling in hand the segment is seen to be of an old epoch.
-            _ => {}
-        }
-    }
-
     /// Makes all but so many of the constant-rate ticks in hand in one step: the same integers, one product.
     #[cfg(test)]
     pub(crate) fn skip_cruise(&mut self, but: u32) -> u32 {
@@ -323,7 +301,9 @@ impl Executor {
             Mode::Cruise => self.cruise(),
             Mode::Rise => self.any_ramp(false),
             Mode::Fall => self.any_ramp(true),
-            Mode::Both => self.both(),
+            Mode::ArcStop => self.arc_stop::<false>(),
+            Mode::TermStop => self.arc_stop::<true>(),
+            Mode::Stop => self.any_stop(),
             Mode::Taken => self.begin_sides(),
             Mode::Sided => self.begin_settle(),
             Mode::Settle => self.settle(),

@@ -1,11 +1,14 @@
 //! What circles, arcs and helices have in common: the law on them, and ramps long enough for it.
+use super::demand::Bounds;
 use super::demand::Demand;
 use super::law::ArcLaw;
 use super::numbers::{arm, length, seen_from, to_m};
 use super::timing::{Motion, end_term};
 use super::worst::{self, Worst};
 use super::{Planner, Refused, terms};
+use crate::engine::descent::Slowing;
 use crate::engine::planned::{Axis, Kind, Planned, Timing};
+use crate::engine::ramp::FIRST;
 use crate::engine::zones::{Asked, Built};
 use core::f32::consts::TAU;
 use giotto_shared::fixed::single_to_fixed;
@@ -13,6 +16,8 @@ use giotto_shared::path::{MAX_POSITION_M, Quantity};
 
 /// Most share of the radius by which the fixed-point law can move a circle.
 pub(super) const MAX_GAIN: f32 = 0.12;
+/// Stops that are tried out, each slower than the one before.
+const STOP_TRIES: u8 = 12;
 /// A ramp without end, s: what is left of the law is that of constant rate.
 const ENDLESS_S: f32 = 1e6;
 
@@ -124,6 +129,9 @@ impl Planner {
         self.blank(segment);
         lay(segment, round);
         segment.timing = timing;
+        let bounds_kept = curable.then_some(&bounds);
+        let stop = (law.as_ref(), limit_m_s2, bounds_kept);
+        segment.slowing = self.slowing(round, zone, &motion, stop);
         if let (Some(zone), Some(law)) = (zone, law) {
             self.bound(segment, &bounds);
             segment.rise = law.rounded();
@@ -131,6 +139,39 @@ impl Planner {
         }
         segment.rise.end_term_q1 = end_term(&timing);
         Ok(())
+    }
+
+    /// What a stop may take, so that centripetal acceleration, braking and what the correction makes of both keep to the limit, and
+    /// offset and slew to their bounds.
+    fn slowing(
+        &self,
+        round: &Round,
+        zone: Option<&Built>,
+        motion: &Motion,
+        (law, limit_m_s2, bounds): (Option<&ArcLaw>, f32, Option<&Bounds>),
+    ) -> Slowing {
+        let (most, jerk) = (self.machine.acceleration_m_s2, self.machine.jerk_m_s3);
+        let speed = motion.rate * round.radius_m * round.steep;
+        let least = self.machine.least_braking(speed, motion.ramp_s);
+        let mut braking = most;
+        for _ in 0..STOP_TRIES {
+            let slower = |of: f32| (of / braking).min(libm::sqrtf(4.0 * of / jerk));
+            let as_ramp = Motion {
+                ramp_s: FIRST * slower(speed),
+                ..*motion
+            };
+            let worst = worst::on_stop(law, motion, [braking / speed, jerk / speed]);
+            let demand = demand(round, zone, &as_ramp, &worst);
+            let correction = bounds.map_or(0.0, |bounds| demand.correction(bounds));
+            // Nothing between the places of this sweep is more.
+            let over = (demand.acceleration_m_s2 / (0.998 * limit_m_s2)).max(correction);
+            if over <= 1.0 || braking <= least {
+                break;
+            }
+            // Of an acceleration that is mostly across, what is along has to give way by more.
+            braking = (braking * (1.0 - 2.0 * (over - 1.0)).clamp(0.5, 0.98)).max(least);
+        }
+        self.machine.slowing(speed, braking)
     }
 
     /// Every point of a circle is one that the engine can hold.

@@ -41,7 +41,7 @@ impl Planner {
         });
         let bounds = self.bounds(zone.is_some());
         let mut stretch = 1.0;
-        let (timing, law) = loop {
+        let (timing, law, speed) = loop {
             let (ramp_ticks, cruise_ticks) = self.profile(whole, feed, stretch)?;
             let timing = Way::LINE
                 .share_out(ramp_ticks, cruise_ticks)
@@ -60,7 +60,7 @@ impl Planner {
                 .max(demand.acceleration(self.machine.acceleration_m_s2));
             match longer(stretch, over) {
                 Some(longer) => stretch = longer,
-                None => break (timing, law),
+                None => break (timing, law, speed),
             }
         };
         self.blank(segment);
@@ -82,6 +82,7 @@ impl Planner {
             }
         }
         segment.timing = timing;
+        segment.slowing = self.machine.slowing(speed, self.machine.acceleration_m_s2);
         segment.rise.end_term_q1 = end_term(&timing);
         segment.end_nm = to;
         self.position_nm = to;

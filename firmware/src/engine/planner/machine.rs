@@ -1,5 +1,6 @@
 //! The configuration in the form that planning needs: single precision, worked out once.
 use crate::engine::config::{Config, ticks, whole_above};
+use crate::engine::descent::Slowing;
 use giotto_shared::fixed::single_to_fixed;
 use giotto_shared::path::STEEPEST;
 
@@ -56,6 +57,27 @@ impl Machine {
         let [by_acceleration, by_jerk] = self.ramp;
         let duration_s = (feed_m_s * by_acceleration).max(libm::sqrtf(feed_m_s * by_jerk));
         ticks(duration_s * stretch * self.rate_hz)
+    }
+
+    /// What a stop may take from a speed, in the units of the tick.
+    pub(super) fn slowing(&self, speed_m_s: f32, braking_m_s2: f32) -> Slowing {
+        let per_tick = self.tick_s / speed_m_s;
+        Slowing {
+            braking: braking_m_s2 * per_tick,
+            jerk: self.jerk_m_s3 * per_tick * self.tick_s,
+        }
+    }
+
+    /// Least braking (m/s²) with which a stop is no longer than a ramp of so many seconds: below it a stop would lead beyond the end of
+    /// its segment.
+    pub(super) fn least_braking(&self, speed_m_s: f32, ramp_s: f32) -> f32 {
+        let edge_s = self.acceleration_m_s2 / self.jerk_m_s3;
+        let left_s = 0.9 * ramp_s - edge_s;
+        if left_s > 0.0 {
+            (speed_m_s / left_s).min(self.acceleration_m_s2)
+        } else {
+            self.acceleration_m_s2
+        }
     }
 
     /// Bounds on an offset (nm) and on its change (nm per tick).

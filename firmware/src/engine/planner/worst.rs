@@ -40,6 +40,38 @@ pub(super) fn on_arc(law: Option<&ArcLaw>, motion: &Motion) -> Worst {
     worst
 }
 
+/// On an arc, in a stop from constant rate: braking (1/s) and jerk (1/s²) as shares of that rate.
+pub(super) fn on_stop(law: Option<&ArcLaw>, motion: &Motion, [braking, jerk]: [f32; 2]) -> Worst {
+    let edge_s = (braking / jerk).min(libm::sqrtf(1.0 / jerk));
+    let (braking, all_s) = (jerk * edge_s, 1.0 / (jerk * edge_s) + edge_s);
+    let h = all_s / f32::from(STEPS);
+    let at = |place: u16| {
+        let t = f32::from(place.min(STEPS)) * h;
+        let (early, late) = (t.min(edge_s), all_s - t);
+        let share = if t < edge_s {
+            1.0 - 0.5 * jerk * early * early
+        } else if late > edge_s {
+            1.0 - braking * (t - 0.5 * edge_s)
+        } else {
+            0.5 * jerk * late * late
+        };
+        let shape = Shape {
+            s: share,
+            ..Shape::default()
+        };
+        let change = jerk * early.min(late);
+        Place {
+            acceleration: -motion.rate * change,
+            ..Place::at(law, motion, &shape, 1.0)
+        }
+    };
+    let mut worst = Worst::default();
+    for place in 0..STEPS {
+        worst.add(&at(place.saturating_sub(1)), &at(place), &at(place + 1), h);
+    }
+    worst
+}
+
 /// Gain less one, and how the angle moves.
 #[derive(Clone, Copy, Default)]
 struct Place {

@@ -4,6 +4,7 @@
 //! The speed falls in three pieces: the acceleration turns to that of braking at the limit of jerk, stays there, and returns
 //! to none so that it reaches it with the speed. Numbers are single precision, per tick: increments of a path, never places.
 
+use super::FARTHEST_NM;
 use core::f32::consts::PI;
 
 /// Velocity below which there is nothing to brake, nm per tick.
@@ -58,8 +59,9 @@ pub(super) struct Brake {
     /// Direction of travel, and the one that it turns to.
     along: [f32; 3],
     across: [f32; 3],
-    /// rad per nm.
+    /// rad per nm, and the acceleration across that it may come to.
     curvature: f32,
+    sharpest: f32,
     /// Way of the last tick, nm.
     way: f32,
     /// What is below a nanometre.
@@ -69,6 +71,10 @@ pub(super) struct Brake {
 fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     let ([ax, ay, az], [bx, by, bz]) = (a, b);
     ax * bx + ay * by + az * bz
+}
+
+pub(super) fn size(v: [f32; 3]) -> f32 {
+    libm::sqrtf(dot(v, v))
 }
 
 fn combined(a: [f32; 3], p: f32, b: [f32; 3], q: f32) -> [f32; 3] {
@@ -85,18 +91,38 @@ fn between(from: [i32; 3], to: [i32; 3]) -> [f32; 3] {
     ]
 }
 
-/// Curvature, and the direction it turns to, of places a step apart; `None`: straight, or as good as.
-fn bend(now: [i32; 3], before: [i32; 3], first: [i32; 3], step: f32) -> Option<(f32, [f32; 3])> {
+/// Curvature (1/nm) in the direction it turns to, of places a step apart; `None`: straight, or as good as.
+fn bend(now: [i32; 3], before: [i32; 3], first: [i32; 3], step: f32) -> Option<[f32; 3]> {
     let (late, early) = (between(before, now), between(first, before));
     let velocity = combined(late, 0.5 / step, early, 0.5 / step);
     let change = combined(late, 1.0 / (step * step), early, -1.0 / (step * step));
     let square = dot(velocity, velocity);
-    if square < SLOWEST_CURVED * SLOWEST_CURVED {
-        return None;
-    }
     let across = combined(change, 1.0, velocity, -dot(change, velocity) / square);
-    let size = libm::sqrtf(dot(across, across));
-    (size > 0.0).then(|| (size / square, combined(across, 1.0 / size, across, 0.0)))
+    let curved = square >= SLOWEST_CURVED * SLOWEST_CURVED;
+    curved.then(|| combined(across, 1.0 / square, across, 0.0))
+}
+
+/// How an acceleration is shared between a turn and the speed.
+struct Turn {
+    /// Largest centripetal acceleration: that of the curvature, until it and the growth of the speed come to the limit together.
+    sharpest: f32,
+    /// The same at the largest speed, and what it leaves for braking.
+    at_top: f32,
+    braking: f32,
+}
+
+impl Turn {
+    /// From the centripetal acceleration and the growth of the speed at its start, until the speed is `gain` times as large.
+    fn at(limit: f32, growth: f32, centripetal: f32, gain: f32) -> Self {
+        let left = |taken: f32| libm::sqrtf((limit * limit - taken * taken).max(0.0));
+        let sharpest = left(growth).max(centripetal);
+        let at_top = (centripetal * gain * gain).min(sharpest);
+        Self {
+            sharpest,
+            at_top,
+            braking: left(at_top).max(LEAST_SHARE * limit),
+        }
+    }
 }
 
 impl Brake {
@@ -105,7 +131,7 @@ impl Brake {
     pub(super) fn begin(before: &Before, limits: Limits) -> Self {
         let [now, one, two, four, eight] = before.place_nm;
         let (velocity, earlier) = (between(one, now), between(two, one));
-        let speed = libm::sqrtf(dot(velocity, velocity));
+        let speed = size(velocity);
         if speed < SLOWEST {
             return Self::default();
         }
@@ -116,20 +142,25 @@ impl Brake {
             way: speed,
             ..Self::default()
         };
-        let mut centripetal = 0.0;
-        if let Some((curvature, across)) = bend(now, four, eight, 4.0) {
-            // Square to where it goes now, a few ticks later.
-            let across = combined(across, 1.0, along, -dot(across, along));
-            let size = libm::sqrtf(dot(across, across));
-            if size > 0.5 {
-                brake.across = combined(across, 1.0 / size, across, 0.0);
-                brake.curvature = curvature.min(limits.acceleration / (speed * speed));
-                centripetal = brake.curvature * speed * speed;
-            }
+        let square_to = |v: [f32; 3]| combined(v, 1.0, along, -dot(v, along));
+        // What the last ticks turned by is right but coarse; what some more of them did is fine, if it is the same still: a path
+        // that gains speed out of a turn had a sharper one.
+        let last = square_to(combined(velocity, 1.0, earlier, -1.0));
+        let across = bend(now, four, eight, 4.0)
+            .map(|bend| square_to(combined(bend, speed * speed, bend, 0.0)))
+            .filter(|across| size(combined(*across, 1.0, last, -1.0)) < 2.0 * limits.jerk)
+            .unwrap_or(last);
+        let turning = size(across);
+        let centripetal = turning.min(limits.acceleration);
+        if centripetal > 0.0 && speed > SLOWEST_CURVED {
+            brake.across = combined(across, 1.0 / turning, across, 0.0);
+            brake.curvature = centripetal / (speed * speed);
         }
-        let left = limits.acceleration * limits.acceleration - centripetal * centripetal;
-        let most = libm::sqrtf(left.max(0.0)).max(LEAST_SHARE * limits.acceleration);
-        brake.shape(speed, acceleration, most, limits.jerk);
+        let growth = acceleration.max(0.0);
+        let top = speed + 0.5 * growth * growth / limits.jerk;
+        let turn = Turn::at(limits.acceleration, growth, centripetal, top / speed);
+        brake.sharpest = turn.sharpest;
+        brake.shape(speed, acceleration, turn.braking, limits.jerk);
         brake
     }
 
@@ -180,7 +211,9 @@ impl Brake {
     pub(super) fn step(&mut self) -> [i32; 3] {
         self.tick += 1.0;
         let way = self.speed_at(self.tick).max(0.0);
-        let angle = 0.5 * self.curvature * (way + self.way);
+        let mean = 0.5 * (way + self.way);
+        // At rest the second is no number, which is not the less.
+        let angle = (self.curvature * mean).min(self.sharpest / mean);
         self.way = way;
         // Some hundredths of a turn at most: what these leave out is below a nanometre.
         let (c, s) = (
@@ -201,6 +234,33 @@ impl Brake {
     }
 }
 
+/// Whether a path that is led from a place at a velocity (nm per tick), which changes (nm per tick²), can stop within the
+/// coordinates, wherever it goes and one tick later. Mostly one comparison: few are so near their end.
+pub(super) fn has_room(
+    limits: Limits,
+    place: [i32; 3],
+    velocity: [i32; 3],
+    change: [i32; 3],
+) -> bool {
+    /// Farther from the end of the coordinates than any brake is long.
+    const FAR_NM: u32 = FARTHEST_NM as u32 / 2;
+    let most = place.iter().fold(0, |most, nm| nm.unsigned_abs().max(most));
+    if most < FAR_NM {
+        return true;
+    }
+    let Limits {
+        acceleration, jerk, ..
+    } = limits;
+    // At most: as `farthest_nm`, straight outward and with what is left if all of the change is across.
+    let speed = size(velocity.map(|nm| nm as f32));
+    let growth = size(change.map(|nm| nm as f32)).min(acceleration);
+    let top = speed + growth * (1.0 + 0.5 * growth / jerk);
+    let growing = growth / jerk * top;
+    let left = Turn::at(acceleration, growth, growth, top / speed.max(1.0)).braking;
+    let braked = 0.5 * top * (top / left + acceleration / jerk);
+    most as f32 + 2.0 * top + growing + braked < FARTHEST_NM as f32
+}
+
 /// Farthest that a brake leads outward, nm, from a velocity and its change; `outward` is a unit vector. All per tick.
 ///
 /// At most: an acceleration is taken back at the limit of jerk, while the speed still grows; then the path goes on along the
@@ -211,7 +271,7 @@ pub(crate) fn farthest_nm(
     change: [f32; 3],
     outward: [f32; 3],
 ) -> f32 {
-    let speed = libm::sqrtf(dot(velocity, velocity));
+    let speed = size(velocity);
     if speed < SLOWEST {
         return 0.0;
     }
@@ -222,12 +282,11 @@ pub(crate) fn farthest_nm(
     let growth = growth.max(0.0).min(acceleration);
     let bend = libm::sqrtf(dot(across, across));
     let centripetal = bend.min(acceleration);
-    let left = acceleration * acceleration - centripetal * centripetal;
-    let most = libm::sqrtf(left.max(0.0)).max(LEAST_SHARE * acceleration);
     let top = speed + 0.5 * growth * growth / jerk;
+    let turn = Turn::at(acceleration, growth, centripetal, top / speed);
+    let most = turn.braking;
     let growing = growth / jerk * (speed + growth * growth / (3.0 * jerk));
     let length = growing + 0.5 * top * (top / most + most / jerk);
-    let curvature = centripetal / (speed * speed);
     // Outward share of where it goes and of where it turns to.
     let u = dot(along, outward);
     let n = if bend > 0.0 {
@@ -235,6 +294,14 @@ pub(crate) fn farthest_nm(
     } else {
         0.0
     };
+    // As sharp as it begins, or as little as where it is fastest.
+    let [sharp, slight] = [centripetal / (speed * speed), turn.at_top / (top * top)];
+    reach(sharp, length, u, n).max(reach(slight, length, u, n))
+}
+
+/// Farthest outward on an arc of a curvature and a length, which begins with the outward shares u of its direction and n of where it
+/// turns to.
+fn reach(curvature: f32, length: f32, u: f32, n: f32) -> f32 {
     let angle = curvature * length;
     if angle < 1e-3 {
         return length * (u + 0.5 * n * angle).max(0.0);

@@ -126,25 +126,27 @@ fn every_stop_keeps_the_limits_and_the_distance() {
     }
 }
 
+/// Largest acceleration, m/s², and jerk, m/s³.
+fn largest(places: &[[f64; 3]]) -> [f64; 2] {
+    let rates = |places: &[[f64; 3]]| -> Vec<_> {
+        let rate = |w: &[[f64; 3]]| difference(w[1], w[0]).map(|d| d / DT);
+        places.windows(2).map(rate).collect()
+    };
+    let acceleration = rates(&rates(places));
+    let most = |v: &[[f64; 3]]| v.iter().copied().map(size).fold(0.0, f64::max);
+    [most(&acceleration), most(&rates(&acceleration))]
+}
+
 fn within_limits(places: &[[f64; 3]], curved: bool, what: &str) {
-    let velocity: Vec<_> = places
-        .windows(2)
-        .map(|w| difference(w[1], w[0]).map(|d| d / DT))
-        .collect();
-    let acceleration: Vec<_> = velocity
-        .windows(2)
-        .map(|w| difference(w[1], w[0]).map(|d| d / DT))
-        .collect();
-    let jerk = acceleration
-        .windows(2)
-        .map(|w| size(difference(w[1], w[0])) / DT);
+    let [acceleration, jerk] = largest(places);
     // Rounding to nanometres: 4 nm of a second difference, 8 of a third.
-    let most = acceleration.iter().copied().map(size).fold(0.0, f64::max);
-    assert!(most < ACCELERATION + 0.01, "{what}: {most} m/s²");
-    let most = jerk.fold(0.0, f64::max);
+    assert!(
+        acceleration < ACCELERATION + 0.01,
+        "{what}: {acceleration} m/s²"
+    );
     // That of the curvature comes on top.
     let bar = if curved { 1.25 } else { 1.02 };
-    assert!(most < JERK * bar + 10.0, "{what}: {most} m/s³");
+    assert!(jerk < JERK * bar + 10.0, "{what}: {jerk} m/s³");
 }
 
 /// On the circle until it stands, to a few micrometres.
@@ -169,6 +171,28 @@ fn a_stop_follows_the_curvature() {
         // Along the tangent it would be half a millimetre at least.
         assert!(way * way / 0.2 > 3e-4);
     }
+}
+
+/// A swing to and fro across a steady feed: dying where it turns back, it is carried on ever faster out of its sharpest turn.
+#[test]
+fn a_brake_out_of_a_sharp_turn_keeps_the_acceleration() {
+    fn swing(t: f64) -> [f64; 3] {
+        let faded = smoothstep((t / 0.5).min(1.0)).value;
+        [
+            length(t, 0.02),
+            faded * 0.01 * (1.0 - (15.0 * t).cos()),
+            0.0,
+        ]
+    }
+    let mut most = 0.0f64;
+    for at in (600..1100).step_by(3) {
+        for dies in [false, true] {
+            let places = stopped(swing, at, dies);
+            most = most.max(largest(&places)[0]);
+        }
+    }
+    std::println!("{most} m/s² at most");
+    assert!(most < ACCELERATION, "{most}");
 }
 
 /// A sender that goes to and fro at the largest feed, or starts at it at once, and dies or is stopped.
@@ -202,4 +226,35 @@ fn however_rough_the_set_points_no_step_is_longer_than_the_feed() {
             }
         }
     }
+}
+
+/// What has room stops within the coordinates, whatever way it goes and turns, also when the brake begins a tick later.
+#[test]
+fn what_has_room_stops_within_the_coordinates() {
+    let limits = plan_with(Operator::default()).limits;
+    let outward = [1.0, 0.0, 0.0];
+    let mut rooms = [0; 2];
+    for place in (1_400..2_126).step_by(20) {
+        for speed in (0..=1_000_000).step_by(125_000) {
+            for [out, up] in [[1.0, 0.0], [0.6, 0.8], [0.0, 1.0], [-0.8, 0.6], [-1.0, 0.0]] {
+                for [x, y] in [[0, 0], [4000, 0], [0, 4000], [-3000, 3000], [5000, 0]] {
+                    let velocity = [out, up, 0.0].map(|part| (part * f64::from(speed)) as i32);
+                    let place_nm = place * 1_000_000;
+                    let change = [x, y, 0];
+                    let room = brake::has_room(limits, [place_nm, 0, 0], velocity, change);
+                    rooms[usize::from(room)] += 1;
+                    let later = [0, 1, 2].map(|i| (velocity[i] + change[i]) as f32);
+                    let change = change.map(|nm| nm as f32);
+                    let accelerations = [limits.acceleration, limits.jerk];
+                    let way = farthest_nm(accelerations, later, change, outward);
+                    let end = f64::from(place_nm) + f64::from(later[0].max(0.0) + way);
+                    assert!(
+                        !room || end <= f64::from(FARTHEST_NM),
+                        "{place} {velocity:?} {change:?}: {end}"
+                    );
+                }
+            }
+        }
+    }
+    assert!(rooms.iter().all(|count| *count > 500), "{rooms:?}");
 }

@@ -133,6 +133,11 @@ impl StreamPlan {
         self.hold_ticks
     }
 
+    /// Ticks that may be carried on at most, until set-points are joined or the brake begins.
+    pub(crate) const fn longest_gap(&self) -> u32 {
+        self.hold_ticks.saturating_add(super::SEEN_TICKS + 1)
+    }
+
     /// Whether a zone of the table applies.
     pub const fn corrected(&self) -> bool {
         self.corrected

@@ -3,6 +3,7 @@ extern crate std;
 mod contour;
 mod endurance;
 mod motion;
+mod stop;
 mod terms;
 
 use super::*;
