@@ -65,8 +65,13 @@ pub(crate) fn smooth(x: f64) -> f64 {
 fn between(known: &[(Place, f64)], at: f64) -> Place {
     let mut place = [0.0; 3];
     for (index, (known_place, time)) in known.iter().enumerate() {
-        let others = known.iter().enumerate().filter(|(other, _)| *other != index);
-        let weight: f64 = others.map(|(_, (_, other))| (at - other) / (time - other)).product();
+        let others = known
+            .iter()
+            .enumerate()
+            .filter(|(other, _)| *other != index);
+        let weight: f64 = others
+            .map(|(_, (_, other))| (at - other) / (time - other))
+            .product();
         for (place, known) in place.iter_mut().zip(known_place) {
             *place += weight * known;
         }
@@ -109,7 +114,11 @@ impl Adder {
             known.1 += cycles;
         }
         let mut known: Vec<(Place, f64)> = vec![(place, 0.0)];
-        known.extend(self.last.iter().map(|(place, ago)| (*place, -f64::from(*ago))));
+        known.extend(
+            self.last
+                .iter()
+                .map(|(place, ago)| (*place, -f64::from(*ago))),
+        );
         for missing in (1..cycles).rev() {
             let place = between(&known, -f64::from(missing));
             self.corrector.tick(&input(place, wanted), self.cycle_s);

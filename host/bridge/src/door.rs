@@ -173,7 +173,9 @@ impl Door {
             return Err(SetupError::Number("the cycle has to be 0.25 to 50 ms"));
         }
         if !(setup.limit_mm > 0.0 && setup.limit_mm <= 100.0) {
-            return Err(SetupError::Number("the limit has to be above 0, up to 100 mm"));
+            return Err(SetupError::Number(
+                "the limit has to be above 0, up to 100 mm",
+            ));
         }
         let protocol: Box<dyn Protocol + Send> = match setup.kind {
             Kind::Egm => Box::new(Egm::new()),
@@ -185,11 +187,19 @@ impl Door {
         let follows = setup.path.is_some() || setup.kind == Kind::J519;
         let adds = matches!(setup.kind, Kind::Rsi | Kind::EgmPath);
         if adds && setup.path.is_some() {
-            return Err(SetupError::Number("this door adds to the robot's own path and takes no other"));
+            return Err(SetupError::Number(
+                "this door adds to the robot's own path and takes no other",
+            ));
         }
         let limits = limits(&setup.table)?;
         let source = if follows {
-            let player = Player::new(settings, &setup.table, cycle_s, setup.motion, setup.path.clone())?;
+            let player = Player::new(
+                settings,
+                &setup.table,
+                cycle_s,
+                setup.motion,
+                setup.path.clone(),
+            )?;
             if let Some(words) = player.too_much() {
                 return Err(SetupError::Path(words));
             }
@@ -207,7 +217,11 @@ impl Door {
             planned_is_corrected: setup.planned_is_corrected && adds,
             needs_planned: !follows && !adds,
             // Two strides of 15 ms each, in whole cycles.
-            latency_s: if adds { 0.0 } else { 2.0 * cycle_s * (0.015 / cycle_s).round().max(1.0) },
+            latency_s: if adds {
+                0.0
+            } else {
+                2.0 * cycle_s * (0.015 / cycle_s).round().max(1.0)
+            },
             source,
             counters: Counters::default(),
             phase: Phase::Waiting(None),
@@ -306,7 +320,8 @@ impl Door {
     }
 
     fn is_tired(&self, now: Duration) -> bool {
-        self.first_heard.is_some_and(|first| now.saturating_sub(first) > self.patience)
+        self.first_heard
+            .is_some_and(|first| now.saturating_sub(first) > self.patience)
     }
 
     /// A datagram of the robot came at `now`; what is to be sent back, in this order.
@@ -326,7 +341,9 @@ impl Door {
         self.counters.received += 1;
         self.first_heard.get_or_insert(now);
         self.last_heard = now;
-        let order = self.sequence.take(told.number, told.stamp_ms, now, &mut self.counters);
+        let order = self
+            .sequence
+            .take(told.number, told.stamp_ms, now, &mut self.counters);
         let cycles = match order {
             Order::Old => return Vec::new(),
             Order::Between(ahead) => {
@@ -385,7 +402,11 @@ impl Door {
             ));
         }
         if let (Some(planned), Some(measured)) = (told.planned, told.measured) {
-            let square: f64 = planned.iter().zip(measured).map(|(a, b)| (a - b) * (a - b)).sum();
+            let square: f64 = planned
+                .iter()
+                .zip(measured)
+                .map(|(a, b)| (a - b) * (a - b))
+                .sum();
             let apart = square.sqrt();
             if apart > APART_MM {
                 return Err(format!(
@@ -405,7 +426,8 @@ impl Door {
         if begins {
             if self.needs_planned && told.planned.is_none() {
                 return self.refuse(
-                    "the robot plans no path of its own: give the one to be followed (--path FILE)".to_owned(),
+                    "the robot plans no path of its own: give the one to be followed (--path FILE)"
+                        .to_owned(),
                 );
             }
             if let Source::Ours(player) = &mut self.source
@@ -417,14 +439,25 @@ impl Door {
         }
         // A number without an answer is one that the robot has given up, unless it insists on each.
         let behind = cycles.filter(|_| !begins).unwrap_or(1);
-        let answers = if self.protocol.answers_each() { behind.min(MOST_AT_ONCE) } else { 1 };
+        let answers = if self.protocol.answers_each() {
+            behind.min(MOST_AT_ONCE)
+        } else {
+            1
+        };
         let mut replies = Vec::new();
         for back in (0..answers).rev() {
             if matches!(self.phase, Phase::Ended | Phase::Refused(_)) {
                 break;
             }
-            self.number = told.number.wrapping_sub(back.wrapping_mul(self.protocol.step()));
-            let done = self.one_answer(here, told.planned, if begins { None } else { Some(behind) }, now);
+            self.number = told
+                .number
+                .wrapping_sub(back.wrapping_mul(self.protocol.step()));
+            let done = self.one_answer(
+                here,
+                told.planned,
+                if begins { None } else { Some(behind) },
+                now,
+            );
             replies.push(self.protocol.write(&self.answer));
             if done {
                 self.phase = Phase::Ended;
@@ -443,7 +476,9 @@ impl Door {
         now: Duration,
     ) -> bool {
         let leaving = self.phase == Phase::Leaving;
-        let tired = self.leaving_since.is_some_and(|since| now.saturating_sub(since) > LEAVING);
+        let tired = self
+            .leaving_since
+            .is_some_and(|since| now.saturating_sub(since) > LEAVING);
         let (target, offset, done, limited) = match &mut self.source {
             Source::Ours(player) => {
                 player.lost(cycles.unwrap_or(1));
@@ -458,7 +493,11 @@ impl Door {
                         *bare -= offset;
                     }
                 }
-                let Added { beside, active, limited } = adder.cycle(bare, cycles, !leaving);
+                let Added {
+                    beside,
+                    active,
+                    limited,
+                } = adder.cycle(bare, cycles, !leaving);
                 let mut target = bare;
                 for (target, beside) in target.iter_mut().zip(beside) {
                     *target += beside;
@@ -471,7 +510,12 @@ impl Door {
             self.listen_for_echo(planned);
         }
         let last = done || (leaving && tired);
-        self.answer = Answer { number: self.number, target, offset, last };
+        self.answer = Answer {
+            number: self.number,
+            target,
+            offset,
+            last,
+        };
         last
     }
 
@@ -494,7 +538,13 @@ impl Door {
 fn limits(table: &[u8]) -> Result<Limits, SetupError> {
     let table = giotto_shared::table::decode(table).map_err(SetupError::Table)?;
     Ok(Limits {
-        offset_m: table.limits.offset_m.min(giotto_shared::table::bounds::OFFSET_MAX_M),
-        slew_m_s: table.limits.slew_m_s.min(giotto_shared::table::bounds::SLEW_MAX_M_S),
+        offset_m: table
+            .limits
+            .offset_m
+            .min(giotto_shared::table::bounds::OFFSET_MAX_M),
+        slew_m_s: table
+            .limits
+            .slew_m_s
+            .min(giotto_shared::table::bounds::SLEW_MAX_M_S),
     })
 }

@@ -4,7 +4,9 @@
 //! are mm; the protocol is `abb.egm` of the RobotWare manual (crate `abbegm`).
 use crate::Place;
 use crate::protocol::{Answer, Heard, Protocol, Told};
-use abbegm::msg::{EgmCartesian, EgmHeader, EgmPlanned, EgmPose, EgmQuaternion, EgmRobot, EgmSensor};
+use abbegm::msg::{
+    EgmCartesian, EgmHeader, EgmPlanned, EgmPose, EgmQuaternion, EgmRobot, EgmSensor,
+};
 use abbegm::msg::{egm_header::MessageType, egm_mci_state::MciStateType};
 
 /// `EgmMotorState.MOTORS_OFF`, `EgmRapidCtrlExecState.RAPID_STOPPED`.
@@ -45,15 +47,24 @@ pub(super) fn read(datagram: &[u8]) -> Result<(Told, EgmRobot), &'static str> {
 }
 
 fn place(pose: Option<&EgmPose>) -> Option<Place> {
-    pose.and_then(|pose| pose.pos.as_ref()).map(EgmCartesian::as_mm)
+    pose.and_then(|pose| pose.pos.as_ref())
+        .map(EgmCartesian::as_mm)
 }
 
 /// What a controller says of itself; what it does not say it cannot be held against.
 fn not_ready(robot: &EgmRobot) -> Option<&'static str> {
-    if robot.motor_state.as_ref().is_some_and(|state| state.state == MOTORS_OFF) {
+    if robot
+        .motor_state
+        .as_ref()
+        .is_some_and(|state| state.state == MOTORS_OFF)
+    {
         return Some("the robot's motors are off");
     }
-    if robot.rapid_exec_state.as_ref().is_some_and(|state| state.state == RAPID_STOPPED) {
+    if robot
+        .rapid_exec_state
+        .as_ref()
+        .is_some_and(|state| state.state == RAPID_STOPPED)
+    {
         return Some("the RAPID program does not run");
     }
     match robot.mci_state.as_ref().map(|state| state.state) {
@@ -62,13 +73,19 @@ fn not_ready(robot: &EgmRobot) -> Option<&'static str> {
         Some(state) if state == MciStateType::MciError as i32 => {
             Some("EGM is in error (mciState MCI_ERROR): the controller's log says why")
         }
-        Some(_) => Some("EGM does not run (mciState is not MCI_RUNNING): EGMRunPose or EGMMoveL has not begun"),
+        Some(_) => Some(
+            "EGM does not run (mciState is not MCI_RUNNING): EGMRunPose or EGMMoveL has not begun",
+        ),
     }
 }
 
 impl Egm {
     pub(crate) const fn new() -> Self {
-        Self { seqno: 0, pose: None, stamp_ms: 0 }
+        Self {
+            seqno: 0,
+            pose: None,
+            stamp_ms: 0,
+        }
     }
 }
 

@@ -8,7 +8,9 @@ use crate::Place;
 use crate::door::Setup;
 use crate::egm;
 use crate::protocol::{Answer, Heard, Mode, Protocol, Told};
-use abbegm::msg::{EgmCartesian, EgmHeader, EgmPathCorr, EgmSensorPathCorr, egm_header::MessageType};
+use abbegm::msg::{
+    EgmCartesian, EgmHeader, EgmPathCorr, EgmSensorPathCorr, egm_header::MessageType,
+};
 
 /// Way between two places below which a path has no direction, mm.
 const STANDING_MM: f64 = 1e-3;
@@ -50,7 +52,11 @@ fn unit(a: Place) -> Option<Place> {
 
 /// Third column of a rotation: where the tool's z points.
 fn tool_z([w, x, y, z]: [f64; 4]) -> Place {
-    [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)]
+    [
+        2.0 * (x * z + w * y),
+        2.0 * (y * z - w * x),
+        1.0 - 2.0 * (x * x + y * y),
+    ]
 }
 
 impl EgmPath {
@@ -146,7 +152,11 @@ impl Protocol for EgmPath {
             self.given = answer.offset;
         }
         let [x, y, z] = self.in_path(offset);
-        let header = EgmHeader::new(self.seqno, self.stamp_ms, MessageType::MsgtypePathCorrection);
+        let header = EgmHeader::new(
+            self.seqno,
+            self.stamp_ms,
+            MessageType::MsgtypePathCorrection,
+        );
         self.seqno = self.seqno.wrapping_add(1);
         let message = EgmSensorPathCorr {
             header: Some(header),
@@ -176,13 +186,19 @@ mod tests {
         let mut last = 0.0;
         // One datagram is lost between the second and the third.
         for (t, cycles) in [(0.0, 1), (0.048, 1), (0.144, 2), (0.192, 1)] {
-            let told = Told { planned: Some(at(t)), ..Told::default() };
+            let told = Told {
+                planned: Some(at(t)),
+                ..Told::default()
+            };
             door.taken(&told, cycles);
             last = t;
         }
         let then = omega * (last + 0.048);
         let [x, y, z] = door.in_path([then.cos(), then.sin(), 0.5]);
-        assert!(x == 0.0 && (y - 1.0).abs() < 1e-6 && (z + 0.5).abs() < 1e-9, "{y} {z}");
+        assert!(
+            x == 0.0 && (y - 1.0).abs() < 1e-6 && (z + 0.5).abs() < 1e-9,
+            "{y} {z}"
+        );
         door.left_handed = true;
         let [_, y, _] = door.in_path([then.cos(), then.sin(), 0.0]);
         assert!((y + 1.0).abs() < 1e-6);

@@ -32,7 +32,10 @@ pub(crate) struct J519 {
 
 impl J519 {
     pub(crate) const fn new() -> Self {
-        Self { pose: None, commands: false }
+        Self {
+            pose: None,
+            commands: false,
+        }
     }
 }
 
@@ -65,9 +68,11 @@ impl Protocol for J519 {
             Some(3 | 4 | 6) => return Heard::Aside,
             _ => return Heard::Malformed("what came is no status of stream motion"),
         }
-        let (Some(number), Some(state), Some(time_ms)) =
-            (u32_at(datagram, 8), datagram.get(12).copied(), u32_at(datagram, 20))
-        else {
+        let (Some(number), Some(state), Some(time_ms)) = (
+            u32_at(datagram, 8),
+            datagram.get(12).copied(),
+            u32_at(datagram, 20),
+        ) else {
             return Heard::Malformed("what came is no status of stream motion");
         };
         let Some(pose) = nine_at(datagram, 24) else {
@@ -125,12 +130,20 @@ mod tests {
     #[test]
     fn a_command_byte_by_byte() {
         let mut j519 = J519::new();
-        let answer = Answer { number: 0x0102_0304, target: [1.0, -2.0, 0.5], offset: [0.0; 3], last: true };
+        let answer = Answer {
+            number: 0x0102_0304,
+            target: [1.0, -2.0, 0.5],
+            offset: [0.0; 3],
+            last: true,
+        };
         let bytes = j519.write(&answer);
         assert_eq!(bytes.len(), 64);
         assert_eq!(bytes[..13], [0, 0, 0, 1, 0, 0, 0, 1, 1, 2, 3, 4, 1]);
         assert!(bytes[13..28].iter().all(|byte| *byte == 0));
-        assert_eq!(bytes[28..40], [0x3f, 0x80, 0, 0, 0xc0, 0, 0, 0, 0x3f, 0, 0, 0]);
+        assert_eq!(
+            bytes[28..40],
+            [0x3f, 0x80, 0, 0, 0xc0, 0, 0, 0, 0x3f, 0, 0, 0]
+        );
         assert_eq!(j519.greeting(), [[0, 0, 0, 0, 0, 0, 0, 1]]);
         assert_eq!(j519.farewell(), [[0, 0, 0, 2, 0, 0, 0, 1]]);
     }

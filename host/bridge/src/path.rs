@@ -54,7 +54,11 @@ impl Path {
             let mut values = [0.0; 4];
             for (value, field) in values.iter_mut().zip(wanted) {
                 let Some(field) = field else { continue };
-                let at = 1 + fields.iter().take(field).map(|f| f.len() + 1).sum::<usize>();
+                let at = 1 + fields
+                    .iter()
+                    .take(field)
+                    .map(|f| f.len() + 1)
+                    .sum::<usize>();
                 let text = fields.get(field).map_or("", |text| text.trim());
                 *value = match text.parse::<f64>() {
                     Ok(number) if number.abs() < 1e6 => number,
@@ -89,7 +93,10 @@ impl Path {
     pub fn at(&self, time_s: f64) -> Place {
         let time = self.times_s.first().copied().unwrap_or(0.0) + time_s;
         let last = self.times_s.len().saturating_sub(1);
-        let after = self.times_s.partition_point(|row| *row <= time).clamp(1, last.max(1));
+        let after = self
+            .times_s
+            .partition_point(|row| *row <= time)
+            .clamp(1, last.max(1));
         let row = |index: usize| {
             let index = index.min(last);
             (
@@ -103,11 +110,14 @@ impl Path {
         let mut place = [0.0; 3];
         for (axis, place) in place.iter_mut().enumerate() {
             let at = |p: &Place| p.get(axis).copied().unwrap_or(0.0);
-            let slope = |(ta, a): (f64, f64), (tb, b): (f64, f64)| if tb > ta { (b - a) / (tb - ta) } else { 0.0 };
+            let slope = |(ta, a): (f64, f64), (tb, b): (f64, f64)| {
+                if tb > ta { (b - a) / (tb - ta) } else { 0.0 }
+            };
             let (a, b) = (at(&p1), at(&p2));
             let (m1, m2) = (slope((t0, at(&p0)), (t2, b)), slope((t1, a), (t3, at(&p3))));
             let (s, h) = (share, t2 - t1);
-            *place = a + s * s * (3.0 - 2.0 * s) * (b - a)
+            *place = a
+                + s * s * (3.0 - 2.0 * s) * (b - a)
                 + h * s * (1.0 - s) * ((1.0 - s) * m1 - s * m2);
         }
         place
@@ -123,7 +133,11 @@ mod tests {
         let mut text = String::from("time_s,x_mm,y_mm,z_mm,corrected_x_mm\n");
         for row in 0..2000 {
             let t = f64::from(row) * 1e-3;
-            text += &format!("{t:.6},{:.9},{:.9},5,0\n", 50.0 * (4.0 * t).cos(), 50.0 * (4.0 * t).sin());
+            text += &format!(
+                "{t:.6},{:.9},{:.9},5,0\n",
+                50.0 * (4.0 * t).cos(),
+                50.0 * (4.0 * t).sin()
+            );
         }
         let path = Path::read(&text).unwrap();
         for k in 10..900 {

@@ -86,12 +86,14 @@ pub(crate) struct Player {
     time_s: f64,
     /// Pace of that time: 0 held, 1 as the file says; and where its ramp is.
     ramp: f64,
-    /// The ramp's length, s.
+    /// The ramp's length, s: a path begins at rest by itself; where it is held or stopped the ramp is all there is.
     ramp_s: f64,
     stopping: bool,
     /// Cycles at rest since the end.
     rested: u64,
     differences: Differences,
+    /// Highest speed so far, mm/s.
+    top_mm_s: f64,
     out: Place,
 }
 
@@ -127,13 +129,11 @@ impl Player {
             cycles: 0,
             time_s: 0.0,
             ramp: 0.0,
-            // Half of the acceleration and of the jerk is the ramp's: the path has its own.
-            ramp_s: (3.75 * motion.speed_mm_s / motion.acceleration_mm_s2)
-                .max((11.6 * motion.speed_mm_s / motion.jerk_mm_s3).sqrt())
-                .max(SHORTEST_S),
+            ramp_s: SHORTEST_S,
             stopping: false,
             rested: 0,
             differences: Differences::default(),
+            top_mm_s: 0.0,
             out: [0.0; 3],
         })
     }
@@ -149,7 +149,12 @@ impl Player {
             let asked = differences.take(played.target, self.cycle_s);
             let pairs = [
                 ("speed", asked.speed_mm_s, self.motion.speed_mm_s, "mm/s"),
-                ("acceleration", asked.acceleration_mm_s2, self.motion.acceleration_mm_s2, "mm/s²"),
+                (
+                    "acceleration",
+                    asked.acceleration_mm_s2,
+                    self.motion.acceleration_mm_s2,
+                    "mm/s²",
+                ),
                 ("jerk", asked.jerk_mm_s3, self.motion.jerk_mm_s3, "mm/s³"),
             ];
             if let Some((name, asked, most, unit)) = pairs.into_iter().find(|(_, a, b, _)| a > b) {
@@ -191,15 +196,25 @@ impl Player {
     pub(crate) fn lost(&mut self, cycles: u32) {
         if f64::from(cycles - 1) * self.cycle_s > BRIDGED_S {
             self.ramp = 0.0;
+            self.ramp_s = self.brake_s();
         }
     }
 
-    /// Comes to rest along the path.
-    pub(crate) fn stop(&mut self) {
-        self.stopping = true;
+    /// Half of the acceleration and of the jerk is the ramp's: the path has its own.
+    fn brake_s(&self) -> f64 {
+        let speed = self.top_mm_s;
+        (3.75 * speed / self.motion.acceleration_mm_s2)
+            .max((11.6 * speed / self.motion.jerk_mm_s3).sqrt())
+            .max(SHORTEST_S)
     }
 
-    /// Latency of the corrected set-points, s.
+    /// The path comes to rest on itself.
+    pub(crate) fn stop(&mut self) {
+        self.stopping = true;
+        self.ramp_s = self.brake_s();
+    }
+
+    /// The path does not move.
     pub(crate) fn at_rest(&self) -> bool {
         self.ramp <= 0.0
     }
@@ -215,10 +230,17 @@ impl Player {
             self.ramp = (self.ramp + if self.stopping { -step } else { step }).clamp(0.0, 1.0);
             self.time_s = (self.time_s + self.cycle_s * smooth(self.ramp)).min(length_s);
         }
-        let planned = self.path.as_ref().map_or(self.home, |path| path.at(self.time_s));
+        let planned = self
+            .path
+            .as_ref()
+            .map_or(self.home, |path| path.at(self.time_s));
         let out = self.corrector.tick(&input(planned, true), self.cycle_s);
         let mut target = planned;
-        let aside = if self.path.is_some() { self.aside } else { [0.0; 3] };
+        let aside = if self.path.is_some() {
+            self.aside
+        } else {
+            [0.0; 3]
+        };
         for ((target, command), aside) in target.iter_mut().zip(out.command).zip(aside) {
             *target = command + (1.0 - eased) * aside;
         }
@@ -227,6 +249,7 @@ impl Player {
         self.rested = if ended && same { self.rested + 1 } else { 0 };
         self.out = target;
         let asked = self.differences.take(target, self.cycle_s);
+        self.top_mm_s = self.top_mm_s.max(asked.speed_mm_s);
         Played {
             target,
             offset: self.corrector.offset_m().map(|m| 1e3 * m),

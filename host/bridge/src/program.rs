@@ -55,12 +55,25 @@ impl Program<'_> {
             ("{cycle}", format!("{:.0}", self.setup.cycle_ms)),
             ("{limit}", format!("{:.1}", self.setup.limit_mm)),
             ("{sentype}", SENTYPE.to_owned()),
-            ("{mode}", if relative { "RELATIVE" } else { "ABSOLUTE" }.to_owned()),
-            ("{ipo}", if self.setup.cycle_ms < 8.0 { "IPO_FAST" } else { "IPO" }.to_owned()),
+            (
+                "{mode}",
+                if relative { "RELATIVE" } else { "ABSOLUTE" }.to_owned(),
+            ),
+            (
+                "{ipo}",
+                if self.setup.cycle_ms < 8.0 {
+                    "IPO_FAST"
+                } else {
+                    "IPO"
+                }
+                .to_owned(),
+            ),
             ("{holdon}", if relative { "0" } else { "1" }.to_owned()),
         ]
         .iter()
-        .fold(text.to_owned(), |text, (mark, value)| text.replace(mark, value))
+        .fold(text.to_owned(), |text, (mark, value)| {
+            text.replace(mark, value)
+        })
     }
 }
 
@@ -74,7 +87,11 @@ mod tests {
             let mut setup = Setup::new(kind, Vec::new());
             setup.limit_mm = 3.0;
             setup.mode = Mode::Relative;
-            let program = Program { setup: &setup, name: "Giotto_1", host: ("192.168.1.10", 6511) };
+            let program = Program {
+                setup: &setup,
+                name: "Giotto_1",
+                host: ("192.168.1.10", 6511),
+            };
             let files = program.files();
             for (ending, text) in &files {
                 // A mark is a word in braces.
@@ -87,13 +104,22 @@ mod tests {
                 assert!(text.to_ascii_lowercase().contains("giotto_1"), "{ending}");
             }
             if kind == Kind::Rsi {
-                let [(_, src), (_, ethernet), (_, flow)] = &files[..] else { panic!() };
+                let [(_, src), (_, ethernet), (_, flow)] = &files[..] else {
+                    panic!()
+                };
                 assert!(src.contains("RSI_ON(#RELATIVE, #IPO_FAST)"));
-                assert!(ethernet.contains("<PORT>6511</PORT>") && ethernet.contains("HOLDON=\"0\""));
+                assert!(
+                    ethernet.contains("<PORT>6511</PORT>") && ethernet.contains("HOLDON=\"0\"")
+                );
                 assert!(flow.contains("\"UpperLimX\" ParamID=\"4\" ParamValue=\"3.0\""));
             }
         }
-        for (name, good) in [("giotto", true), ("1giotto", false), ("gi otto", false), ("", false)] {
+        for (name, good) in [
+            ("giotto", true),
+            ("1giotto", false),
+            ("gi otto", false),
+            ("", false),
+        ] {
             assert_eq!(Program::is_name(name), good);
         }
     }

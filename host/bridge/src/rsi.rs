@@ -200,8 +200,14 @@ mod tests {
                 panic!("{ipoc}")
             };
             assert_eq!(told.measured, Some([1.5, -2.0, 3.0]));
-            assert_eq!((told.planned, told.missed), (Some([1.0, 2.0, 3.0]), Some(2)));
-            let answer = Answer { offset: [0.12345, -0.00001, 0.0], ..Answer::default() };
+            assert_eq!(
+                (told.planned, told.missed),
+                (Some([1.0, 2.0, 3.0]), Some(2))
+            );
+            let answer = Answer {
+                offset: [0.12345, -0.00001, 0.0],
+                ..Answer::default()
+            };
             let text = String::from_utf8(rsi.write(&answer)).unwrap();
             assert_eq!(
                 text,
@@ -224,7 +230,10 @@ mod tests {
             "<Rob Type=\"KUKA\"></Rob>",
             &whole[..whole.len() - 3],
         ] {
-            assert!(matches!(rsi.read(text.as_bytes()), Heard::Malformed(_)), "{text}");
+            assert!(
+                matches!(rsi.read(text.as_bytes()), Heard::Malformed(_)),
+                "{text}"
+            );
         }
     }
 }

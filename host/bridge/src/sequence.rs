@@ -192,7 +192,10 @@ mod tests {
     fn a_robot_that_counts_anew_is_followed() {
         let mut counters = Counters::default();
         let mut sequence = Sequence::new(1, 4e-3);
-        assert_eq!(sequence.take(5000, None, at(0.0), &mut counters), Order::First);
+        assert_eq!(
+            sequence.take(5000, None, at(0.0), &mut counters),
+            Order::First
+        );
         let orders: Vec<Order> = (1..=11)
             .map(|k| sequence.take(k, None, at(4.0), &mut counters))
             .collect();

@@ -17,6 +17,8 @@ const LONGEST: usize = 65_535;
 /// called after each datagram and each silence of 50 ms, and says whether to go on: `false` takes the correction out and ends.
 /// Times are taken when a datagram has been received; the answer is on its way before `each` is called.
 ///
+/// Gives the robot's address, where one was answered.
+///
 /// # Errors
 /// Those of the socket, but for a robot that is not there yet.
 pub fn guide(
@@ -24,7 +26,7 @@ pub fn guide(
     door: &mut Door,
     robot: Option<SocketAddr>,
     each: &mut dyn FnMut(&Door) -> bool,
-) -> io::Result<()> {
+) -> io::Result<Option<SocketAddr>> {
     let started = Instant::now();
     let mut robot = robot;
     let mut asked: Option<Instant> = None;
@@ -64,7 +66,7 @@ pub fn guide(
             send(socket, &farewell, to)?;
         }
     }
-    Ok(())
+    Ok(robot.filter(|_| door.counters().answered > 0))
 }
 
 /// No datagram came, or the last one found nobody there.

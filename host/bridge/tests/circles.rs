@@ -1,5 +1,9 @@
 //! 100,000 cycles of each door with 1 % loss, jitter and reordering, against a simulated robot, in virtual time.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may fail where it stands")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test may fail where it stands"
+)]
 mod robot;
 
 use giotto_bridge::{Door, Kind, Mode, Motion, Path, Phase, Setup};
@@ -91,7 +95,10 @@ fn run(mut side: impl Side, setup: Setup, program: &Program, seed: u64, late_s: 
             ballbar.see(program, time_s - late_s, place);
         }
         // The first datagrams may be lost.
-        assert!(cycle < 5 || *door.phase() == Phase::Guiding, "cycle {cycle}: {door:?}");
+        assert!(
+            cycle < 5 || *door.phase() == Phase::Guiding,
+            "cycle {cycle}: {door:?}"
+        );
     }
     Shown {
         before: bare(program),
@@ -110,7 +117,10 @@ fn took(mut times: Vec<f64>) -> [f64; 2] {
 }
 
 fn far(a: Place, b: Place) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max)
 }
 
 fn check(shown: &Shown, name: &str, bar: f64) {
@@ -122,7 +132,10 @@ fn check(shown: &Shown, name: &str, bar: f64) {
     assert!(shown.reduction() >= bar, "{}", shown.reduction());
     let counters = shown.door.counters();
     assert!(counters.lost > 800 && counters.lost < 1300, "{counters:?}");
-    assert!(counters.reordered > 200 && counters.malformed == 0, "{counters:?}");
+    assert!(
+        counters.reordered > 200 && counters.malformed == 0,
+        "{counters:?}"
+    );
 }
 
 /// KUKA: an answer with the IPOC of its cycle acts from the next on; others count as late.
@@ -262,7 +275,13 @@ impl Side for Abb {
         self.cycle = cycle;
         let planned = if self.plans { planned } else { self.to };
         let seqno = (cycle as u32).wrapping_add(u32::MAX - 1000);
-        bytes::egm_robot(seqno, cycle as u32 * 4, measured, Some(planned), bytes::ABB_RUNS)
+        bytes::egm_robot(
+            seqno,
+            cycle as u32 * 4,
+            measured,
+            Some(planned),
+            bytes::ABB_RUNS,
+        )
     }
 
     fn hear(&mut self, cycle: u64, answer: &[u8]) -> Option<u64> {
@@ -309,7 +328,11 @@ fn egm_follows_what_the_robot_plans() {
     let shown = run(Abb::new(true), setup, &program, 13, late_s);
     check(&shown, "egm, the robot's path", 0.95);
     // 300 mm/s over at most a few lost cycles, and the correction's own.
-    assert!(shown.step < 6.0 * (0.3 + SLEW_AND_OFFSET[0]) * 4.0, "{}", shown.step);
+    assert!(
+        shown.step < 6.0 * (0.3 + SLEW_AND_OFFSET[0]) * 4.0,
+        "{}",
+        shown.step
+    );
 }
 
 /// The program begins when the robot has come to its first row and the engine rests there: 1 s, and the ramp's half.
@@ -442,7 +465,8 @@ fn by_place(program: &Program, track: &[Place]) -> f64 {
             break;
         };
         let start = at + start;
-        let span = (std::f64::consts::TAU * circle.radius * circle.laps / circle.feed / INNER_S) as usize;
+        let span =
+            (std::f64::consts::TAU * circle.radius * circle.laps / circle.feed / INNER_S) as usize;
         // The steady middle: well behind the rise and before the fall, whole laps or not.
         let (from, to) = (start + span / 4, start + 3 * span / 4);
         if to + span / 2 >= track.len() {
@@ -474,7 +498,15 @@ fn j519_gets_each_number_once_and_keeps_its_limits() {
         cycle: u64::MAX,
     };
     let sent = std::rc::Rc::new(std::cell::RefCell::new(Vec::new()));
-    let shown = free(Watched { side, sent: sent.clone() }, setup, &program, 15);
+    let shown = free(
+        Watched {
+            side,
+            sent: sent.clone(),
+        },
+        setup,
+        &program,
+        15,
+    );
     shown.print("j519, our path");
     assert!(shown.reduction() >= 0.95, "{}", shown.reduction());
     assert!(shown.answered as f64 >= 0.999 * shown.in_time as f64);
@@ -482,8 +514,17 @@ fn j519_gets_each_number_once_and_keeps_its_limits() {
     assert!(sent.len() > 90_000);
     let mut most = [0.0f64; 3];
     for four in sent.windows(4) {
-        let [(n0, a), (n1, b), (n2, c), (n3, d)] = four else { panic!() };
-        assert_eq!([n1.wrapping_sub(*n0), n2.wrapping_sub(*n1), n3.wrapping_sub(*n2)], [1; 3]);
+        let [(n0, a), (n1, b), (n2, c), (n3, d)] = four else {
+            panic!()
+        };
+        assert_eq!(
+            [
+                n1.wrapping_sub(*n0),
+                n2.wrapping_sub(*n1),
+                n3.wrapping_sub(*n2)
+            ],
+            [1; 3]
+        );
         let norm = |w: [f64; 4], power: i32| {
             (0..3)
                 .map(|k| (w[0] * a[k] + w[1] * b[k] + w[2] * c[k] + w[3] * d[k]).powi(2))
@@ -496,7 +537,10 @@ fn j519_gets_each_number_once_and_keeps_its_limits() {
         most[2] = most[2].max(norm([-1.0, 3.0, -3.0, 1.0], 3));
     }
     println!("j519: speed, acceleration, jerk {most:.0?}");
-    assert!(most[0] <= motion.speed_mm_s && most[1] <= motion.acceleration_mm_s2, "{most:?}");
+    assert!(
+        most[0] <= motion.speed_mm_s && most[1] <= motion.acceleration_mm_s2,
+        "{most:?}"
+    );
     assert!(most[2] <= motion.jerk_mm_s3, "{most:?}");
 }
 
@@ -547,7 +591,13 @@ impl Side for AbbPath {
             self.cycle = cycle;
             self.now = [self.corr, self.up];
         }
-        bytes::egm_robot(cycle as u32, cycle as u32 * 48, measured, Some(planned), bytes::ABB_RUNS)
+        bytes::egm_robot(
+            cycle as u32,
+            cycle as u32 * 48,
+            measured,
+            Some(planned),
+            bytes::ABB_RUNS,
+        )
     }
 
     fn hear(&mut self, cycle: u64, answer: &[u8]) -> Option<u64> {
@@ -569,7 +619,10 @@ impl Side for AbbPath {
     }
 
     fn command(&mut self, planned: Place, time_s: f64) -> Place {
-        let (a, b) = (self.program.at(time_s - 1e-4), self.program.at(time_s + 1e-4));
+        let (a, b) = (
+            self.program.at(time_s - 1e-4),
+            self.program.at(time_s + 1e-4),
+        );
         let (tx, ty) = (b[0] - a[0], b[1] - a[1]);
         let length = tx.hypot(ty);
         if length == 0.0 {
@@ -604,5 +657,9 @@ fn egm_path_corrects_across_the_path() {
     let setup = Setup::new(Kind::EgmPath, table_image());
     let shown = run(side, setup, &program, 16, 0.0);
     check(&shown, "egm-path", 0.90);
-    assert!(shown.step <= SLEW_AND_OFFSET[0] * 48.0 + 1e-9, "{}", shown.step);
+    assert!(
+        shown.step <= SLEW_AND_OFFSET[0] * 48.0 + 1e-9,
+        "{}",
+        shown.step
+    );
 }

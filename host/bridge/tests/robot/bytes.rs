@@ -153,7 +153,13 @@ pub fn egm_sensor(bytes: &[u8]) -> (u32, Place) {
     // The orientation comes back.
     let orient: Vec<f64> = fields(message(pose, 2))
         .into_iter()
-        .map(|(_, v)| if let Value::Double(v) = v { v } else { f64::NAN })
+        .map(|(_, v)| {
+            if let Value::Double(v) = v {
+                v
+            } else {
+                f64::NAN
+            }
+        })
         .collect();
     assert_eq!(orient, [0.0, 1.0, 0.0, 0.0]);
     (integer(header, 1) as u32, xyz(message(pose, 1)))
@@ -163,7 +169,10 @@ pub fn egm_sensor(bytes: &[u8]) -> (u32, Place) {
 pub fn egm_path_corr(bytes: &[u8]) -> (u32, Place) {
     let header = message(bytes, 1);
     assert_eq!(integer(header, 3), 4, "MSGTYPE_PATH_CORRECTION");
-    (integer(header, 1) as u32, xyz(message(message(bytes, 2), 1)))
+    (
+        integer(header, 1) as u32,
+        xyz(message(message(bytes, 2), 1)),
+    )
 }
 
 /// A telegram of RSI.
@@ -181,8 +190,14 @@ pub fn rob(ipoc: &str, measured: Place, planned: Place, delay: u64) -> Vec<u8> {
 
 /// What stands between two words.
 fn cut<'a>(text: &'a str, from: &str, to: &str) -> &'a str {
-    let after = text.split_once(from).unwrap_or_else(|| panic!("{from} in {text}")).1;
-    after.split_once(to).unwrap_or_else(|| panic!("{to} in {text}")).0
+    let after = text
+        .split_once(from)
+        .unwrap_or_else(|| panic!("{from} in {text}"))
+        .1;
+    after
+        .split_once(to)
+        .unwrap_or_else(|| panic!("{to} in {text}"))
+        .0
 }
 
 /// A `<Sen>`: IPOC and RKorr.
@@ -201,7 +216,10 @@ pub fn status(seq: u32, state: u8, time_ms: u32, place: Place) -> Vec<u8> {
     out.extend([state, 0, 0, 0, 0, 0, 0, 0]);
     out.extend(time_ms.to_be_bytes());
     let [x, y, z] = place.map(|c| c as f32);
-    for value in [x, y, z, 180.0, 0.0, 0.0, 0.0, 0.0, 0.0].into_iter().chain([0.0; 18]) {
+    for value in [x, y, z, 180.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+        .into_iter()
+        .chain([0.0; 18])
+    {
         out.extend(f32::to_be_bytes(value));
     }
     assert_eq!(out.len(), 132);
@@ -214,7 +232,11 @@ pub fn command(bytes: &[u8]) -> (u32, bool, Place) {
     assert_eq!(bytes[..8], [0, 0, 0, 1, 0, 0, 0, 1]);
     assert_eq!(bytes[18], 0, "a pose, no joints");
     let float = |at: usize| f64::from(f32::from_be_bytes(bytes[at..at + 4].try_into().unwrap()));
-    assert_eq!([float(40), float(44)], [180.0, 0.0], "the orientation stays");
+    assert_eq!(
+        [float(40), float(44)],
+        [180.0, 0.0],
+        "the orientation stays"
+    );
     (
         u32::from_be_bytes(bytes[8..12].try_into().unwrap()),
         bytes[12] == 1,

@@ -1,6 +1,10 @@
 //! A robot of our own on the other side of each door: it shares no code with the bridge.
 #![allow(dead_code, reason = "each test uses a part of it")]
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may fail where it stands")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test may fail where it stands"
+)]
 pub mod bytes;
 pub mod net;
 
@@ -217,9 +221,9 @@ impl Ballbar {
         let circle = program.0[index];
         if circle.is_steady(time_s) {
             let [cx, cy, cz] = circle.centre();
-            let radius = ((place[0] - cx).powi(2) + (place[1] - cy).powi(2)
-                + (place[2] - cz).powi(2))
-            .sqrt();
+            let radius =
+                ((place[0] - cx).powi(2) + (place[1] - cy).powi(2) + (place[2] - cz).powi(2))
+                    .sqrt();
             self.sums[index].0 += radius - circle.radius;
             self.sums[index].1 += 1;
         }
