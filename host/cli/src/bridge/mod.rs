@@ -179,12 +179,6 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         let listen = address(args.listen.as_deref().unwrap_or("0"), kind.usual_port())?;
         return program::write(file, &setup, listen, out);
     }
-    let Some(table) = &args.table else {
-        return Err(Failure::usage("--table is missing"));
-    };
-    setup.table = table_file::read(table, out)?.image;
-    setup.path = args.path.path.as_deref().map(set_points).transpose()?;
-    let door = Door::new(setup).map_err(|error| refused(&error, &args, table))?;
     let robot = args
         .robot
         .as_deref()
@@ -195,6 +189,12 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
             "j519 has to call the robot: its address is missing (--robot ADDR)",
         ));
     }
+    let Some(table) = &args.table else {
+        return Err(Failure::usage("--table is missing"));
+    };
+    setup.table = table_file::read(table, out)?.image;
+    setup.path = args.path.path.as_deref().map(set_points).transpose()?;
+    let door = Door::new(setup).map_err(|error| refused(&error, &args, table))?;
     let usual = if kind == Kind::J519 {
         0
     } else {
