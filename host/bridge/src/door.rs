@@ -12,8 +12,9 @@ use giotto_corrector::{LawError, PERIOD_S, Settings, SettingsError};
 use giotto_shared::table::{Limits, TableError};
 use std::time::Duration;
 
-/// A robot that was guided and is silent so long has ended.
-const SILENCE: Duration = Duration::from_secs(2);
+/// A robot that was guided on our path and is silent so long is lost; on a path of its own, its program has ended.
+const LOST: Duration = Duration::from_secs(2);
+const SILENCE: Duration = Duration::from_secs(10);
 /// Leaving takes no longer than this, whatever does not come to rest.
 const LEAVING: Duration = Duration::from_secs(5);
 /// Farthest that a robot's planned place is from its measured one, mm: farther is another frame or unit.
@@ -304,17 +305,17 @@ impl Door {
             Phase::Waiting(Some(why)) if self.is_tired(now) => {
                 self.phase = Phase::Refused((*why).to_owned());
             }
-            Phase::Guiding if silent > SILENCE => match &self.source {
-                Source::Ours(player) if !player.at_rest() => {
+            Phase::Guiding => match &self.source {
+                Source::Ours(player) if !player.at_rest() && silent > LOST => {
                     self.phase = Phase::Refused(format!(
                         "the robot has gone silent on its path; it was last heard {:.1} s ago",
                         silent.as_secs_f64()
                     ));
                 }
-                // The robot's program has switched its door off.
-                _ => self.phase = Phase::Ended,
+                _ if silent > SILENCE => self.phase = Phase::Ended,
+                _ => {}
             },
-            Phase::Leaving if silent > SILENCE => self.phase = Phase::Ended,
+            Phase::Leaving if silent > LOST => self.phase = Phase::Ended,
             _ => {}
         }
     }

@@ -408,7 +408,9 @@ fn a_robot_that_goes_silent_on_our_path_is_an_error_and_after_its_own_an_end() {
     ours.silence(Duration::from_secs(5));
     assert!(words(&ours).contains("gone silent"));
     let (mut robots, _) = rsi_session(Setup::new(Kind::Rsi, table_image()), &[], u32::MAX, 500);
-    robots.silence(Duration::from_secs(10));
+    robots.silence(Duration::from_secs(11));
+    assert_eq!(*robots.phase(), Phase::Guiding);
+    robots.silence(Duration::from_secs(13));
     assert_eq!(*robots.phase(), Phase::Ended);
 }
 

@@ -24,6 +24,8 @@ class Robot(EchoServer):
 
 
 server = Robot(config, delay_ms=4, mode="absolute")
+for state in ("RIst", "RSol"):
+    server.state[state].update(X=100.0, Y=0.0, Z=0.0)
 answered, largest = 0, 0.0
 for cycle in range(cycles):
     begun = time.monotonic()
