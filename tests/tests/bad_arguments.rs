@@ -11,7 +11,7 @@ const MODEL: &str = "format = 1\ncampaign = \"bench\"\nmachine = \"mill\"\n[serv
                      [valid]\nradius_mm = [50.0, 100.0]\nfeed_mm_s = [20.0, 200.0]\n";
 
 /// Commands that read a file, `{}` standing for it.
-const READERS: [&str; 17] = [
+const READERS: [&str; 18] = [
     "import {} --radius 100 --feed 100 --direction ccw -o new",
     "analyze {}",
     "fit {}",
@@ -25,6 +25,7 @@ const READERS: [&str; 17] = [
     "table show {}",
     "flash {} --port sim",
     "verify {} --port sim",
+    "bridge rsi --table {} --listen 127.0.0.1:0 --wait 1",
     "run program {} --port sim",
     "run stream {} --port sim",
     "analyze campaign --ballbar {}",

@@ -9,11 +9,16 @@ const FADE_S: f64 = 0.05;
 /// What a radius may be beyond a zone's and still count as meant, share.
 const SLACK: f64 = 0.02;
 
+/// Farthest that a path is followed ahead along its circle, rad: beyond a quarter of a turn it is guesswork.
+const FARTHEST_RAD: f64 = core::f64::consts::FRAC_PI_2;
+
 /// How the path turns.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Turn {
     pub(crate) speed_m_s: f64,
     pub(crate) centripetal_m_s2: f64,
+    /// Unit vector along the path; zero where it stands or is straight.
+    along: [f64; 3],
     /// Unit vector away from the centre; zero where it is straight.
     pub(crate) outward: [f64; 3],
     /// Infinite where it is straight.
@@ -54,10 +59,59 @@ impl Turn {
         Self {
             speed_m_s,
             centripetal_m_s2,
+            along: velocity.map(|c| c / speed_m_s),
             outward: across.map(|c| -c / centripetal_m_s2),
             radius_m: square / centripetal_m_s2,
             ccw: Some(largest > 0.0),
         }
+    }
+}
+
+/// The path after some time more on its circle or line.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ahead {
+    along: [f64; 3],
+    outward: [f64; 3],
+    /// Of the angle that it turns by until then.
+    sin: f64,
+    cos: f64,
+    /// Way to the place there, m.
+    pub(crate) way_m: [f64; 3],
+}
+
+impl Ahead {
+    /// `time_s` after a place with this velocity.
+    pub(crate) fn after(turn: &Turn, velocity_m_s: [f64; 3], time_s: f64) -> Self {
+        let angle = if turn.radius_m.is_finite() {
+            (turn.speed_m_s / turn.radius_m * time_s).min(FARTHEST_RAD)
+        } else {
+            0.0
+        };
+        let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+        let mut way_m = velocity_m_s.map(|velocity| velocity * time_s);
+        if angle > 0.0 {
+            for ((way, along), outward) in way_m.iter_mut().zip(turn.along).zip(turn.outward) {
+                *way = turn.radius_m * (sin * along - (1.0 - cos) * outward);
+            }
+        }
+        Self {
+            along: turn.along,
+            outward: turn.outward,
+            sin,
+            cos,
+            way_m,
+        }
+    }
+
+    /// A vector that turns with the path.
+    pub(crate) fn turned(&self, vector: [f64; 3]) -> [f64; 3] {
+        let (t, n) = (dot(vector, self.along), dot(vector, self.outward));
+        let mut turned = vector;
+        for ((turned, along), outward) in turned.iter_mut().zip(self.along).zip(self.outward) {
+            *turned += (self.cos * t + self.sin * n - t) * along
+                + (self.cos * n - self.sin * t - n) * outward;
+        }
+        turned
     }
 }
 

@@ -5,7 +5,7 @@
 //!
 //! Where the planner puts its set-points elsewhere, or follows the feedback because the machine was switched off, both end
 //! at once: what the output then is beside the input is kept, so that it does not jump, and taken out smoothly.
-use crate::arc::Turn;
+use crate::arc::{Ahead, Turn};
 use crate::fade::{Fade, Part};
 use crate::guard::{Guard, within};
 use crate::history::History;
@@ -96,6 +96,18 @@ pub struct Corrector {
     last: [f64; JOINTS],
     started: bool,
     counters: Counters,
+}
+
+/// Moves the place that is corrected on along the path.
+fn advance(place: &mut Place, time_s: f64) {
+    let ahead = Ahead::after(&place.turn, place.velocity_m_s, time_s);
+    for (place, way) in place.place_m.iter_mut().zip(ahead.way_m) {
+        *place += way;
+    }
+    place.velocity_m_s = ahead.turned(place.velocity_m_s);
+    place.acceleration_m_s2 = ahead.turned(place.acceleration_m_s2);
+    place.turn.outward = ahead.turned(place.turn.outward);
+    place.ahead = Some(ahead);
 }
 
 /// Joint or slide `index` of an array, 0 beyond it.
@@ -229,8 +241,9 @@ impl Corrector {
         let wanted = input.enable && input.coordinated && !off && !self.bypass && self.has_table;
         let wanted = wanted && self.quiet == 0;
         let rests = seen.still as usize >= self.history.latency();
-        if rests && wanted != self.delayed {
-            self.delayed = wanted;
+        let delays = wanted && self.settings.lead_s.is_none();
+        if rests && delays != self.delayed {
+            self.delayed = delays;
             if wanted && self.fade.is_silent() {
                 let here = self.by_slide(&input.command, &input.motor_offset);
                 self.senses.forget(here);
@@ -252,6 +265,10 @@ impl Corrector {
         self.watch.stand(&input.command);
         self.senses
             .forget(self.by_slide(&input.command, &input.motor_offset));
+        if self.settings.lead_s.is_some() {
+            // The path may be under way already: its beginning is no corner.
+            self.quiet = self.forgets();
+        }
         self.started = true;
     }
 
@@ -272,16 +289,25 @@ impl Corrector {
 
     /// What the output is beside the input stays for a moment; all else of the correction ends.
     fn end_at_once(&mut self, input: &Input) {
-        for ((left, last), command) in self.left.iter_mut().zip(self.last).zip(input.command) {
+        // A controller that adds the offset itself has moved its path and kept the offset.
+        let kept = match self.settings.lead_s {
+            Some(_) => self.history.back(1),
+            None => &input.command,
+        };
+        for ((left, last), command) in self.left.iter_mut().zip(self.last).zip(kept) {
             *left = last - command;
         }
         self.left_done = 0.0;
         self.delayed = false;
         self.fade = Fade::silent();
         self.guard = Guard::new();
-        // Until the last set-points from before have left the filter.
-        self.quiet = self.history.latency().saturating_mul(2).saturating_add(2);
+        self.quiet = self.forgets();
         self.counters.resets = self.counters.resets.wrapping_add(1);
+    }
+
+    /// Ticks until the last set-points from before have left the filter.
+    fn forgets(&self) -> usize {
+        self.history.latency().saturating_mul(2).saturating_add(2)
     }
 
     fn by_slide(&self, places: &[f64; JOINTS], motor_offset: &[f64; JOINTS]) -> [f64; 3] {
@@ -319,8 +345,13 @@ impl Corrector {
         // Half a take-up, and half a tick, because a reversal is noticed so late on average.
         let share = self.history.tick_s() / self.settings.take_up_s;
         let lead = (0.5 / share + 1.0) as usize;
-        let ahead = self.history.back(latency.saturating_sub(lead));
-        let ahead_m = self.by_slide(ahead, &input.motor_offset);
+        let mut back = latency.saturating_sub(lead);
+        if let Some(lead_s) = self.settings.lead_s {
+            // Where a slide will turn nobody can know: it is seen when it has.
+            back = 0;
+            advance(&mut place, latency as f64 * self.history.tick_s() + lead_s);
+        }
+        let ahead_m = self.by_slide(self.history.back(back), &input.motor_offset);
         place.sensed = self.senses.tick(ahead_m, share);
         place
     }

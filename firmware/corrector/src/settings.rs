@@ -2,8 +2,8 @@
 
 /// Most joints.
 pub const JOINTS: usize = 9;
-/// Shortest and longest period of a tick, s.
-pub const PERIOD_S: [f64; 2] = [250.0e-6, 4.0e-3];
+/// Shortest and longest period of a tick, s: servo threads, and the doors of robots (path correction takes one place in 48 ms).
+pub const PERIOD_S: [f64; 2] = [250.0e-6, 50.0e-3];
 
 /// Numbers and places that do not change while it runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,6 +22,8 @@ pub struct Settings {
     pub(crate) engage_s: f64,
     /// Time in which play is taken up at a reversal, s.
     pub(crate) take_up_s: f64,
+    /// `Some`: set-points pass undelayed, and the offset is that of the place so long after the newest one, s.
+    pub(crate) lead_s: Option<f64>,
 }
 
 /// Why settings cannot be used: the name of the first that is wrong.
@@ -38,6 +40,7 @@ impl Settings {
         window_s: 0.015,
         engage_s: 0.5,
         take_up_s: 0.008,
+        lead_s: None,
     };
 
     /// Settings for joints that move these axes: a letter a joint, as LinuxCNC's `coordinates` (`XYZ`, `XZ`, `XYYZ`).
@@ -95,6 +98,23 @@ impl Settings {
             Ok(Self { window_s, ..self })
         } else {
             Err(SettingsError("window_ms"))
+        }
+    }
+
+    /// For a controller that adds the offset to a path of its own, `lead_s` after it has sent the place: nothing is delayed, and
+    /// the offset is the one of the place ahead. The path is taken to go on along its circle or line until then; where one
+    /// begins or ends the offset is late by `lead_s` and twice the window.
+    ///
+    /// # Errors
+    /// Not within 0 and 0.5 s.
+    pub fn with_lead(self, lead_s: f64) -> Result<Self, SettingsError> {
+        if (0.0..=0.5).contains(&lead_s) {
+            Ok(Self {
+                lead_s: Some(lead_s),
+                ..self
+            })
+        } else {
+            Err(SettingsError("lead_s"))
         }
     }
 

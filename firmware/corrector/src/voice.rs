@@ -1,5 +1,5 @@
 //! The offset that one zone of a table asks for at one place of the path: the opposite of the machine's error there.
-use crate::arc::{OnArc, Turn};
+use crate::arc::{Ahead, OnArc, Turn};
 use crate::history::History;
 use crate::law::ZoneLaw;
 use crate::senses::Sensed;
@@ -14,6 +14,8 @@ pub(crate) struct Place {
     pub(crate) acceleration_m_s2: [f64; 3],
     pub(crate) turn: Turn,
     pub(crate) sensed: [Sensed; 3],
+    /// How what is taken from the history turns until the place that is corrected; `None`: it is the same place.
+    pub(crate) ahead: Option<Ahead>,
 }
 
 /// A friction pulse: what is up of it, and what the turn under way adds, m.
@@ -59,6 +61,9 @@ impl Voice {
             if let Some(joint) = joint {
                 *offset = history.operated(joint, &zone.operator) / metre;
             }
+        }
+        if let Some(ahead) = &at.ahead {
+            offset = ahead.turned(offset);
         }
         if zone.has_terms {
             self.by_motion(zone, at, &mut offset);

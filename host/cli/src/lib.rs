@@ -4,6 +4,7 @@
 
 mod analyze;
 mod bounds_in_words;
+mod bridge;
 mod bypass;
 mod campaign_edit;
 mod choice;
@@ -123,6 +124,8 @@ enum Command {
     Run(run::Args),
     /// Live view of the controller in the terminal.
     Monitor(monitor::Args),
+    /// Corrected set-points to a robot controller over its own protocol.
+    Bridge(bridge::Args),
     /// Start a virtual controller.
     Controller(controller::Args),
     /// The whole loop on a bundled campaign and a simulated machine.
@@ -161,6 +164,7 @@ fn dispatch(command: Command, out: Output) -> Result<(), Failure> {
         Command::Config(args) => config::run(args, out),
         Command::Run(args) => run::run(args, out),
         Command::Monitor(args) => monitor::run(args, out),
+        Command::Bridge(args) => bridge::run(args, out),
         Command::Controller(args) => controller::run(args, out),
         Command::Demo(args) => demo::run(args, out),
         Command::Completions(args) => completions::run(args, Cli::command(), out),
