@@ -5,6 +5,7 @@
 mod analyze;
 mod bounds_in_words;
 mod bypass;
+mod calibrate;
 mod campaign_edit;
 mod choice;
 mod compare;
@@ -125,6 +126,8 @@ enum Command {
     Monitor(monitor::Args),
     /// Start a virtual controller.
     Controller(controller::Args),
+    /// Plan, run, record, diagnose, flash and prove in one go; take the table back without gain.
+    Calibrate(calibrate::Args),
     /// The whole loop on a bundled campaign and a simulated machine.
     Demo(demo::Args),
     /// Script that completes commands and options in a shell.
@@ -162,6 +165,7 @@ fn dispatch(command: Command, out: Output) -> Result<(), Failure> {
         Command::Run(args) => run::run(args, out),
         Command::Monitor(args) => monitor::run(args, out),
         Command::Controller(args) => controller::run(args, out),
+        Command::Calibrate(args) => calibrate::run(args, out),
         Command::Demo(args) => demo::run(args, out),
         Command::Completions(args) => completions::run(args, Cli::command(), out),
         Command::Man(args) => man::run(args, Cli::command(), out),

@@ -13,6 +13,7 @@ mod prove;
 
 pub use learn::{Learned, learn};
 pub use picture::picture;
+pub(crate) use prove::record;
 pub use prove::{CIRCLES, Measured, Pair, Proof, Size, prove};
 
 use giotto::diagnosis::DiagnosisError;
