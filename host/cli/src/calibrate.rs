@@ -1,5 +1,7 @@
 //! `giotto calibrate`: plan, run, record the machine's own feedback, diagnose, flash, prove, and take the table back if it
 //! does not help.
+mod linuxcnc;
+
 use super::choice::whole;
 use super::demo::{um, word};
 use super::grid::{Grid, width};
@@ -11,8 +13,10 @@ use giotto::campaign::Campaign;
 use giotto::diagnosis::{self, Diagnosis, diagnose};
 use giotto::simulation::{CircleTest, Machine, Plan};
 use giotto::table_from_model::table_from_model;
+use giotto_link::linuxcnc::drive;
 use giotto_link::{Controller, Port};
 use giotto_shared::Direction;
+use giotto_shared::table::Table;
 use giotto_shared::wire::Command;
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
@@ -40,6 +44,9 @@ pub struct Args {
     /// Highest centripetal acceleration; without it the controller's.
     #[arg(long, value_name = "MM_S2", value_parser = length)]
     max_acceleration: Option<f64>,
+    /// Where the campaigns of LinuxCNC are kept, a folder that is not there yet; without it they are forgotten.
+    #[arg(long, short, value_name = "FOLDER")]
+    output: Option<PathBuf>,
     /// Seed of every random draw.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u64>)]
     seed: u64,
@@ -77,17 +84,61 @@ const UNSEEN: [&str; 3] = [
     "their own scale",
 ];
 
+/// What the controller moves.
+enum Behind {
+    /// A simulated machine, and what measures it.
+    Simulated(Box<Plan>),
+    /// The machine of a LinuxCNC; campaigns in this folder.
+    LinuxCnc(PathBuf, Option<tempfile::TempDir>),
+}
+
+impl Behind {
+    const fn is_simulated(&self) -> bool {
+        matches!(self, Self::Simulated(_))
+    }
+
+    /// Runs the circles with the correction off.
+    fn measure(
+        &self,
+        controller: &mut Controller,
+        circles: &[(f64, f64)],
+        seed: u64,
+    ) -> Result<Campaign, Failure> {
+        controller.command(Command::Bypass { on: true })?;
+        match self {
+            Self::Simulated(plan) => simulated(controller, plan, circles, seed),
+            Self::LinuxCnc(folder, _) => linuxcnc::measure(circles, &folder.join("plan")),
+        }
+    }
+
+    /// Flashes a table and runs circles without and with it.
+    fn prove(
+        &self,
+        controller: &mut Controller,
+        table: &Table,
+        circles: &[(f64, f64)],
+        seed: u64,
+    ) -> Result<Proof, Failure> {
+        match self {
+            Self::Simulated(plan) => {
+                Ok(prove(controller, plan, table, circles, seed, &mut |_| ())?)
+            }
+            Self::LinuxCnc(folder, _) => linuxcnc::prove(controller, table, circles, folder),
+        }
+    }
+}
+
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let machine = behind(&args)?;
     let mut controller = args.port.open(out)?;
-    let limits = Limits::of(&args, &mut controller)?;
+    let limits = Limits::of(&args, &machine, &mut controller)?;
     let circles = limits.circles();
-    propose(&limits, &circles, &controller, out);
+    propose(&limits, &circles, &controller, machine.is_simulated(), out);
     agreed(args.yes, "Move the machine", out)?;
 
     let bar = out.spinner("measuring");
-    let campaign = measure(&mut controller, &machine, &circles, args.seed);
+    let campaign = machine.measure(&mut controller, &circles, args.seed);
     bar.finish_and_clear();
     let campaign = campaign?;
     let bar = out.spinner("diagnosing");
@@ -114,14 +165,7 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         .map_err(|error| Failure::input(format_args!("the model has no table: {error}")))?;
 
     let bar = out.spinner("proving");
-    let proof = prove(
-        &mut controller,
-        &machine,
-        &table.table,
-        &limits.proof(),
-        args.seed,
-        &mut |step| bar.set_message(step.to_owned()),
-    );
+    let proof = machine.prove(&mut controller, &table.table, &limits.proof(), args.seed);
     bar.finish_and_clear();
     let proof = proof?;
     let kept = helps(proof.before(), proof.after());
@@ -129,14 +173,9 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         controller.command(Command::Rollback)?;
     }
     if out.json {
-        out.document(&document(
-            &args,
-            &controller,
-            &circles,
-            &found,
-            &proof,
-            kept,
-        ))?;
+        let mut document = document(&args, &controller, &circles, &found, &proof, kept);
+        document["simulated"] = json!(machine.is_simulated());
+        out.document(&document)?;
     } else {
         show_proof(&proof, &args, out);
     }
@@ -150,15 +189,10 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
 }
 
 /// The machine that is moved and looked at.
-fn behind(args: &Args) -> Result<Plan, Failure> {
+fn behind(args: &Args) -> Result<Behind, Failure> {
     match args.port.kind() {
         Port::Sim | Port::Qemu | Port::QemuBoard(_) => {}
-        Port::LinuxCnc => {
-            return Err(Failure::controller(
-                "LinuxCNC plans its motion itself: giotto cannot start its programs",
-            )
-            .help("giotto plan CAMPAIGN --gcode FILE.ngc writes the circles, halsampler records them (guide: LinuxCNC)"));
-        }
+        Port::LinuxCnc => return in_linuxcnc(args),
         Port::Device(name) => {
             return Err(Failure::controller(format_args!(
                 "{name} gives no feedback: a controller of giotto sends set-points and hears nothing of the machine"
@@ -173,7 +207,27 @@ fn behind(args: &Args) -> Result<Plan, Failure> {
     if args.measure == Eyes::Encoders {
         plan.machine = seen_by_encoders(&plan.machine);
     }
-    Ok(plan)
+    Ok(Behind::Simulated(Box::new(plan)))
+}
+
+fn in_linuxcnc(args: &Args) -> Result<Behind, Failure> {
+    if args.machine.is_some() || args.measure != Eyes::Encoders {
+        return Err(Failure::usage(
+            "LinuxCNC has a machine of its own, and its encoders measure",
+        ));
+    }
+    if let Some(folder) = &args.output {
+        if folder.exists() {
+            return Err(Failure::input(format_args!(
+                "{}: is there already",
+                folder.display()
+            )));
+        }
+        return Ok(Behind::LinuxCnc(folder.clone(), None));
+    }
+    let folder = tempfile::tempdir()
+        .map_err(|error| Failure::input(format_args!("no folder for the runs: {error}")))?;
+    Ok(Behind::LinuxCnc(folder.path().to_path_buf(), Some(folder)))
 }
 
 /// The part of a machine that its own encoders see.
@@ -207,22 +261,32 @@ fn tenths(value: f64) -> f64 {
 }
 
 impl Limits {
-    fn of(args: &Args, controller: &mut Controller) -> Result<Self, Failure> {
-        let (config, _) = controller.config()?;
-        // Circles lie about the origin of the first two slides.
-        let room_mm = config.soft_nm.iter().take(2).flatten();
-        let room_mm = room_mm.fold(f64::INFINITY, |room, nm| {
-            room.min(f64::from(*nm).abs() * 1e-6)
-        });
+    fn of(args: &Args, machine: &Behind, controller: &mut Controller) -> Result<Self, Failure> {
+        let (room_mm, feed_mm_s, acceleration_mm_s2) = if machine.is_simulated() {
+            let (config, _) = controller.config()?;
+            // Circles lie about the origin of the first two slides.
+            let soft = config.soft_nm.iter().take(2).flatten();
+            let room_mm = soft.fold(f64::INFINITY, |room, nm| {
+                room.min(f64::from(*nm).abs() * 1e-6)
+            });
+            let [feed, acceleration] = [config.feed_m_s, config.acceleration_m_s2];
+            (
+                room_mm,
+                1e3 * f64::from(feed),
+                1e3 * f64::from(acceleration),
+            )
+        } else {
+            let of = drive::limits()?;
+            (of.room_mm, of.feed_mm_s, of.acceleration_mm_s2)
+        };
+        let least = |given: Option<f64>, limit: f64| given.unwrap_or(limit).min(limit);
         let limits = Self {
             radius_mm: args
                 .max_radius
                 .unwrap_or(USUAL_RADIUS_MM)
                 .min(SHARE * room_mm),
-            feed_mm_s: (args.max_feed.unwrap_or(f64::INFINITY))
-                .min(SHARE * 1e3 * f64::from(config.feed_m_s)),
-            acceleration_mm_s2: (args.max_acceleration.unwrap_or(f64::INFINITY))
-                .min(SHARE * 1e3 * f64::from(config.acceleration_m_s2)),
+            feed_mm_s: least(args.max_feed, SHARE * feed_mm_s),
+            acceleration_mm_s2: least(args.max_acceleration, SHARE * acceleration_mm_s2),
         };
         if limits.radius_mm < 1.0 {
             return Err(Failure::controller(format_args!(
@@ -260,9 +324,20 @@ fn duration_s(circles: &[(f64, f64)]) -> f64 {
     circles.iter().map(both_ways).sum()
 }
 
-fn propose(limits: &Limits, circles: &[(f64, f64)], controller: &Controller, out: Output) {
+fn propose(
+    limits: &Limits,
+    circles: &[(f64, f64)],
+    controller: &Controller,
+    simulated: bool,
+    out: Output,
+) {
+    let which = if simulated {
+        "the machine is SIMULATED"
+    } else {
+        "the machine will MOVE"
+    };
     out.say(format_args!(
-        "{}: the machine is SIMULATED. {} circles about the origin, R {:.0} to {:.0} mm, up to {:.0} mm/s and {:.0} mm/s², both ways: {:.0} s of motion.",
+        "{}: {which}. {} circles about the origin, R {:.0} to {:.0} mm, up to {:.0} mm/s and {:.0} mm/s², both ways: {:.0} s of motion.",
         controller.port(),
         2 * circles.len(),
         RADII[2] * limits.radius_mm,
@@ -294,14 +369,13 @@ fn agreed(yes: bool, question: &str, out: Output) -> Result<(), Failure> {
     Err(Failure::interrupted("not agreed: nothing was done"))
 }
 
-/// Runs the circles with the correction off.
-fn measure(
+/// Circles on a simulated machine.
+fn simulated(
     controller: &mut Controller,
     machine: &Plan,
     circles: &[(f64, f64)],
     seed: u64,
 ) -> Result<Campaign, Failure> {
-    controller.command(Command::Bypass { on: true })?;
     let mut runs = Vec::new();
     for (radius_mm, feed_mm_s) in circles {
         for direction in [Direction::Ccw, Direction::Cw] {
@@ -407,7 +481,6 @@ fn document(
         .collect();
     json!({
         "port": controller.port(),
-        "simulated": true,
         "measured_by": if eyes { "encoders" } else { "ballbar" },
         "plan": circles.iter().map(pair).collect::<Vec<_>>(),
         "motion_s": duration_s(circles),

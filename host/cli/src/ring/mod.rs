@@ -11,6 +11,7 @@ mod learn;
 mod picture;
 mod prove;
 
+pub(crate) use learn::image;
 pub use learn::{Learned, learn};
 pub use picture::picture;
 pub(crate) use prove::record;
