@@ -73,6 +73,12 @@ enum Command {
         /// The component; without it the one that was built beside this program.
         #[arg(long)]
         component: Option<PathBuf>,
+        /// The play of the machine lies behind its servo instead of ahead of it.
+        #[arg(long)]
+        play_behind: bool,
+        /// Programs, samples and campaigns stay in this folder.
+        #[arg(long, value_name = "FOLDER")]
+        keep: Option<PathBuf>,
         /// One JSON document.
         #[arg(long)]
         json: bool,
@@ -123,9 +129,23 @@ fn main() -> ExitCode {
         Command::Link { json, check } => run_link(json, check),
         Command::Linuxcnc {
             component,
+            play_behind,
+            keep,
             json,
             check,
-        } => return run_linuxcnc(component, json, check),
+        } => {
+            let setup = linuxcnc::Setup {
+                component: component.unwrap_or_else(|| beside("libgiotto_linuxcnc.so")),
+                giotto: beside("giotto"),
+                play: if play_behind {
+                    linuxcnc::Play::Behind
+                } else {
+                    linuxcnc::Play::Ahead
+                },
+                keep,
+            };
+            return run_linuxcnc(&setup, json, check);
+        }
         Command::Rate { json, check } => run_rate(json, check),
         Command::Size {
             board,
@@ -266,16 +286,15 @@ fn run_link(as_json: bool, check: bool) -> Result<ExitCode, ControllerError> {
     })
 }
 
-/// The component that cargo has built beside this program.
-fn built_component() -> PathBuf {
+/// What cargo has built beside this program.
+fn beside(name: &str) -> PathBuf {
     let mut path = std::env::current_exe().unwrap_or_default();
     path.pop();
-    path.join("libgiotto_linuxcnc.so")
+    path.join(name)
 }
 
-fn run_linuxcnc(component: Option<PathBuf>, as_json: bool, check: bool) -> ExitCode {
-    let component = component.unwrap_or_else(built_component);
-    let report = match linuxcnc::run(&component, &mut |text: &str| eprintln!("{text}")) {
+fn run_linuxcnc(setup: &linuxcnc::Setup, as_json: bool, check: bool) -> ExitCode {
+    let report = match linuxcnc::run(setup, &mut |text: &str| eprintln!("{text}")) {
         Ok(report) => report,
         Err(error) => {
             eprintln!("{error}");
@@ -305,6 +324,14 @@ fn run_linuxcnc(component: Option<PathBuf>, as_json: bool, check: bool) -> ExitC
             "update: {median:.2} us median, {longest:.2} us at most; {} runs diagnosed",
             report.runs
         );
+        let [before, after] = report.touched;
+        println!(
+            "output not the input to the bit: {before} ticks before the first enable, {after} after the last; contour under bypass {:.2} um",
+            report.bypassed_um
+        );
+        for command in &report.commands {
+            println!("did: {command}");
+        }
         for finding in &report.findings {
             println!("found: {finding}");
         }

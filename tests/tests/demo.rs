@@ -101,7 +101,7 @@ fn circles_of_the_proof_are_not_in_the_campaign() {
 fn proven(table: &Table, seed: u64) -> Proof {
     let plan = bundled().expect("the bundled plan is a plan");
     let mut controller = open(&Port::Sim, &OpenOptions::default(), &mut |_| {}).expect("sim opens");
-    prove(&mut controller, &plan, table, seed, &mut |_| {}).expect("circles run")
+    prove(&mut controller, &plan, table, &CIRCLES, seed, &mut |_| {}).expect("circles run")
 }
 
 /// The same ring with the correction turned round, and with none: the bar must not be met by accident.

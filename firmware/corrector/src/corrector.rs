@@ -7,7 +7,7 @@
 //! at once: what the output then is beside the input is kept, so that it does not jump, and taken out smoothly.
 use crate::arc::{Ahead, Turn};
 use crate::fade::{Fade, Part};
-use crate::guard::{Guard, within};
+use crate::guard::{Guard, NEAR_M, share};
 use crate::history::History;
 use crate::law::{Here, Law, LawError};
 use crate::senses::{Senses, smooth};
@@ -234,10 +234,13 @@ impl Corrector {
             .look(&input.command, joints, metre, self.history.tick_s());
         let acts = self.delayed || !self.fade.is_silent() || self.guard.last_m() != [0.0; 3];
         let off = seen.off || !input.machine_on;
-        if acts && (off || seen.jumped) {
-            self.end_at_once(input);
-        }
         self.quiet = self.quiet.saturating_sub(1);
+        if off || seen.jumped {
+            self.quiet = self.reach();
+            if acts {
+                self.end_at_once(input);
+            }
+        }
         let wanted = input.enable && input.coordinated && !off && !self.bypass && self.has_table;
         let wanted = wanted && self.quiet == 0;
         let rests = seen.still as usize >= self.history.latency();
@@ -267,7 +270,7 @@ impl Corrector {
             .forget(self.by_slide(&input.command, &input.motor_offset));
         if self.settings.lead_s.is_some() {
             // The path may be under way already: its beginning is no corner.
-            self.quiet = self.forgets();
+            self.quiet = self.reach();
         }
         self.started = true;
     }
@@ -301,13 +304,17 @@ impl Corrector {
         self.delayed = false;
         self.fade = Fade::silent();
         self.guard = Guard::new();
-        self.quiet = self.forgets();
+        self.quiet = self.reach();
         self.counters.resets = self.counters.resets.wrapping_add(1);
     }
 
-    /// Ticks until the last set-points from before have left the filter.
-    fn forgets(&self) -> usize {
-        self.history.latency().saturating_mul(2).saturating_add(2)
+    /// Ticks until set-points from before have left all filters.
+    fn reach(&self) -> usize {
+        let lag_s = self.laws.iter().map(Law::lag_s).fold(0.0, f64::max);
+        // Not negative; a cast saturates.
+        let late = (lag_s / self.history.tick_s()) as usize;
+        let five = self.history.latency().saturating_mul(2);
+        five.saturating_add(late.saturating_add(3))
     }
 
     fn by_slide(&self, places: &[f64; JOINTS], motor_offset: &[f64; JOINTS]) -> [f64; 3] {
@@ -425,24 +432,18 @@ impl Corrector {
             );
             let slide = self.settings.slide.get(joint).copied().flatten();
             let by_law = slide.map_or(0.0, |slide| at(&offset, slide) * self.settings.units_per_m);
-            let add = by_law
-                + if left > 0.0 {
-                    left * at(&self.left, joint)
-                } else {
-                    0.0
-                };
             let mut place = planned;
-            if add != 0.0 {
+            if left > 0.0 {
+                // Between two places that were within the limits.
+                place += left * at(&self.left, joint);
+            }
+            if by_law != 0.0 {
                 let motor = at(&input.motor_offset, joint);
-                let soft = input
-                    .soft
-                    .get(joint)
-                    .copied()
-                    .unwrap_or([0.0; 2])
-                    .map(|limit| limit + motor);
-                let allowed = within(add, planned, soft);
-                place = planned + allowed;
-                cut |= allowed != add;
+                let soft = input.soft.get(joint).copied().unwrap_or([0.0; 2]);
+                let near = NEAR_M * self.settings.units_per_m;
+                let share = share(place, soft.map(|limit| limit + motor), near);
+                place += share * by_law;
+                cut |= share < 1.0;
             }
             if let (Some(command), Some(feedback)) =
                 (out.command.get_mut(joint), out.feedback.get_mut(joint))

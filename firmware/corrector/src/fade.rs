@@ -66,7 +66,7 @@ impl Fade {
         let settled = self.done >= 1.0;
         let begins = settled && wanted != self.to.map(|(part, _)| part);
         if begins {
-            self.begin(wanted, laws, at);
+            self.begin(wanted, laws, at, history);
         }
         let sound = |voice: &mut Option<(Part, Voice)>| match voice {
             Some((part, voice)) => {
@@ -100,13 +100,17 @@ impl Fade {
         offset
     }
 
-    fn begin(&mut self, wanted: Option<Part>, laws: &[Law; 2], at: &Place) {
+    fn begin(&mut self, wanted: Option<Part>, laws: &[Law; 2], at: &Place, history: &History) {
         self.from = self.to;
-        self.to = wanted.map(|part| {
+        let to = wanted.and_then(|part| zone(laws, part).map(|zone| (part, zone)));
+        self.to = to.map(|(part, zone)| {
             // Errors of position go on being counted from where they were.
             let here = self.from.map_or(at.place_m, |(_, voice)| voice.reference_m);
-            let reference = zone(laws, part).and_then(|zone| zone.reference_m());
-            (part, Voice::new(reference.unwrap_or(here)))
+            let reference_m = zone.reference_m().unwrap_or(here);
+            (
+                part,
+                Voice::new(reference_m, history.stencil(&zone.inverse)),
+            )
         });
         self.done = 0.0;
     }

@@ -1,4 +1,6 @@
 //! The last gate before a drive: bounds of the offset and of its change, and the soft limits of a joint.
+use crate::senses::smooth;
+use giotto_shared::bounds::OFFSET_MAX_M;
 
 /// The offset that passed last, by slide, m.
 #[derive(Clone, Copy, Debug, Default)]
@@ -45,24 +47,20 @@ impl Guard {
     }
 }
 
-/// Within so many times its own size from a soft limit an offset toward it is taken back.
-const NEAR: f64 = 8.0;
+/// So near to a soft limit an offset begins to be taken back, m. The largest offset that is possible still cannot lead over it.
+pub(crate) const NEAR_M: f64 = 2.0 * OFFSET_MAX_M as f64;
 
-/// The part of an offset that may be added to a planned place: less and less of it as the place comes near the soft limit
-/// that it leads to, none at the limit, none beyond. It never leads over the limit, and its velocity does not jump.
-pub(crate) fn within(add: f64, planned: f64, [least, most]: [f64; 2]) -> f64 {
-    let room = if add > 0.0 {
-        most - planned
-    } else {
-        planned - least
-    };
-    let near = NEAR * add.abs();
+/// The share of an offset that may be added to a place: less and less as the place comes within `near` of a soft limit, none
+/// at the limit or beyond. It goes by the place alone, for both signs: an offset that changes its sign near a limit would else
+/// be cut in one tick and free in the next.
+pub(crate) fn share(place: f64, [least, most]: [f64; 2], near: f64) -> f64 {
+    let room = (most - place).min(place - least);
     // Limits that are no numbers limit nothing.
     if room >= near || room.is_nan() {
-        return add;
+        1.0
+    } else {
+        smooth(room / near)
     }
-    let share = (room / near).max(0.0);
-    add * share * (2.0 - share)
 }
 
 #[cfg(test)]
@@ -89,19 +87,19 @@ mod tests {
 
     #[test]
     fn soft_limits_hold_where_the_planner_keeps_them() {
-        assert_eq!(within(0.2, 5.0, [0.0, 10.0]), 0.2);
-        assert_eq!(within(-0.2, 5.0, [0.0, 10.0]), -0.2);
-        assert_eq!(within(0.2, 10.0, [0.0, 10.0]), 0.0);
-        // The planner is out: no farther, but back.
-        assert_eq!(within(0.5, 11.0, [0.0, 10.0]), 0.0);
-        assert_eq!(within(-0.5, 11.0, [0.0, 10.0]), -0.5);
-        assert_eq!(within(1.0, 4.0, [f64::NAN, f64::NAN]), 1.0);
-        let mut last = within(0.2, 8.0, [0.0, 10.0]);
-        for step in 0..2000 {
-            let planned = 8.0 + f64::from(step) * 1e-3;
-            let add = within(0.2, planned, [0.0, 10.0]);
-            assert!(planned + add <= 10.0 && (add - last).abs() < 0.5e-3);
-            last = add;
+        let soft = [0.0, 100.0];
+        assert_eq!(share(50.0, soft, 10.0), 1.0);
+        for beyond in [100.0, 101.0, 0.0, -1.0] {
+            assert_eq!(share(beyond, soft, 10.0), 0.0);
+        }
+        assert_eq!(share(4.0, [f64::NAN, f64::NAN], 10.0), 1.0);
+        let mut last = 1.0;
+        for step in 0..=12_000 {
+            let place = 88.0 + f64::from(step) * 1e-3;
+            let share = share(place, soft, 10.0);
+            // Half of NEAR_M is the largest offset.
+            assert!(place + 5.0 * share <= 100.0 && share <= last && last - share < 2e-4);
+            last = share;
         }
     }
 }

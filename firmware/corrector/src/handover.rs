@@ -6,6 +6,7 @@
 //!   magic, version          written once by the component, the magic last
 //!   status                  written by the component each tick, between `begun` and `ended`: a reader that finds them
 //!                           equal, `ended` read first and `begun` last, has the words of one tick
+//!   seen                    written by the component before `ended`: set-points and feedback of the last ticks, by tick
 //!   taken, verdict          written by the component when it has looked at an offer
 //!   offered, length, image  written by the program; `offered` last, one byte that counts. Not written again until `taken`
 //!                           is equal to it: nobody reads a table that is being written. If it happened, its CRC would not hold
@@ -22,11 +23,26 @@ use giotto_shared::table::MAX_IMAGE_BYTES;
 /// Says that a page is one.
 pub const MAGIC: u32 = u32::from_le_bytes(*b"giot");
 /// Layout of the page.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 /// Longest path of a table, bytes.
 pub const MAX_PATH: usize = 1024;
 /// Where the page is.
 pub const PAGE_PATH: &str = "/dev/shm/giotto-linuxcnc";
+
+/// Ticks kept in [`Page::seen`], a power of two: a reader may be as late as that.
+pub const SEEN: usize = 8192;
+
+const _: () = assert!(SEEN.is_power_of_two());
+
+/// What one tick had, by slide, machine coordinates, nm.
+#[repr(C)]
+#[derive(Debug)]
+pub struct Seen {
+    /// Set-points as they came.
+    pub commanded_nm: [AtomicI32; 3],
+    /// Feedback as it came.
+    pub measured_nm: [AtomicI32; 3],
+}
 
 /// Bits of [`Page::state`].
 pub mod state {
@@ -108,11 +124,12 @@ pub struct Page {
     pub image: [AtomicU8; MAX_IMAGE_BYTES],
     /// Path of the table that was given at load; ends with 0.
     pub path: [AtomicU8; MAX_PATH],
+    /// The last ticks: that of tick t at t mod [`SEEN`].
+    pub seen: [Seen; SEEN],
 }
 
-/// Rest of a joint that has not moved for so long, ticks of latency or one.
+/// Saturates; a place farther than 2.1 m is shown as that.
 fn nm(metres: f64) -> i32 {
-    // Saturates; a place farther than 2.1 m is shown as that.
     (metres * 1e9) as i32
 }
 
@@ -214,6 +231,10 @@ impl Taker {
             command: output.command,
             ..*input
         });
+        let measured = corrector.slides_m(&Input {
+            command: input.feedback,
+            ..*input
+        });
         marks::write(&page.begun, &page.ended, counters.ticks, || {
             page.state.store(state, Relaxed);
             page.latency_ns.store((latency_s * 1e9) as u32, Relaxed);
@@ -225,6 +246,15 @@ impl Taker {
             {
                 to.store(nm(*metres.0), Relaxed);
                 from.store(nm(metres.1), Relaxed);
+            }
+            if let Some(seen) = page.seen.get(counters.ticks as usize & (SEEN - 1)) {
+                let of = |to: &[AtomicI32; 3], from: [f64; 3]| {
+                    for (to, metres) in to.iter().zip(from) {
+                        to.store(nm(metres), Relaxed);
+                    }
+                };
+                of(&seen.commanded_nm, raw);
+                of(&seen.measured_nm, measured);
             }
             page.offset_cuts.store(counters.offset_cuts, Relaxed);
             page.slew_cuts.store(counters.slew_cuts, Relaxed);

@@ -1,10 +1,8 @@
 //! The last set-points of all joints, and the derivatives at a place two strides before the newest.
 //!
-//! As in the engine's stream mode the whole operator A·p″ + B·p⁗ is one symmetric filter over five set-points a stride
-//! `h` apart, with weights whose second and fourth moments are exactly those of the operator: its error is of order
-//! (h·d/dt)⁶.
+//! What undoes the machine's chain is one filter over five of them a stride `h` apart ([`crate::stencil`]).
 use crate::settings::JOINTS;
-use giotto_shared::law::Operator;
+use crate::stencil::{Inverse, Stencil};
 
 /// Set-points kept, a power of two.
 const PLACES: usize = 1024;
@@ -83,16 +81,24 @@ impl History {
         }
     }
 
-    /// What the operator adds to a joint at the place that is corrected.
-    pub(crate) fn operated(&self, joint: usize, operator: &Operator<f64>) -> f64 {
-        let [p0, p1, p2, p3, p4] = self.five(joint);
-        let h = self.stride as f64 * self.tick_s;
-        let square = h * h;
-        let second = operator.second_s2 / square;
-        let fourth = 12.0 * operator.fourth_s4 / (square * square);
-        let outer = (fourth - second) / 12.0;
-        let inner = second - 4.0 * outer;
-        inner * (p1 + p3 - 2.0 * p2) + outer * (p0 + p4 - 2.0 * p2)
+    /// The weights that undo a chain at this period.
+    pub(crate) fn stencil(&self, inverse: &Inverse) -> Stencil {
+        Stencil::new(inverse, self.stride, self.tick_s, PLACES - 1)
+    }
+
+    /// What a stencil adds to a joint at the place that is corrected. Nothing, exactly, where all stood still.
+    pub(crate) fn offset(&self, joint: usize, stencil: &Stencil) -> f64 {
+        let at = |ticks: usize| self.back(ticks).get(joint).copied().unwrap_or(0.0);
+        let base = at(self.latency());
+        let newest = stencil
+            .centre
+            .saturating_sub(stencil.stride.saturating_mul(2));
+        let places =
+            (0..5).map(|k: usize| at(newest.saturating_add(k.saturating_mul(stencil.stride))));
+        let weighted = stencil.weights.iter().zip(places);
+        weighted
+            .map(|(weight, place)| weight * (place - base))
+            .sum()
     }
 
     /// A joint's set-points a stride apart, the newest first.
@@ -108,6 +114,7 @@ impl History {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use giotto_shared::model::Cumulants;
     use std::boxed::Box;
 
     /// A polynomial of fifth degree has its derivatives exactly, and the operator its second and fourth.
@@ -127,12 +134,13 @@ mod tests {
             "{at:?}"
         );
         assert!((at.acceleration - 10.0).abs() < 1e-8, "{at:?}");
-        let operator = Operator {
-            second_s2: -2.7e-4,
-            fourth_s4: 3.1e-8,
-        };
-        let expected = operator.offset(10.0, 24.0 * 700.0);
-        assert!((history.operated(4, &operator) - expected).abs() < 1e-12);
+        let stencil = history.stencil(&Inverse::new(&Cumulants {
+            kappa2_s2: 5.4e-4,
+            kappa4_s4: -6.0 * 2.916e-7,
+        }));
+        // Outside what a lag and an average have: −κ2/2 and κ2²/8 − κ4/24.
+        let expected = -2.7e-4 * 10.0 + (3.645e-8 + 7.29e-8) * 24.0 * 700.0;
+        assert!((history.offset(4, &stencil) - expected).abs() < 1e-12);
         assert_eq!(history.latency(), 30);
     }
 }

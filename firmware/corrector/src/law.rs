@@ -1,6 +1,7 @@
-//! A table in the form that the tick runs: operator and merged terms of each zone, in double precision, SI.
+//! A table in the form that the tick runs: inverse and merged terms of each zone, in double precision, SI.
+use crate::stencil::Inverse;
 use giotto_shared::bounds::{OFFSET_MAX_M, SLEW_MAX_M_S};
-use giotto_shared::law::{Operator, Profile};
+use giotto_shared::law::Profile;
 use giotto_shared::model::Cumulants;
 use giotto_shared::table::{self, MAX_ZONES, Table, TableError, Travel, Zone};
 use giotto_shared::term::{ProfileError, Term};
@@ -19,7 +20,7 @@ pub enum LawError {
 /// One zone.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ZoneLaw {
-    pub(crate) operator: Operator<f64>,
+    pub(crate) inverse: Inverse,
     pub(crate) profile: Profile<f64>,
     /// Whether any profile term is there at all.
     pub(crate) has_terms: bool,
@@ -56,7 +57,7 @@ impl ZoneLaw {
             [[x0, x1], [y0, y1], [z0, z1]].map(|range| range.map(f64::from))
         });
         Ok(Self {
-            operator: Operator::new(&Cumulants {
+            inverse: Inverse::new(&Cumulants {
                 kappa2_s2: f64::from(zone.cumulants.kappa2_s2),
                 kappa4_s4: f64::from(zone.cumulants.kappa4_s4),
             }),
@@ -133,6 +134,12 @@ impl Law {
             slew_m_s: f64::from(place.limits.slew_m_s.min(SLEW_MAX_M_S)),
         };
         Ok(())
+    }
+
+    /// Longest lag of a zone, s.
+    pub(crate) fn lag_s(&self) -> f64 {
+        let lags = self.zones.iter().flatten().map(|zone| zone.inverse.lag_s);
+        lags.fold(0.0, f64::max)
     }
 
     /// The first zone that holds here.

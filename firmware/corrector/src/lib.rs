@@ -9,6 +9,7 @@
 //! | `settings` | what is said once: joints and their slides, units, times |
 //! | `law` | a table in the form that the tick runs |
 //! | `history` | the last set-points, their derivatives |
+//! | `stencil` | what undoes the machine's chain, as weights of five set-points |
 //! | `watch` | whether the machine rests, whether its planner follows the feedback |
 //! | `senses` | which way each slide travels: for play and friction |
 //! | `arc` | the circle that the path is on, if any |
@@ -37,6 +38,7 @@ mod law;
 pub mod marks;
 mod senses;
 mod settings;
+mod stencil;
 mod voice;
 mod watch;
 

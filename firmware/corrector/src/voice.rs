@@ -4,6 +4,7 @@ use crate::history::History;
 use crate::law::ZoneLaw;
 use crate::senses::Sensed;
 use crate::settings::Settings;
+use crate::stencil::Stencil;
 use core::f64::consts::TAU;
 
 /// What all voices see of the place that is corrected, SI, by slide.
@@ -33,12 +34,14 @@ pub(crate) struct Voice {
     /// By slide.
     pulse: [Pulse; 3],
     on_arc: OnArc,
+    stencil: Stencil,
 }
 
 impl Voice {
-    pub(crate) const fn new(reference_m: [f64; 3]) -> Self {
+    pub(crate) const fn new(reference_m: [f64; 3], stencil: Stencil) -> Self {
         Self {
             reference_m,
+            stencil,
             pulse: [Pulse {
                 now_m: 0.0,
                 rise_m: 0.0,
@@ -59,7 +62,7 @@ impl Voice {
         let metre = settings.units_per_m;
         for (offset, joint) in offset.iter_mut().zip(settings.joint) {
             if let Some(joint) = joint {
-                *offset = history.operated(joint, &zone.operator) / metre;
+                *offset = history.offset(joint, &self.stencil) / metre;
             }
         }
         if let Some(ahead) = &at.ahead {

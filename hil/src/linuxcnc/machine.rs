@@ -4,6 +4,8 @@
 //! joint.N.motor-pos-cmd → giotto.N → play (sum2, deadzone) → average (a chain of sum2) → lag (lowpass) → scale → measured
 //!                                                                                                      → giotto.N.fb-in
 //! ```
+//! The play lies ahead of the servo, as that of LinuxCNC's own BACKLASH and of a slide that is measured directly, or behind it,
+//! between lag and scale, as that of a screw that nothing measures.
 use std::fmt::Write as _;
 
 /// Axes.
@@ -24,6 +26,16 @@ const ACCELERATION: f64 = 10_000.0;
 /// Soft limits, mm.
 const LIMIT: f64 = 500.0;
 
+/// Where the play lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Play {
+    /// Ahead of the servo.
+    #[default]
+    Ahead,
+    /// Behind it.
+    Behind,
+}
+
 /// LinuxCNC's configuration.
 pub(super) fn ini() -> String {
     let mut out = format!(
@@ -32,7 +44,7 @@ pub(super) fn ini() -> String {
          [TASK]\nTASK = milltask\nCYCLE_TIME = 0.005\n\
          [RS274NGC]\nPARAMETER_FILE = machine.var\n\
          [EMCMOT]\nEMCMOT = motmod\nCOMM_TIMEOUT = 4.0\nSERVO_PERIOD = 1000000\n\
-         [HAL]\nHALFILE = machine.hal\n\
+         [HAL]\nHALFILE = machine.hal\nHALUI = halui\n\
          [EMCIO]\nEMCIO = io\nCYCLE_TIME = 0.1\n\
          [TRAJ]\nCOORDINATES = X Y Z\nLINEAR_UNITS = mm\nANGULAR_UNITS = degree\nDEFAULT_LINEAR_VELOCITY = 50\n\
          MAX_LINEAR_VELOCITY = {FEED}\nMAX_LINEAR_ACCELERATION = {ACCELERATION}\nNO_FORCE_HOMING = 1\n\
@@ -52,96 +64,158 @@ pub(super) fn ini() -> String {
     out
 }
 
+/// Names of the parts of one axis.
+struct Parts {
+    axis: usize,
+    gap: String,
+    place: String,
+    chain: Vec<String>,
+    change: String,
+    average: String,
+    touched: String,
+}
+
+/// `sum2`s of an axis: two of the play, the average's chain, its difference and sum, what was added.
+const SUMS: usize = 2 + AVERAGE_TICKS + 3;
+
+impl Parts {
+    fn new(axis: usize) -> Self {
+        let sum = |k: usize| format!("sum2.{}", axis * SUMS + k);
+        Self {
+            axis,
+            gap: sum(0),
+            place: sum(1),
+            chain: (0..AVERAGE_TICKS).map(|k| sum(2 + k)).collect(),
+            change: sum(2 + AVERAGE_TICKS),
+            average: sum(3 + AVERAGE_TICKS),
+            touched: sum(4 + AVERAGE_TICKS),
+        }
+    }
+
+    /// Set-points through giotto, the feedback back through it, and a bit of what was added as large as a number.
+    fn giotto(&self) -> String {
+        let Self { axis, touched, .. } = self;
+        format!(
+            "setp giotto.{axis}.min -{LIMIT}\nsetp giotto.{axis}.max {LIMIT}\n\
+             net cmd{axis} joint.{axis}.motor-pos-cmd => giotto.{axis}.in {touched}.in1 sampler.0.pin.{axis}\n\
+             net moff{axis} joint.{axis}.motor-offset => giotto.{axis}.motor-offset\n\
+             net out{axis} giotto.{axis}.out => {touched}.in0\n\
+             setp {touched}.gain0 {LOUD}\nsetp {touched}.gain1 -{LOUD}\n\
+             net touched{axis} {touched}.out => sampler.0.pin.{}\n\
+             net fb{axis} giotto.{axis}.fb-out => joint.{axis}.motor-pos-fb\n",
+            2 * AXES + axis
+        )
+    }
+
+    /// Play between two signals: the place follows once the gap is used up.
+    fn play(&self, from: &str, to: &str) -> String {
+        let Self {
+            axis, gap, place, ..
+        } = self;
+        format!(
+            "setp {gap}.gain1 -1\nsetp deadzone.{axis}.threshold {PLAY_MM}\n\
+             net {from}{axis} => {gap}.in0\n\
+             net gap{axis} {gap}.out => deadzone.{axis}.in\n\
+             net pull{axis} deadzone.{axis}.out => {place}.in1\n\
+             net {to}{axis} {place}.out => {place}.in0 {gap}.in1\n"
+        )
+    }
+
+    /// Average and lag between two signals.
+    fn servo(&self, from: &str, to: &str) -> String {
+        let Self {
+            axis,
+            chain,
+            change,
+            average,
+            ..
+        } = self;
+        let (share, gain) = (1.0 / AVERAGE_TICKS as f64, 1.0 - (-TICK_S / LAG_S).exp());
+        let mut out = format!("net {from}{axis} => {}.in0 {change}.in0\n", chain[0]);
+        for (k, pair) in chain.windows(2).enumerate() {
+            let _ = writeln!(out, "net tap{axis}-{k} {}.out => {}.in0", pair[0], pair[1]);
+        }
+        out + &format!(
+            "setp {change}.gain0 {share}\nsetp {change}.gain1 -{share}\n\
+             net oldest{axis} {}.out => {change}.in1\n\
+             net change{axis} {change}.out => {average}.in1\n\
+             net mean{axis} {average}.out => {average}.in0 lowpass.{axis}.in\n\
+             setp lowpass.{axis}.gain {gain:.9}\nnet {to}{axis} lowpass.{axis}.out\n",
+            chain[AVERAGE_TICKS - 1]
+        )
+    }
+
+    /// The scale, and what is measured.
+    fn scale(&self, from: &str) -> String {
+        let axis = self.axis;
+        let scale = if axis == 0 { 1.0 + SCALE_X } else { 1.0 };
+        format!(
+            "net {from}{axis} => scale.{axis}.in\nsetp scale.{axis}.gain {scale}\n\
+             net at{axis} scale.{axis}.out => giotto.{axis}.fb-in sampler.0.pin.{}\n",
+            axis + AXES
+        )
+    }
+
+    /// The parts in the order of their work.
+    fn order(&self, play: Play) -> Vec<String> {
+        let axis = self.axis;
+        let gap = [
+            self.gap.clone(),
+            format!("deadzone.{axis}"),
+            self.place.clone(),
+        ];
+        // The chain from its end: each takes what the one before had in the last tick.
+        let servo = [self.change.clone(), self.average.clone()]
+            .into_iter()
+            .chain(self.chain.iter().rev().cloned())
+            .chain([format!("lowpass.{axis}")]);
+        let mut order = vec![self.touched.clone()];
+        match play {
+            Play::Ahead => order.extend(gap.into_iter().chain(servo)),
+            Play::Behind => order.extend(servo.chain(gap)),
+        }
+        order.push(format!("scale.{axis}"));
+        order
+    }
+}
+
+/// What is added is sampled times this, so that its last bit shows among the digits.
+const LOUD: f64 = 1e15;
+
 /// Its HAL.
-pub(super) fn hal() -> String {
-    // By axis: difference and sum of the play, the average's chain, its difference and sum.
-    let per_axis = 2 + AVERAGE_TICKS + 2;
-    let sum = |axis: usize, k: usize| format!("sum2.{}", axis * per_axis + k);
+pub(super) fn hal(play: Play) -> String {
     let mut out = format!(
         "loadrt [KINS]KINEMATICS\n\
          loadrt [EMCMOT]EMCMOT servo_period_nsec=[EMCMOT]SERVO_PERIOD num_joints=[KINS]JOINTS\n\
          loadrt giotto joints={AXES}\n\
          loadrt sum2 count={}\nloadrt deadzone count={AXES}\nloadrt lowpass count={AXES}\nloadrt scale count={AXES}\n\
-         loadrt sampler depth=40000 cfg=ffffffs\nsetp sampler.0.enable 0\n\
+         loadrt sampler depth=40000 cfg=fffffffffs\nsetp sampler.0.enable 0\n\
          addf motion-command-handler servo-thread\naddf motion-controller servo-thread\naddf giotto.update servo-thread\n",
-        AXES * per_axis
+        AXES * SUMS
     );
-    let mut line = |text: String| {
-        out += &text;
-        out.push('\n');
-    };
-    let gain = 1.0 - (-TICK_S / LAG_S).exp();
     for axis in 0..AXES {
-        let (gap, place) = (sum(axis, 0), sum(axis, 1));
-        let chain: Vec<String> = (0..AVERAGE_TICKS).map(|k| sum(axis, 2 + k)).collect();
-        let (change, average) = (sum(axis, 2 + AVERAGE_TICKS), sum(axis, 3 + AVERAGE_TICKS));
-        line(format!(
-            "net cmd{axis} joint.{axis}.motor-pos-cmd => giotto.{axis}.in sampler.0.pin.{axis}"
-        ));
-        line(format!(
-            "net moff{axis} joint.{axis}.motor-offset => giotto.{axis}.motor-offset"
-        ));
-        line(format!(
-            "setp giotto.{axis}.min -{LIMIT}\nsetp giotto.{axis}.max {LIMIT}"
-        ));
-        // The place follows once the gap is used up.
-        line(format!("net out{axis} giotto.{axis}.out => {gap}.in0"));
-        line(format!(
-            "setp {gap}.gain1 -1\nsetp deadzone.{axis}.threshold {PLAY_MM}"
-        ));
-        line(format!("net gap{axis} {gap}.out => deadzone.{axis}.in"));
-        line(format!("net pull{axis} deadzone.{axis}.out => {place}.in1"));
-        line(format!(
-            "net play{axis} {place}.out => {place}.in0 {gap}.in1 {}.in0 {change}.in0",
-            chain[0]
-        ));
-        for (k, pair) in chain.windows(2).enumerate() {
-            line(format!(
-                "net tap{axis}-{k} {}.out => {}.in0",
-                pair[0], pair[1]
-            ));
-        }
-        let share = 1.0 / AVERAGE_TICKS as f64;
-        line(format!(
-            "setp {change}.gain0 {share}\nsetp {change}.gain1 -{share}"
-        ));
-        line(format!(
-            "net oldest{axis} {}.out => {change}.in1",
-            chain[AVERAGE_TICKS - 1]
-        ));
-        line(format!("net change{axis} {change}.out => {average}.in1"));
-        line(format!(
-            "net mean{axis} {average}.out => {average}.in0 lowpass.{axis}.in"
-        ));
-        line(format!("setp lowpass.{axis}.gain {gain:.9}"));
-        line(format!(
-            "net lag{axis} lowpass.{axis}.out => scale.{axis}.in"
-        ));
-        let scale = if axis == 0 { 1.0 + SCALE_X } else { 1.0 };
-        line(format!("setp scale.{axis}.gain {scale}"));
-        line(format!(
-            "net at{axis} scale.{axis}.out => giotto.{axis}.fb-in sampler.0.pin.{}",
-            axis + AXES
-        ));
-        line(format!(
-            "net fb{axis} giotto.{axis}.fb-out => joint.{axis}.motor-pos-fb"
-        ));
-        let order = [gap, format!("deadzone.{axis}"), place, change, average];
-        // The chain from its end: each takes what the one before had in the last tick.
-        let order = order.into_iter().chain(chain.into_iter().rev());
-        for part in order.chain([format!("lowpass.{axis}"), format!("scale.{axis}")]) {
-            line(format!("addf {part} servo-thread"));
+        let parts = Parts::new(axis);
+        out += &parts.giotto();
+        out += &match play {
+            Play::Ahead => [parts.play("out", "play"), parts.servo("play", "drive")].concat(),
+            Play::Behind => [parts.servo("out", "drive"), parts.play("drive", "play")].concat(),
+        };
+        out += &parts.scale(match play {
+            Play::Ahead => "drive",
+            Play::Behind => "play",
+        });
+        for part in parts.order(play) {
+            let _ = writeln!(out, "addf {part} servo-thread");
         }
     }
-    line(format!(
-        "net kind motion.motion-type => sampler.0.pin.{}",
-        2 * AXES
-    ));
-    line("addf sampler.0 servo-thread".to_owned());
-    line("net on motion.motion-enabled => giotto.machine-on".to_owned());
-    line("net coordinated motion.coord-mode => giotto.coordinated".to_owned());
-    line("net estop iocontrol.0.user-enable-out => iocontrol.0.emc-enable-in".to_owned());
-    line("net prepare iocontrol.0.tool-prepare => iocontrol.0.tool-prepared".to_owned());
-    line("net change iocontrol.0.tool-change => iocontrol.0.tool-changed".to_owned());
-    out
+    let kind = 3 * AXES;
+    out + &format!(
+        "net kind motion.motion-type => sampler.0.pin.{kind}\naddf sampler.0 servo-thread\n\
+         net on motion.motion-enabled => giotto.machine-on\n\
+         net coordinated motion.coord-mode => giotto.coordinated\n\
+         net estop iocontrol.0.user-enable-out => iocontrol.0.emc-enable-in\n\
+         net prepare iocontrol.0.tool-prepare => iocontrol.0.tool-prepared\n\
+         net change iocontrol.0.tool-change => iocontrol.0.tool-changed\n\
+         net giotto-stop giotto.stop => halui.abort\n"
+    )
 }

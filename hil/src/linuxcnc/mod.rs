@@ -6,24 +6,25 @@
 //!
 //! | file | holds |
 //! |---|---|
+//! | `commands` | the program `giotto` against the running component |
 //! | `machine` | the machine of LinuxCNC's own components, its INI and HAL |
 //! | `session`, `driver.py` | LinuxCNC started as an ordinary user, and told what to do |
 //! | `samples` | what halsampler writes |
 //! | `programs` | circles, and a part |
+mod commands;
 mod machine;
 mod programs;
 mod samples;
 mod session;
 
+use commands::Commands;
 use giotto::analysis::of_campaign;
 use giotto::campaign::import::{Format, Laps, Options, add};
 use giotto::campaign::{Direction, Plane, read};
 use giotto::diagnosis::{self, diagnose};
 use giotto::model_file::ModelFile;
 use giotto::planning::{self, Limits, propose};
-use giotto::table_from_model::table_from_model;
-use giotto_link::{Controller, OpenOptions, Port, open};
-use giotto_shared::table::{MAX_IMAGE_BYTES, image};
+pub use machine::Play;
 pub use programs::Circle;
 use serde_json::{Value, json};
 pub use session::LinuxCncError;
@@ -34,6 +35,9 @@ use std::path::{Path, PathBuf};
 pub const BARS_PERCENT: [f64; 3] = [98.0, 70.0, 90.0];
 /// What the function may take, µs: the median.
 pub const UPDATE_BAR_US: f64 = 20.0;
+
+/// By so much may the contour error differ between a correction switched off and none.
+const BYPASSED: f64 = 0.01;
 
 /// What one way of correcting, or none, leaves.
 #[derive(Clone, Debug, Default)]
@@ -86,8 +90,12 @@ pub struct Report {
     pub findings: Vec<String>,
     /// Runs that were diagnosed.
     pub runs: usize,
-    /// Largest difference of set-point and output before the first enable and after the last, mm.
-    pub touched_mm: f64,
+    /// Ticks of the proof before the first enable, and of the part after the last, in which the output was not the input to the bit.
+    pub touched: [usize; 2],
+    /// The part's contour error while the correction was switched off by `bypass on`, µm.
+    pub bypassed_um: f64,
+    /// Commands of `giotto` that did what they say.
+    pub commands: Vec<String>,
     /// Time of the function: the median of looks, and the longest, µs.
     pub update_us: [f64; 2],
 }
@@ -101,6 +109,8 @@ impl Report {
             .zip(BARS_PERCENT)
             .all(|(gain, bar)| *gain >= bar)
             && self.update_us[0] <= UPDATE_BAR_US
+            && self.touched == [0; 2]
+            && (self.bypassed_um / self.before.contour_um - 1.0).abs() < BYPASSED
     }
 
     /// One JSON document.
@@ -115,7 +125,8 @@ impl Report {
         };
         json!({
             "before": left(&self.before), "component": left(&self.component), "compensate": left(&self.compensated),
-            "findings": self.findings, "runs": self.runs, "update_us": self.update_us, "bars_percent": BARS_PERCENT,
+            "findings": self.findings, "runs": self.runs, "touched_ticks": self.touched,
+            "bypassed_contour_um": self.bypassed_um, "commands": self.commands, "update_us": self.update_us, "bars_percent": BARS_PERCENT,
             "met": self.meets_bars(),
         })
     }
@@ -131,15 +142,30 @@ const fn circle(radius_mm: f64, feed_mm_s: f64, ccw: bool, plane: Plane) -> Circ
     }
 }
 
-/// With what the first look is taken.
-const FIRST: [Circle; 6] = [
-    circle(60.0, 200.0, true, Plane::Xy),
-    circle(60.0, 200.0, false, Plane::Xy),
-    circle(60.0, 400.0, true, Plane::Xy),
-    circle(60.0, 400.0, false, Plane::Xy),
-    circle(100.0, 400.0, true, Plane::Xy),
-    circle(30.0, 300.0, false, Plane::Xy),
+/// With what the first look is taken, each both ways: slow circles, which show play and scale sharply, and fast ones in all planes.
+const FIRST: [(f64, f64, Plane); 12] = [
+    (60.0, 20.0, Plane::Xy),
+    (30.0, 50.0, Plane::Xy),
+    (100.0, 200.0, Plane::Xy),
+    (60.0, 400.0, Plane::Xy),
+    (30.0, 20.0, Plane::Yz),
+    (60.0, 50.0, Plane::Yz),
+    (20.0, 300.0, Plane::Yz),
+    (30.0, 100.0, Plane::Yz),
+    (100.0, 20.0, Plane::Zx),
+    (30.0, 50.0, Plane::Zx),
+    (60.0, 100.0, Plane::Zx),
+    (30.0, 300.0, Plane::Zx),
 ];
+
+fn first() -> Vec<Circle> {
+    FIRST
+        .into_iter()
+        .flat_map(|(radius_mm, feed_mm_s, plane)| {
+            [true, false].map(|ccw| circle(radius_mm, feed_mm_s, ccw, plane))
+        })
+        .collect()
+}
 
 /// With what it is proven.
 const PROOF: [Circle; 7] = [
@@ -185,15 +211,15 @@ fn import(
         .map_err(failed)
 }
 
-/// Runs circles and adds them to a campaign.
+/// Runs circles and adds them to a campaign; in how many ticks the component changed anything.
 fn measure(
     session: &mut Session,
     name: &str,
     program: &[u8],
     circles: &[(f64, f64, Direction)],
     campaign: &Path,
-) -> Result<(), LinuxCncError> {
-    let recording = samples::run(session, name, program, 240)?;
+) -> Result<usize, LinuxCncError> {
+    let recording = samples::run(session, name, program, 800)?;
     let recorded = recording.runs();
     // A plan begins with a warm-up.
     let warm_up = usize::from(name == "plan");
@@ -207,25 +233,28 @@ fn measure(
         )));
     }
     for (k, (rows, (radius_mm, feed_mm_s, direction))) in runs.iter().zip(circles).enumerate() {
-        let file = samples::write(rows, session.folder.path(), &format!("{name}{k:02}.txt"))?;
+        let file = samples::write(rows, &session.folder, &format!("{name}{k:02}.txt"))?;
         import(file, campaign, *radius_mm, *feed_mm_s, *direction).map_err(|error| {
             failed(format!(
                 "{name}, R {radius_mm} mm, {feed_mm_s} mm/s: {error}"
             ))
         })?;
     }
-    Ok(())
+    Ok(recording.touched())
+}
+
+/// The circles and the part, run once.
+struct Proof {
+    left: Left,
+    /// Ticks in which the component changed anything.
+    touched: usize,
 }
 
 /// Runs the proof; `programs`: circles and part, as they are or compensated.
-fn prove(session: &mut Session, name: &str, programs: [&[u8]; 2]) -> Result<Left, LinuxCncError> {
+fn prove(session: &mut Session, name: &str, programs: [&[u8]; 2]) -> Result<Proof, LinuxCncError> {
     let [circles, part] = programs;
     let folder = session.place(format!("{name}-campaign"));
-    let list: Vec<(f64, f64, Direction)> = PROOF
-        .iter()
-        .map(|c| (c.radius_mm, c.feed_mm_s, c.direction))
-        .collect();
-    measure(session, name, circles, &list, &folder)?;
+    let touched = measure(session, name, circles, &listed(&PROOF), &folder)?;
     let campaign = read(&folder).map_err(failed)?;
     let report = of_campaign(&campaign)
         .map_err(|(run, error)| failed(format!("{name}, run {run}: {error}")))?;
@@ -235,9 +264,12 @@ fn prove(session: &mut Session, name: &str, programs: [&[u8]; 2]) -> Result<Left
         .map(|run| [run.radius_error_m * 1e6, run.out_of_roundness_m * 1e6])
         .collect();
     let recording = samples::run(session, &format!("{name}-part"), part, 60)?;
-    Ok(Left {
-        circles_um,
-        contour_um: samples::contour(&recording.rows) * 1e3,
+    Ok(Proof {
+        left: Left {
+            circles_um,
+            contour_um: samples::contour(&recording.rows) * 1e3,
+        },
+        touched: touched + recording.touched(),
     })
 }
 
@@ -292,36 +324,35 @@ fn model_of(
     Ok((diagnosis.model, findings, campaign.runs.len()))
 }
 
-/// Flashes over the protocol.
-fn flash(model: &ModelFile) -> Result<Controller, LinuxCncError> {
-    let table = table_from_model(model).map_err(failed)?.table;
-    let mut bytes = vec![0; MAX_IMAGE_BYTES];
-    let length = image::encode(&table, &mut bytes).map_err(failed)?;
-    bytes.truncate(length);
-    let mut controller =
-        open(&Port::LinuxCnc, &OpenOptions::default(), &mut |_| ()).map_err(failed)?;
-    controller.flash(&bytes, &mut |_| ()).map_err(failed)?;
-    Ok(controller)
+/// What the scenario is run with.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    /// The component.
+    pub component: PathBuf,
+    /// The program `giotto`.
+    pub giotto: PathBuf,
+    /// Where the play lies.
+    pub play: Play,
+    /// Programs, samples and campaigns stay here.
+    pub keep: Option<PathBuf>,
 }
 
-/// Runs the scenario with a component.
+/// Runs the scenario.
 ///
 /// # Errors
 /// [`LinuxCncError::Skipped`] where there is no LinuxCNC.
-pub fn run(component: &Path, note: &mut dyn FnMut(&str)) -> Result<Report, LinuxCncError> {
-    let mut session = Session::start(component)?;
+pub fn run(setup: &Setup, note: &mut dyn FnMut(&str)) -> Result<Report, LinuxCncError> {
+    let mut commands = Commands::new(&setup.giotto)?;
+    let mut session = Session::start(&setup.component, setup.play, setup.keep.as_deref())?;
     session.order(&json!({ "do": "up" }))?;
     note("LinuxCNC runs; first circles");
     let campaign = session.place("campaign");
-    let list: Vec<(f64, f64, Direction)> = FIRST
-        .iter()
-        .map(|c| (c.radius_mm, c.feed_mm_s, c.direction))
-        .collect();
+    let circles = first();
     measure(
         &mut session,
         "first",
-        programs::circles(&FIRST).as_bytes(),
-        &list,
+        programs::circles(&circles).as_bytes(),
+        &listed(&circles),
         &campaign,
     )?;
     planned(&mut session, &campaign, note)?;
@@ -332,31 +363,69 @@ pub fn run(component: &Path, note: &mut dyn FnMut(&str)) -> Result<Report, Linux
     note("the proof without correction");
     let before = prove(&mut session, "before", plain)?;
     note("the same programs, compensated");
+    let compensated = compensated(&mut session, &model, plain, note)?;
+
+    note("flashed into the running component; the proof with it");
+    let file = session.place("model.toml");
+    model.save(&file).map_err(failed)?;
+    commands.flash(&file)?;
+    session.set("giotto.enable", "1")?;
+    let component = prove(&mut session, "component", plain)?;
+    let update_us = update_us(&mut session)?;
+    note("the other commands");
+    commands.there_and_back(&campaign)?;
+    commands.bypass(true)?;
+    let bypassed = samples::run(&mut session, "bypassed", part.as_bytes(), 60)?;
+    commands.bypass(false)?;
+    commands.stop(&mut session)?;
+    session.set("giotto.enable", "0")?;
+    let after = samples::run(&mut session, "after", part.as_bytes(), 60)?;
+    Ok(Report {
+        circles: PROOF.to_vec(),
+        touched: [before.touched, after.touched()],
+        before: before.left,
+        component: component.left,
+        compensated: compensated.left,
+        findings,
+        runs,
+        bypassed_um: samples::contour(&bypassed.rows) * 1e3,
+        commands: commands.done,
+        update_us,
+    })
+}
+
+fn listed(circles: &[Circle]) -> Vec<(f64, f64, Direction)> {
+    circles
+        .iter()
+        .map(|c| (c.radius_mm, c.feed_mm_s, c.direction))
+        .collect()
+}
+
+/// The proof with rewritten programs.
+fn compensated(
+    session: &mut Session,
+    model: &ModelFile,
+    plain: [&[u8]; 2],
+    note: &mut dyn FnMut(&str),
+) -> Result<Proof, LinuxCncError> {
     let options = giotto_nc::Options {
         acceleration_mm_s2: 8000.0,
         max_offset_mm: 5.0,
         all_planes: true,
         ..giotto_nc::Options::default()
     };
-    let rewritten = plain.map(|program| giotto_nc::compensate(program, &model, &options).program);
-    let compensated = prove(&mut session, "compensated", [&rewritten[0], &rewritten[1]])?;
-
-    note("flashed into the running component; the proof with it");
-    drop(flash(&model)?);
-    session.set("giotto.enable", "1")?;
-    let component = prove(&mut session, "component", plain)?;
-    let update_us = update_us(&mut session)?;
-    session.set("giotto.enable", "0")?;
-    Ok(Report {
-        circles: PROOF.to_vec(),
-        before,
-        component,
-        compensated,
-        findings,
-        runs,
-        touched_mm: 0.0,
-        update_us,
-    })
+    let rewritten = plain.map(|program| {
+        let done = giotto_nc::compensate(program, model, &options);
+        let corrected =
+            |arc: &&giotto_nc::Report| matches!(arc.fate, giotto_nc::Fate::Corrected { .. });
+        let rewritten = done.arcs.iter().filter(corrected).count();
+        note(&format!(
+            "{rewritten} of {} arcs rewritten",
+            done.arcs.len()
+        ));
+        done.program
+    });
+    prove(session, "compensated", [&rewritten[0], &rewritten[1]])
 }
 
 /// Runs the program of `giotto plan`.
@@ -390,5 +459,5 @@ fn planned(
         .map(|step| (step.radius_mm, step.feed_mm_s, step.direction))
         .collect();
     let program = plan.gcode(&campaign.name);
-    measure(session, "plan", program.as_bytes(), &list, folder)
+    measure(session, "plan", program.as_bytes(), &list, folder).map(drop)
 }

@@ -50,7 +50,7 @@ pub(super) fn circles(list: &[Circle]) -> String {
         let _ = write!(
             out,
             "{code}\nG1 {u}-{lead:.4} {v}{low:.4} F6000\nM0\nG1 {u}0 {v}{low:.4} F{feed:.3}\n\
-             {arc} {u}0 {v}{low:.4} {i}0 {j}{r:.4}\n{arc} {u}{r:.4} {v}0 {i}0 {j}{up:.4}\n\
+             {arc} {u}0 {v}{low:.4} {i}0 {j}{up:.4}\n{arc} {u}{r:.4} {v}0 {i}0 {j}{up:.4}\n\
              {arc} {u}0 {v}{high:.4} {i}-{r:.4} {j}0\n{arc} {u}-{r:.4} {v}0 {i}0 {j}{down:.4}\nM0\n",
             up = side * r,
             high = side * r,

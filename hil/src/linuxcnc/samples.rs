@@ -14,6 +14,8 @@ pub(super) struct Row {
     /// mm.
     pub(super) commanded: [f64; AXES],
     pub(super) measured: [f64; AXES],
+    /// What was sent to the drives is not what the planner said, in any bit.
+    pub(super) touched: bool,
     /// The planner is on an arc.
     arc: bool,
 }
@@ -26,16 +28,17 @@ pub(super) struct Recording {
 fn row(line: &str) -> Option<Row> {
     let mut words = line.split_whitespace();
     let tick = words.next()?.parse().ok()?;
-    let mut places = [[0.0; AXES]; 2];
+    let mut places = [[0.0; AXES]; 3];
     for place in places.iter_mut().flatten() {
         *place = words.next()?.parse().ok()?;
     }
-    let [commanded, measured] = places;
+    let [commanded, measured, added] = places;
     let arc = words.next()? == ARC;
     Some(Row {
         tick,
         commanded,
         measured,
+        touched: added != [0.0; AXES],
         arc,
     })
 }
@@ -72,6 +75,11 @@ const STOP_TICKS: usize = 250;
 const MARGIN_TICKS: usize = 100;
 
 impl Recording {
+    /// Ticks in which the component changed anything.
+    pub(super) fn touched(&self) -> usize {
+        self.rows.iter().filter(|row| row.touched).count()
+    }
+
     /// The rows of each run. A program stands still before and after each, and between two positions itself, without arcs;
     /// a busy computer makes further stops there.
     pub(super) fn runs(&self) -> Vec<&[Row]> {

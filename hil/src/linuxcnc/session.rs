@@ -1,5 +1,5 @@
 //! LinuxCNC started as an ordinary user, driven over a socket.
-use super::machine;
+use super::machine::{self, Play};
 use serde_json::{Value, json};
 use std::ffi::OsStr;
 use std::io::{BufRead, BufReader, Write};
@@ -31,13 +31,17 @@ const MODULES: &str = "/usr/lib/linuxcnc/modules";
 /// The account of those who have none.
 const NOBODY: u32 = 65534;
 const START_WITHIN: Duration = Duration::from_secs(40);
+/// A program of the first campaign takes five minutes.
+const ANSWER_WITHIN: Duration = Duration::from_secs(900);
 const END_WITHIN: Duration = Duration::from_secs(20);
 
 /// A LinuxCNC that runs; it ends with this.
 pub(super) struct Session {
     child: Child,
     lines: Option<BufReader<TcpStream>>,
-    pub(super) folder: tempfile::TempDir,
+    pub(super) folder: PathBuf,
+    /// Goes with the session, unless somebody wants to keep its files.
+    _temporary: Option<tempfile::TempDir>,
 }
 
 fn found(program: &str) -> bool {
@@ -79,18 +83,35 @@ fn install(component: &Path) -> Result<(), LinuxCncError> {
 
 impl Session {
     /// Starts the machine.
-    pub(super) fn start(component: &Path) -> Result<Self, LinuxCncError> {
+    pub(super) fn start(
+        component: &Path,
+        play: Play,
+        keep: Option<&Path>,
+    ) -> Result<Self, LinuxCncError> {
         install(component)?;
         let failed = |e: std::io::Error| LinuxCncError::failed(e);
-        let folder = tempfile::tempdir().map_err(failed)?;
+        let temporary = match keep {
+            Some(_) => None,
+            None => Some(tempfile::tempdir().map_err(failed)?),
+        };
+        let folder = match (keep, &temporary) {
+            (Some(keep), _) => {
+                std::fs::create_dir_all(keep).map_err(failed)?;
+                keep.canonicalize().map_err(failed)?
+            }
+            (None, temporary) => temporary
+                .as_ref()
+                .map(|folder| folder.path().to_path_buf())
+                .unwrap_or_default(),
+        };
         let files = [
             ("machine.ini", machine::ini()),
-            ("machine.hal", machine::hal()),
+            ("machine.hal", machine::hal(play)),
             ("driver.py", include_str!("driver.py").to_owned()),
         ];
-        let mut places: Vec<PathBuf> = vec![folder.path().to_path_buf()];
+        let mut places: Vec<PathBuf> = vec![folder.clone()];
         for (name, text) in files {
-            let place = folder.path().join(name);
+            let place = folder.join(name);
             std::fs::write(&place, text).map_err(failed)?;
             places.push(place);
         }
@@ -116,11 +137,11 @@ impl Session {
         } else {
             Command::new("linuxcnc")
         };
-        let log = std::fs::File::create(folder.path().join("linuxcnc.log")).map_err(failed)?;
+        let log = std::fs::File::create(folder.join("linuxcnc.log")).map_err(failed)?;
         let child = command
             .arg("machine.ini")
-            .current_dir(folder.path())
-            .env("HOME", folder.path())
+            .current_dir(&folder)
+            .env("HOME", &folder)
             .env("GIOTTO_DRIVER", &address)
             .stdin(Stdio::null())
             .stdout(log.try_clone().map_err(failed)?)
@@ -131,6 +152,7 @@ impl Session {
             child,
             lines: None,
             folder,
+            _temporary: temporary,
         };
         session.lines = Some(session.accept(&listener)?);
         Ok(session)
@@ -142,7 +164,7 @@ impl Session {
         loop {
             if let Ok((stream, _)) = listener.accept() {
                 let set = stream.set_nonblocking(false);
-                set.and_then(|()| stream.set_read_timeout(Some(Duration::from_secs(180))))
+                set.and_then(|()| stream.set_read_timeout(Some(ANSWER_WITHIN)))
                     .map_err(LinuxCncError::failed)?;
                 return Ok(BufReader::new(stream));
             }
@@ -159,7 +181,7 @@ impl Session {
 
     /// What LinuxCNC has said; it writes some of that into its user's home.
     fn log(&self) -> String {
-        let read = |name: &str| std::fs::read_to_string(self.folder.path().join(name));
+        let read = |name: &str| std::fs::read_to_string(self.folder.join(name));
         ["linuxcnc.log", "linuxcnc_print.txt", "linuxcnc_debug.txt"]
             .into_iter()
             .filter_map(|name| read(name).ok())
@@ -199,7 +221,7 @@ impl Session {
 
     /// A file in the machine's folder.
     pub(super) fn place(&self, name: impl AsRef<OsStr>) -> PathBuf {
-        self.folder.path().join(name.as_ref())
+        self.folder.join(name.as_ref())
     }
 }
 

@@ -5,7 +5,8 @@ use super::failure::Failure;
 use super::grid::{Grid, width};
 use super::output::Output;
 use crate::ring::{
-    DemoError, LEFT_M, Learned, Proof, REDUCTION_PERCENT, Size, bundled, learn, picture, prove,
+    CIRCLES, DemoError, LEFT_M, Learned, Proof, REDUCTION_PERCENT, Size, bundled, learn, picture,
+    prove,
 };
 use giotto_link::{Controller, OpenOptions, Port, open};
 use giotto_shared::Direction;
@@ -99,6 +100,7 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         &mut controller,
         &plan,
         &learned.table.table,
+        &CIRCLES,
         args.seed,
         &mut |step| bar.set_message(step.to_owned()),
     );
@@ -129,14 +131,14 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     )))
 }
 
-fn um(size: Size) -> Value {
+pub(super) fn um(size: Size) -> Value {
     json!({
         "radius_error_rms_um": size.radius_error_rms_m * 1e6,
         "out_of_roundness_um": size.out_of_roundness_m * 1e6,
     })
 }
 
-const fn word(direction: Direction) -> &'static str {
+pub(super) const fn word(direction: Direction) -> &'static str {
     match direction {
         Direction::Ccw => "ccw",
         Direction::Cw => "cw",

@@ -6,6 +6,7 @@ mod analyze;
 mod bounds_in_words;
 mod bridge;
 mod bypass;
+mod calibrate;
 mod campaign_edit;
 mod choice;
 mod compare;
@@ -128,6 +129,8 @@ enum Command {
     Bridge(bridge::Args),
     /// Start a virtual controller.
     Controller(controller::Args),
+    /// Plan, run, record, diagnose, flash and prove in one go; take the table back without gain.
+    Calibrate(calibrate::Args),
     /// The whole loop on a bundled campaign and a simulated machine.
     Demo(demo::Args),
     /// Script that completes commands and options in a shell.
@@ -166,6 +169,7 @@ fn dispatch(command: Command, out: Output) -> Result<(), Failure> {
         Command::Monitor(args) => monitor::run(args, out),
         Command::Bridge(args) => bridge::run(args, out),
         Command::Controller(args) => controller::run(args, out),
+        Command::Calibrate(args) => calibrate::run(args, out),
         Command::Demo(args) => demo::run(args, out),
         Command::Completions(args) => completions::run(args, Cli::command(), out),
         Command::Man(args) => man::run(args, Cli::command(), out),

@@ -26,6 +26,12 @@ impl PortArgs {
         Ok(self.connect(out)?)
     }
 
+    /// What was named.
+    pub(super) fn kind(&self) -> Port {
+        let Ok(port) = self.port.parse::<Port>();
+        port
+    }
+
     /// Baud rate of a serial device.
     pub(super) const fn baud(&self) -> u32 {
         self.baud
@@ -33,7 +39,7 @@ impl PortArgs {
 
     /// As [`Self::open`], for those who look at the error.
     pub(super) fn connect(&self, out: Output) -> Result<Controller, ControllerError> {
-        let Ok(port) = self.port.parse::<Port>();
+        let port = self.kind();
         let options = OpenOptions {
             image: self.image.clone(),
             baud: self.baud,

@@ -105,6 +105,12 @@ pub enum ControllerError {
         /// What was looked for, and what was found.
         reason: String,
     },
+    /// LinuxCNC does not run a program.
+    #[error("linuxcnc: {reason}")]
+    NoProgram {
+        /// What it says.
+        reason: String,
+    },
     /// No emulator.
     #[error("{program} is not installed")]
     NoEmulator {
@@ -138,6 +144,9 @@ impl ControllerError {
             Self::NoComponent { .. } => {
                 "start LinuxCNC with `loadrt giotto joints=3` and `addf giotto.update servo-thread` in its HAL file, as the \
                  user who runs this; the guide's page on LinuxCNC has the lines"
+            }
+            Self::NoProgram { .. } => {
+                "nothing moves any more; LinuxCNC has to be on, homed and idle, and run by the user who runs this"
             }
             Self::InUse { .. } => "close the other program, or wait until it is done",
             Self::NoAnswer { .. } | Self::Lost { .. } => {

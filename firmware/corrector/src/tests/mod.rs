@@ -4,6 +4,7 @@
     reason = "a joint is a number into several arrays at once"
 )]
 mod circles;
+mod contours;
 mod lead;
 mod sessions;
 mod through;

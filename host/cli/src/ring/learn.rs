@@ -59,7 +59,7 @@ pub fn learn(plan: &Plan, seed: u64) -> Result<Learned, DemoError> {
 }
 
 /// The table in the form in which it is flashed.
-pub(super) fn image(table: &Table) -> Result<Vec<u8>, DemoError> {
+pub(crate) fn image(table: &Table) -> Result<Vec<u8>, DemoError> {
     let mut image = vec![0; MAX_IMAGE_BYTES];
     let length = table::encode(table, &mut image)?;
     image.truncate(length);

@@ -11,8 +11,10 @@ mod learn;
 mod picture;
 mod prove;
 
+pub(crate) use learn::image;
 pub use learn::{Learned, learn};
 pub use picture::picture;
+pub(crate) use prove::record;
 pub use prove::{CIRCLES, Measured, Pair, Proof, Size, prove};
 
 use giotto::diagnosis::DiagnosisError;

@@ -112,7 +112,7 @@ impl Proof {
     }
 }
 
-/// Runs [`CIRCLES`] with the correction off, flashes the table, runs them again with the correction on.
+/// Runs circles, radius in mm and feed in mm/s, both ways with the correction off, flashes the table, runs them again with the correction on.
 ///
 /// # Errors
 /// [`DemoError`]: mostly those of the controller.
@@ -120,6 +120,7 @@ pub fn prove(
     controller: &mut Controller,
     plan: &Plan,
     table: &Table,
+    circles: &[(f64, f64)],
     seed: u64,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Proof, DemoError> {
@@ -137,7 +138,7 @@ pub fn prove(
     let mut measure = |bypass: bool| -> Result<Vec<Measured>, DemoError> {
         controller.command(Command::Bypass { on: bypass })?;
         let mut done = Vec::new();
-        for (radius_mm, feed_mm_s) in CIRCLES {
+        for &(radius_mm, feed_mm_s) in circles {
             for direction in [Direction::Ccw, Direction::Cw] {
                 let state = if bypass { "off" } else { "on" };
                 progress(&format!(
@@ -164,7 +165,7 @@ pub fn prove(
     })
 }
 
-/// One circle: set-points from the controller, the machine moved by them, the last steady turn measured.
+/// One circle, measured and analysed.
 fn run(
     controller: &mut Controller,
     plan: &Plan,
@@ -172,6 +173,22 @@ fn run(
     seed: u64,
     stream: u64,
 ) -> Result<Measured, DemoError> {
+    let run = record(controller, plan, test, seed, stream)?;
+    let analysis = analysis::of_run(&run, None)?;
+    Ok(Measured {
+        samples: run.samples,
+        analysis,
+    })
+}
+
+/// One circle: set-points from the controller, the machine moved by them, the last steady turn measured.
+pub(crate) fn record(
+    controller: &mut Controller,
+    plan: &Plan,
+    test: &CircleTest,
+    seed: u64,
+    stream: u64,
+) -> Result<Run, DemoError> {
     let every = (controller.identity().tick_hz / RATE_HZ).clamp(1, u32::from(u16::MAX)) as u16;
     let recording = controller.run_circle(
         &circle(test.radius_m, test.feed_m_s, test.direction, LAPS),
@@ -200,7 +217,7 @@ fn run(
     let trace = path.lap(&test, turn.start_s, turn.turn_s);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(stream);
-    let run = Run {
+    Ok(Run {
         file: String::new(),
         radius_m: test.radius_m,
         feed_m_s: test.feed_m_s,
@@ -212,11 +229,6 @@ fn run(
         frame: test.frame,
         setup: None,
         samples: plan.instrument.record(&test, &trace, &mut rng),
-    };
-    let analysis = analysis::of_run(&run, None)?;
-    Ok(Measured {
-        samples: run.samples,
-        analysis,
     })
 }
 

@@ -6,9 +6,11 @@
 //!
 //! | file | holds |
 //! |---|---|
+//! | `drive`, `drive.py` | LinuxCNC runs a program, and what the component sees of it |
 //! | `page` | the page, read and written as a file |
 //! | `motion` | what the server asks of an engine |
 //! | `store` | the flash as a file |
+pub mod drive;
 mod motion;
 mod page;
 mod store;

@@ -1,6 +1,6 @@
 //! The page of the component, read and written as the file that it is.
 use crate::error::ControllerError;
-use giotto_corrector::handover::{self, MAGIC, MAX_PATH, PAGE_PATH, VERSION};
+use giotto_corrector::handover::{self, MAGIC, MAX_PATH, PAGE_PATH, SEEN, VERSION};
 use giotto_shared::table::MAX_IMAGE_BYTES;
 use std::ffi::OsString;
 use std::fs::{File, OpenOptions, TryLockError};
@@ -13,8 +13,8 @@ use std::time::{Duration, Instant};
 
 /// So long an offer may wait to be taken: while an earlier one is being exchanged.
 const TAKEN_WITHIN: Duration = Duration::from_secs(2);
-/// Two looks at a tick that stands still lie so far apart.
-const STILL: Duration = Duration::from_millis(100);
+/// A tick that has not moved for so long stands still: a busy computer holds threads up that are not real-time.
+const STILL: Duration = Duration::from_secs(1);
 
 type Shared = handover::Page;
 
@@ -48,7 +48,19 @@ fn no(reason: String) -> ControllerError {
     ControllerError::NoComponent { reason }
 }
 
+/// The reader was slower than the page remembers.
+fn late() -> io::Error {
+    io::Error::other("this computer was too busy: samples were overwritten before they were read")
+}
+
 impl Page {
+    /// To read alone, beside whoever has it.
+    pub(super) fn watch() -> Result<Self, ControllerError> {
+        let file = File::open(PAGE_PATH).map_err(|error| no(format!("{PAGE_PATH}: {error}")))?;
+        Self::checked(file)
+    }
+
+    /// For this program alone.
     pub(super) fn open() -> Result<Self, ControllerError> {
         let file = OpenOptions::new().read(true).write(true).open(PAGE_PATH);
         let file = file.map_err(|error| no(format!("{PAGE_PATH}: {error}")))?;
@@ -61,6 +73,11 @@ impl Page {
             }
             Err(TryLockError::Error(error)) => return Err(no(format!("{PAGE_PATH}: {error}"))),
         }
+        Self::checked(file)
+    }
+
+    /// The page of this release.
+    fn checked(file: File) -> Result<Self, ControllerError> {
         let page = Self { file };
         let word = |at| {
             page.word(at)
@@ -141,6 +158,42 @@ impl Page {
                 return Ok(words);
             }
         }
+    }
+
+    /// Set-points and feedback of the ticks from `first` to the last one written, nm.
+    ///
+    /// # Errors
+    /// Some of them are overwritten already.
+    pub(super) fn seen(&self, first: u32) -> io::Result<Vec<[[i32; 3]; 2]>> {
+        const ENTRY: usize = size_of::<handover::Seen>();
+        let ended = self.word(offset_of!(Shared, ended))?;
+        let count = ended.wrapping_sub(first).wrapping_add(1) as usize;
+        if count > SEEN {
+            return Err(late());
+        }
+        if count == 0 {
+            return Ok(Vec::new());
+        }
+        let mut seen = Vec::with_capacity(count);
+        for k in 0..count {
+            let entry = first.wrapping_add(k as u32) as usize & (SEEN - 1);
+            let bytes: [u8; ENTRY] = self.bytes(offset_of!(Shared, seen) + entry * ENTRY)?;
+            let mut nm = [[0; 3]; 2];
+            for (nm, four) in nm
+                .as_flattened_mut()
+                .iter_mut()
+                .zip(bytes.as_chunks::<4>().0)
+            {
+                *nm = i32::from_le_bytes(*four);
+            }
+            seen.push(nm);
+        }
+        // The component went on meanwhile: has it come round to what was read?
+        let begun = self.word(offset_of!(Shared, begun))?;
+        if begun.wrapping_sub(first) as usize >= SEEN {
+            return Err(late());
+        }
+        Ok(seen)
     }
 
     /// Process that runs the component.

@@ -1,0 +1,213 @@
+//! Paths whose curvature changes, through chains of several kinds: how far the machine leaves the path.
+use super::*;
+use std::boxed::Box;
+
+const TICK_S: f64 = 1e-3;
+/// Feed, mm/s, and radius of the arcs, mm.
+const FEED: f64 = 150.0;
+const RADIUS: f64 = 30.0;
+
+/// One element of a chain, in time steps of its own: no cumulant is known here.
+trait Acts {
+    fn tick(&mut self, input: f64) -> f64;
+}
+
+struct Lag {
+    at: f64,
+    lag_s: f64,
+    /// Velocity feed-forward.
+    share: f64,
+}
+
+impl Acts for Lag {
+    fn tick(&mut self, input: f64) -> f64 {
+        self.at += (input - self.at) * (1.0 - (-TICK_S / self.lag_s).exp());
+        self.share * input + (1.0 - self.share) * self.at
+    }
+}
+
+struct Average {
+    last: VecDeque<f64>,
+}
+
+impl Acts for Average {
+    fn tick(&mut self, input: f64) -> f64 {
+        self.last.push_back(input);
+        self.last.pop_front();
+        self.last.iter().sum::<f64>() / self.last.len() as f64
+    }
+}
+
+/// ωn and ζ, in hundredths of a tick.
+struct Oscillator {
+    at: f64,
+    velocity: f64,
+    before: f64,
+    omega: f64,
+    zeta: f64,
+}
+
+impl Acts for Oscillator {
+    fn tick(&mut self, input: f64) -> f64 {
+        const PARTS: i32 = 100;
+        let step = TICK_S / f64::from(PARTS);
+        for part in 1..=PARTS {
+            let share = f64::from(part) / f64::from(PARTS);
+            let goal = self.before + (input - self.before) * share;
+            let pull = self.omega * self.omega * (goal - self.at);
+            self.velocity += step * (pull - 2.0 * self.zeta * self.omega * self.velocity);
+            self.at += step * self.velocity;
+        }
+        self.before = input;
+        self.at
+    }
+}
+
+fn lag(ms: f64, share: f64) -> (Box<dyn Acts>, Element<f64>) {
+    let (lag_s, at) = (ms * 1e-3, 0.0);
+    let kv_per_s = 1.0 / lag_s;
+    let element = if share > 0.0 {
+        Element::FeedForwardLag {
+            kv_per_s,
+            feed_forward: share,
+        }
+    } else {
+        Element::Lag { kv_per_s }
+    };
+    (Box::new(Lag { at, lag_s, share }), element)
+}
+
+fn average(ticks: usize) -> (Box<dyn Acts>, Element<f64>) {
+    let last = std::iter::repeat_n(0.0, ticks).collect();
+    let window_s = ticks as f64 * TICK_S;
+    (
+        Box::new(Average { last }),
+        Element::MovingAverage { window_s },
+    )
+}
+
+fn oscillator(omega: f64, zeta: f64) -> (Box<dyn Acts>, Element<f64>) {
+    let of = Oscillator {
+        at: 0.0,
+        velocity: 0.0,
+        before: 0.0,
+        omega,
+        zeta,
+    };
+    let element = Element::SecondOrder {
+        omega_n_rad_s: omega,
+        zeta,
+    };
+    (Box::new(of), element)
+}
+
+type Chain = Vec<(Box<dyn Acts>, Element<f64>)>;
+
+/// A slot: lines and half-circles that meet with the same direction, at constant feed, begun and ended slowly.
+fn slot(way: f64) -> [f64; 2] {
+    let (straight, half) = (60.0, std::f64::consts::PI * RADIUS);
+    let way = way.max(0.0);
+    let lap = way % (2.0 * (straight + half));
+    if lap < straight {
+        [lap, 0.0]
+    } else if lap < straight + half {
+        let (sin, cos) = ((lap - straight) / RADIUS).sin_cos();
+        [straight + RADIUS * sin, RADIUS * (1.0 - cos)]
+    } else if lap < 2.0 * straight + half {
+        [2.0 * straight + half - lap, 2.0 * RADIUS]
+    } else {
+        let (sin, cos) = ((lap - 2.0 * straight - half) / RADIUS).sin_cos();
+        [-RADIUS * sin, RADIUS * (1.0 + cos)]
+    }
+}
+
+/// Distance of a place from the slot, mm: from its two lines or its two half-circles.
+fn off_slot([x, y]: [f64; 2]) -> f64 {
+    let across = y - RADIUS;
+    let along = x.clamp(0.0, 60.0);
+    ((x - along).hypot(across) - RADIUS).abs()
+}
+
+/// Farthest from the path, µm, and the largest acceleration of a set-point, mm/s².
+fn farthest(chain: &dyn Fn() -> Chain, correct: bool) -> [f64; 2] {
+    let mut cumulants = Cumulants::<f64>::default();
+    for (_, element) in chain() {
+        cumulants += element.cumulants();
+    }
+    let image = table(
+        Cumulants {
+            kappa2_s2: cumulants.kappa2_s2 as f32,
+            kappa4_s4: cumulants.kappa4_s4 as f32,
+        },
+        &[],
+        None,
+    );
+    let mut corrector = corrector(2, 1.0);
+    corrector.load(&image).unwrap();
+    let mut axes = [chain(), chain()];
+    let mut last = [[0.0; 2]; 2];
+    let (mut worst, mut hardest) = (0.0f64, 0.0f64);
+    for tick in 0..8000 {
+        // 150 mm/s after 0.3 s.
+        let t = (f64::from(tick) * TICK_S - 0.7).max(0.0);
+        let way = if t < 0.3 {
+            FEED * t * t / 0.6
+        } else {
+            FEED * (t - 0.15)
+        };
+        let mut command = [0.0; JOINTS];
+        command[..2].copy_from_slice(&slot(way));
+        let mut input = input(command, command);
+        input.enable = correct;
+        let out = corrector.tick(&input, TICK_S);
+        let mut place = [0.0; 2];
+        for (k, axis) in axes.iter_mut().enumerate() {
+            place[k] = axis
+                .iter_mut()
+                .fold(out.command[k], |at, (element, _)| element.tick(at));
+            let second = out.command[k] - 2.0 * last[1][k] + last[0][k];
+            hardest = hardest.max(second.abs() / (TICK_S * TICK_S));
+        }
+        last = [last[1], [out.command[0], out.command[1]]];
+        worst = worst.max(off_slot(place) * 1e3);
+    }
+    [worst, hardest]
+}
+
+#[test]
+fn where_lines_meet_arcs_the_contour_holds_as_well() {
+    type Named = (&'static str, f64, f64, fn() -> Chain);
+    // What may be left of the contour error, and how much harder the set-points may pull.
+    let chains: [Named; 8] = [
+        ("lag and average", 0.08, 2.6, || {
+            std::vec![average(40), lag(20.0, 0.0)]
+        }),
+        ("lag", 0.06, 1.9, || std::vec![lag(20.0, 0.0)]),
+        ("average", 0.20, 2.9, || std::vec![average(60)]),
+        ("two lags", 0.06, 2.4, || {
+            std::vec![lag(10.0, 0.0), lag(20.0, 0.0)]
+        }),
+        ("three lags", 0.09, 2.8, || {
+            std::vec![lag(12.0, 0.0), lag(12.0, 0.0), lag(12.0, 0.0)]
+        }),
+        ("average, two lags", 0.09, 2.8, || {
+            std::vec![average(30), lag(5.0, 0.0), lag(15.0, 0.0)]
+        }),
+        // These have no lag and average: what the operator of even derivatives leaves.
+        ("feed-forward", 0.85, 2.6, || std::vec![lag(25.0, 0.5)]),
+        ("second order", 0.36, 3.5, || {
+            std::vec![oscillator(60.0, 0.9)]
+        }),
+    ];
+    for (name, share, pull, chain) in chains {
+        let [bare, _] = farthest(&chain, false);
+        let [left, hardest] = farthest(&chain, true);
+        std::println!(
+            "{name}: {bare:.1} -> {left:.1} um ({:.3}), {hardest:.0} mm/s2",
+            left / bare
+        );
+        assert!(left < share * bare, "{name}: {left} of {bare} um");
+        let most = FEED * FEED / RADIUS;
+        assert!(hardest < pull * most, "{name}: {hardest} of {most} mm/s2");
+    }
+}

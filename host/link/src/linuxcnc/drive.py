@@ -1,0 +1,74 @@
+"""Asks LinuxCNC for its limits, or has it run a program: LinuxCNC's own interface is Python.
+
+Arguments: `limits`, or `run FILE SECONDS`. One JSON document on stdout.
+"""
+import json
+import sys
+import time
+
+import linuxcnc
+
+command, stat, errors = linuxcnc.command(), linuxcnc.stat(), linuxcnc.error_channel()
+
+
+def complaint():
+    while True:
+        said = errors.poll()
+        if not said:
+            return None
+        kind, text = said
+        if kind in (linuxcnc.NML_ERROR, linuxcnc.OPERATOR_ERROR) and "realtime delay" not in text:
+            return text
+
+
+def ready():
+    stat.poll()
+    if stat.task_state != linuxcnc.STATE_ON:
+        raise RuntimeError("the machine is off: take back the emergency stop and switch it on")
+    if not all(stat.homed[: stat.joints]):
+        raise RuntimeError("the machine is not homed")
+    if stat.interp_state != linuxcnc.INTERP_IDLE:
+        raise RuntimeError("a program runs")
+
+
+def limits():
+    ready()
+    mm = 1.0 / stat.linear_units
+    axes = [stat.axis[k] for k in (0, 1)]
+    room = [min(axis["max_position_limit"], -axis["min_position_limit"]) for axis in axes]
+    return {
+        "room_mm": min(room) * mm,
+        "feed_mm_s": stat.max_velocity * mm,
+        "acceleration_mm_s2": stat.max_acceleration * mm,
+    }
+
+
+def run(file, seconds):
+    ready()
+    complaint()
+    command.mode(linuxcnc.MODE_AUTO)
+    command.wait_complete(10)
+    command.program_open(file)
+    command.wait_complete(10)
+    command.auto(linuxcnc.AUTO_RUN, 0)
+    time.sleep(0.3)
+    until = time.time() + float(seconds)
+    while time.time() < until:
+        stat.poll()
+        said = complaint()
+        if said:
+            command.abort()
+            raise RuntimeError(said)
+        if stat.task_state != linuxcnc.STATE_ON:
+            raise RuntimeError("the machine was switched off")
+        if stat.interp_state == linuxcnc.INTERP_IDLE:
+            return {"done": True}
+        time.sleep(0.02)
+    command.abort()
+    raise RuntimeError("the program did not end within %s s" % seconds)
+
+
+try:
+    print(json.dumps(limits() if sys.argv[1] == "limits" else run(sys.argv[2], sys.argv[3])))
+except Exception as error:  # said to whoever asked
+    print(json.dumps({"error": str(error)}))
