@@ -93,6 +93,19 @@ struct Found {
     keys: [Option<PublicKey>; 2],
 }
 
+impl Found {
+    /// First byte, first blank place and copy of the key: of the unit of the newest record, then of the other one.
+    const fn in_order(&self, [a, b]: [u32; 2]) -> [(u32, u32, Option<PublicKey>); 2] {
+        let ([blank_a, blank_b], [key_a, key_b]) = (self.blank, self.keys);
+        let (first, second) = ((a, blank_a, key_a), (b, blank_b, key_b));
+        if self.unit == 0 {
+            [first, second]
+        } else {
+            [second, first]
+        }
+    }
+}
+
 impl<F: NorFlash> Store<F> {
     fn places(&self) -> u32 {
         F::ERASE_SIZE as u32 / CONFIG_BYTES as u32
@@ -145,8 +158,7 @@ impl<F: NorFlash> Store<F> {
         let Some(units) = self.layout.config else {
             return Ok(None);
         };
-        let Found { unit, keys, .. } = self.configs(units)?;
-        let [newest, other] = [keys[unit & 1], keys[(unit ^ 1) & 1]];
+        let [(_, _, newest), (_, _, other)] = self.configs(units)?.in_order(units);
         Ok(newest.or(other))
     }
 
@@ -158,19 +170,18 @@ impl<F: NorFlash> Store<F> {
         let Some(units) = self.layout.config else {
             return Ok(());
         };
-        let found = self.configs(units)?;
         let record = write_key(key).ok_or(FlashFault::Program)?;
-        for unit in [found.unit & 1, (found.unit ^ 1) & 1] {
-            if found.keys[unit] == Some(*key) {
+        let [newest, other] = self.configs(units)?.in_order(units);
+        for (base, blank, copy) in [newest, other] {
+            if copy == Some(*key) {
                 return Ok(());
             }
-            let place = found.blank[unit];
-            if place < self.places() {
-                return self.append(units[unit] + place * CONFIG_BYTES as u32, &record);
+            if blank < self.places() {
+                return self.append(base + blank * CONFIG_BYTES as u32, &record);
             }
         }
         // Both are full: the other one holds older records only.
-        let base = units[(found.unit ^ 1) & 1];
+        let (base, ..) = other;
         self.clear(base)?;
         self.append(base, &record)
     }
