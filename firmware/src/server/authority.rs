@@ -1,6 +1,6 @@
 //! Who may give this controller tables: whoever has the key, once one is provisioned. Off until then.
 //!
-//! The key is kept in flash and is never replaced; a flash whose key cannot be read trusts no table at all. Tables are
+//! The key is kept in flash, more than once, and is never replaced; a flash whose key cannot be read trusts no table at all. Tables are
 //! checked before they are programmed and again each time one is taken from flash, so that those from before the
 //! provisioning are refused as well.
 use super::{Buffers, Motion, Server};

@@ -127,7 +127,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     #[inline(never)]
     pub fn boot(board: Board, flash: F, layout: Layout, motion: M, mut buffers: B) -> Self {
         let mut store = Store::open(flash, layout, &mut buffers.image);
-        let key = store.key();
+        let key = store.boot_key();
         let mut server = Self {
             board,
             store,

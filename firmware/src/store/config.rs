@@ -7,7 +7,10 @@
 //! A record goes into the first place that is blank, with all behind it blank too; where there is none left, into the other
 //! unit, erased first: it holds older records only. So a cut of power at any byte leaves the old configuration or the new
 //! one, whole, and no word is programmed twice between erasures.
-use super::Store;
+//!
+//! A record of version 254 holds no configuration but a copy of the owner's key, beside the newest one: a key whose own unit is lost is
+//! found here, and the controller does not stand open.
+use super::{PublicKey, Store, StoredKey};
 use embedded_storage::nor_flash::NorFlash;
 use giotto_shared::wire::{Crc32, FlashFault, MachineConfig, take};
 
@@ -15,6 +18,8 @@ use giotto_shared::wire::{Crc32, FlashFault, MachineConfig, take};
 pub(super) const CONFIG_BYTES: usize = 80;
 /// Version of what a record holds.
 const VERSION: u8 = 1;
+/// That of a record which holds a key.
+const KEY_VERSION: u8 = 254;
 const HEAD: usize = 6;
 const CHECK: usize = CONFIG_BYTES - 4;
 
@@ -48,12 +53,32 @@ fn read(record: &Record) -> Option<(u32, MachineConfig)> {
 fn write(number: u32, config: &MachineConfig) -> Option<Record> {
     let mut record = [0xff; CONFIG_BYTES];
     let body = giotto_shared::wire::put(config, record.get_mut(HEAD..CHECK)?)?;
+    finish(record, number, body as u8, VERSION)
+}
+
+/// A record with its body, and the rest around it.
+fn finish(mut record: Record, number: u32, length: u8, version: u8) -> Option<Record> {
     *record.first_chunk_mut()? = number.to_le_bytes();
-    *record.get_mut(4)? = body as u8;
-    *record.get_mut(5)? = VERSION;
+    *record.get_mut(4)? = length;
+    *record.get_mut(5)? = version;
     let check = check(&record);
     record.get_mut(CHECK..)?.copy_from_slice(&check);
     Some(record)
+}
+
+/// The key of a record, if it is whole and holds one.
+fn read_key(record: &Record) -> Option<PublicKey> {
+    let [_, _, _, _, 32, KEY_VERSION, body @ ..] = record else {
+        return None;
+    };
+    let whole = record.get(CHECK..)? == check(record);
+    body.first_chunk().copied().filter(|_| whole)
+}
+
+fn write_key(key: &PublicKey) -> Option<Record> {
+    let mut record = [0xff; CONFIG_BYTES];
+    *record.get_mut(HEAD..)?.first_chunk_mut()? = *key;
+    finish(record, 0, 32, KEY_VERSION)
 }
 
 /// What the two units hold.
@@ -64,6 +89,21 @@ struct Found {
     unit: usize,
     /// First place of each unit from which on all is blank.
     blank: [u32; 2],
+    /// Copy of the key in each unit.
+    keys: [Option<PublicKey>; 2],
+}
+
+impl Found {
+    /// First byte, first blank place and copy of the key: of the unit of the newest record, then of the other one.
+    const fn in_order(&self, [a, b]: [u32; 2]) -> [(u32, u32, Option<PublicKey>); 2] {
+        let ([blank_a, blank_b], [key_a, key_b]) = (self.blank, self.keys);
+        let (first, second) = ((a, blank_a, key_a), (b, blank_b, key_b));
+        if self.unit == 0 {
+            [first, second]
+        } else {
+            [second, first]
+        }
+    }
 }
 
 impl<F: NorFlash> Store<F> {
@@ -86,6 +126,9 @@ impl<F: NorFlash> Store<F> {
                     continue;
                 }
                 blank = place + 1;
+                if let (Some(copy), Some(key)) = (found.keys.get_mut(unit), read_key(&record)) {
+                    *copy = Some(key);
+                }
                 let newest = found.newest.map(|(number, _)| number);
                 if let Some((number, config)) = read(&record)
                     && newest.is_none_or(|newest| number > newest)
@@ -107,6 +150,66 @@ impl<F: NorFlash> Store<F> {
         self.configs(units).ok()?.newest.map(|(_, config)| config)
     }
 
+    /// The copy of the key beside the configuration.
+    ///
+    /// # Errors
+    /// [`FlashFault::Read`].
+    pub(super) fn copied_key(&mut self) -> Result<Option<PublicKey>, FlashFault> {
+        let Some(units) = self.layout.config else {
+            return Ok(None);
+        };
+        let [(_, _, newest), (_, _, other)] = self.configs(units)?.in_order(units);
+        Ok(newest.or(other))
+    }
+
+    /// Sees to it that there is a copy of the key in the unit of the newest configuration, or in the other one while the first is full.
+    ///
+    /// # Errors
+    /// Those of the flash.
+    pub(super) fn copy_key(&mut self, key: &PublicKey) -> Result<(), FlashFault> {
+        let Some(units) = self.layout.config else {
+            return Ok(());
+        };
+        let record = write_key(key).ok_or(FlashFault::Program)?;
+        let [newest, other] = self.configs(units)?.in_order(units);
+        for (base, blank, copy) in [newest, other] {
+            if copy == Some(*key) {
+                return Ok(());
+            }
+            if blank < self.places() {
+                return self.append(base + blank * CONFIG_BYTES as u32, &record);
+            }
+        }
+        // Both are full: the other one holds older records only.
+        let (base, ..) = other;
+        self.clear(base)?;
+        self.append(base, &record)
+    }
+
+    /// Erases a unit.
+    fn clear(&mut self, base: u32) -> Result<(), FlashFault> {
+        self.flash
+            .erase(base, base + F::ERASE_SIZE as u32)
+            .map_err(|_| FlashFault::Erase)
+    }
+
+    /// Programs a record into a blank place and reads it back.
+    fn append(&mut self, at: u32, record: &Record) -> Result<(), FlashFault> {
+        self.flash
+            .write(at, record)
+            .map_err(|_| FlashFault::Program)?;
+        let mut back = [0; CONFIG_BYTES];
+        self.flash
+            .read(at, &mut back)
+            .map_err(|_| FlashFault::Read)?;
+        match record.iter().zip(&back).position(|(a, b)| a != b) {
+            None => Ok(()),
+            Some(offset) => Err(FlashFault::ReadBack {
+                offset: at + offset as u32,
+            }),
+        }
+    }
+
     /// Whether there is a place for a configuration.
     pub const fn keeps_config(&self) -> bool {
         self.layout.config.is_some()
@@ -119,6 +222,8 @@ impl<F: NorFlash> Store<F> {
     #[inline(never)]
     pub fn keep_config(&mut self, config: &MachineConfig) -> Result<(), FlashFault> {
         let units = self.layout.config.ok_or(FlashFault::Full)?;
+        // Read before anything is erased.
+        let key = self.key();
         let found = self.configs(units)?;
         let number = found.newest.map_or(0, |(number, _)| number.wrapping_add(1));
         let record = write(number, config).ok_or(FlashFault::Program)?;
@@ -126,26 +231,15 @@ impl<F: NorFlash> Store<F> {
         let mut place = found.blank[unit];
         if place >= self.places() {
             unit ^= 1;
-            let base = units[unit];
-            self.flash
-                .erase(base, base + F::ERASE_SIZE as u32)
-                .map_err(|_| FlashFault::Erase)?;
+            self.clear(units[unit])?;
             place = 0;
         }
-        let at = units[unit] + place * CONFIG_BYTES as u32;
-        self.flash
-            .write(at, &record)
-            .map_err(|_| FlashFault::Program)?;
-        let mut back = [0; CONFIG_BYTES];
-        self.flash
-            .read(at, &mut back)
-            .map_err(|_| FlashFault::Read)?;
-        match record.iter().zip(&back).position(|(a, b)| a != b) {
-            None => Ok(()),
-            Some(offset) => Err(FlashFault::ReadBack {
-                offset: at + offset as u32,
-            }),
+        self.append(units[unit] + place * CONFIG_BYTES as u32, &record)?;
+        if let StoredKey::Key(key) = key {
+            // The configuration is kept; without a copy the key still is where it was.
+            let _ = self.copy_key(&key);
         }
+        Ok(())
     }
 }
 
@@ -217,5 +311,53 @@ mod tests {
         assert_eq!(store.config(), Some(config(1.0)));
         store.keep_config(&config(3.0)).unwrap();
         assert_eq!(store.config(), Some(config(3.0)));
+    }
+
+    const WITH_KEY: Layout = LAYOUT.with_key(5120);
+
+    fn keyed(cells: RamFlash<5632, 512>, after: Option<u32>) -> Store<PowerCut<5632, 512>> {
+        let flash = PowerCut::new(cells, after, Tear::Untouched);
+        Store::open(flash, WITH_KEY, &mut [0; MAX_IMAGE_BYTES])
+    }
+
+    /// The unit of the key is erased, or all of it rots: its copy is found, however many configurations were stored before and after, and
+    /// wherever power failed meanwhile, once the controller has booted.
+    #[test]
+    fn a_key_whose_unit_is_lost_is_found_beside_the_configuration() {
+        let key = [9; 32];
+        for before in [0, 3, 5, 6, 7, 12] {
+            for later in [0, 1, 5, 6, 7, 13] {
+                for after in [None, Some(3), Some(83), Some(170), Some(500)] {
+                    let mut store = keyed(RamFlash::new(), None);
+                    for n in 0..before {
+                        store.keep_config(&config(n as f32 + 1.0)).unwrap();
+                    }
+                    store.keep_key(&key).unwrap();
+                    let mut store = keyed(store.into_flash().into_cells(), after);
+                    for n in 0..later {
+                        if store.keep_config(&config(n as f32 + 50.0)).is_err() {
+                            break;
+                        }
+                    }
+                    let what = std::format!("{before} {later} {after:?}");
+                    store = keyed(store.into_flash().into_cells(), None);
+                    assert_eq!(store.boot_key(), StoredKey::Key(key), "{what}");
+                    for lost in [0xff, 0x00, 0x5a] {
+                        let cells = store.into_flash().into_cells();
+                        let mut gone = cells.clone();
+                        gone.bytes_mut()[5120..].fill(lost);
+                        let mut gone = keyed(gone, None);
+                        assert_eq!(gone.key(), StoredKey::Key(key), "{what} {lost}");
+                        // And it goes on being found.
+                        for n in 0..20 {
+                            gone.keep_config(&config(n as f32 + 70.0)).unwrap();
+                            assert_eq!(gone.key(), StoredKey::Key(key), "{what} {lost} {n}");
+                        }
+                        store = keyed(cells, None);
+                    }
+                    assert_eq!(store.key(), StoredKey::Key(key), "{what}");
+                }
+            }
+        }
     }
 }

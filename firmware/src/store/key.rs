@@ -8,6 +8,8 @@ pub type PublicKey = [u8; 32];
 pub(super) const KEY_BYTES: usize = 40;
 /// Places: one more for each cut of power during provisioning.
 pub(super) const KEYS: usize = 4;
+/// Places that a key takes.
+pub(super) const KEY_COPIES: usize = 2;
 
 /// What the place of the key holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -88,6 +90,19 @@ mod tests {
                     assert_eq!(store.key(), StoredKey::Key(wanted));
                 }
             }
+        }
+    }
+
+    /// Any bit of one of its places rots.
+    #[test]
+    fn a_bit_that_rots_does_not_open_the_controller() {
+        for bit in 0..2 * KEY_BYTES * 8 {
+            let mut store = open(Cells::new(), None, Tear::Untouched);
+            store.keep_key(&[7; 32]).unwrap();
+            let mut cells = store.into_flash().into_cells();
+            cells.bytes_mut()[4096 + bit / 8] ^= 1 << (bit % 8);
+            let mut store = open(cells, None, Tear::Untouched);
+            assert_eq!(store.key(), StoredKey::Key([7; 32]), "{bit}");
         }
     }
 

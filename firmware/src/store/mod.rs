@@ -36,7 +36,7 @@ use config::CONFIG_BYTES;
 use embedded_storage::nor_flash::NorFlash;
 use giotto_shared::table::{Header, MAX_IMAGE_BYTES, image::FORMAT_VERSION};
 use giotto_shared::wire::{FlashFault, SlotState, TableInfo};
-use key::{KEY_BYTES, KEYS};
+use key::{KEY_BYTES, KEY_COPIES, KEYS};
 use record::{RECORD_BYTES, Record};
 
 pub use key::{PublicKey, StoredKey};
@@ -196,7 +196,8 @@ impl<F: NorFlash> Store<F> {
         self.base(slot) + self.layout.size - RECORDS_BYTES + (index * RECORD_BYTES) as u32
     }
 
-    /// The key that tables have to be signed with. One that cannot be read is not one that is not there.
+    /// The key that tables have to be signed with. One that cannot be read is not one that is not there, and one that is lost is
+    /// looked for beside the configuration.
     pub fn key(&mut self) -> StoredKey {
         let Some(base) = self.layout.key else {
             return StoredKey::None;
@@ -214,34 +215,53 @@ impl<F: NorFlash> Store<F> {
                 return StoredKey::Key(key);
             }
         }
-        StoredKey::None
+        match self.copied_key() {
+            Ok(Some(key)) => StoredKey::Key(key),
+            Ok(None) => StoredKey::None,
+            Err(_) => StoredKey::Unreadable,
+        }
     }
 
-    /// Keeps a key for good. A place that a cut of power has spoilt is left behind.
+    /// The key at boot: its copy is made again if a cut of power has left none.
+    pub fn boot_key(&mut self) -> StoredKey {
+        let key = self.key();
+        if let StoredKey::Key(key) = key {
+            // Without a copy the key still is where it was.
+            let _ = self.copy_key(&key);
+        }
+        key
+    }
+
+    /// Keeps a key for good: twice, since a bit that rots in one must not open the controller, and beside the configuration, if there
+    /// is a place for one. A place that a cut of power has spoilt is left behind.
     ///
     /// # Errors
     /// [`FlashFault::Full`] if there is no blank place, [`FlashFault::Read`], [`FlashFault::Program`],
     /// [`FlashFault::ReadBack`].
     pub fn keep_key(&mut self, key: &PublicKey) -> Result<(), FlashFault> {
         let base = self.layout.key.ok_or(FlashFault::Full)?;
+        let mut kept = 0;
         for place in 0..KEYS {
             let at = base + (place * KEY_BYTES) as u32;
             let mut bytes = [0; KEY_BYTES];
             self.flash
                 .read(at, &mut bytes)
                 .map_err(|_| FlashFault::Read)?;
-            if bytes != [0xff; KEY_BYTES] {
+            if bytes != [0xff; KEY_BYTES] || kept == KEY_COPIES {
                 continue;
             }
             self.flash
                 .write(at, &key::write(key))
                 .map_err(|_| FlashFault::Program)?;
-            return match self.key() {
-                StoredKey::Key(found) if found == *key => Ok(()),
-                _ => Err(FlashFault::ReadBack { offset: at }),
-            };
+            match self.key() {
+                StoredKey::Key(found) if found == *key => kept += 1,
+                _ => return Err(FlashFault::ReadBack { offset: at }),
+            }
         }
-        Err(FlashFault::Full)
+        if kept == 0 {
+            return Err(FlashFault::Full);
+        }
+        self.copy_key(key)
     }
 
     /// Bytes of a slot.

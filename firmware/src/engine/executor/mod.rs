@@ -10,11 +10,11 @@
 //!
 //! | tick | steady | at most | bar |
 //! |---|---|---|---|
-//! | arc, β model (`arc`) | 125 | 185, in a ramp | 300 |
+//! | arc, β model (`arc`) | 125 | 183, in a ramp | 300 |
 //! | arc with eight profile terms, two slides with play and friction pulses (`arc`) | 345 | 445, in a ramp in which they turn | 450 |
 //! | arc with the dearest eight (`arc`) | | 576 | |
 //! | helix (`curve`), the same with eight terms | | 292, 619 | |
-//! | set-point of a stream ([`super::Stream`]) | 150 | 150 | 250 |
+//! | set-point of a stream ([`super::Stream`]) | 147 | 147 | 250 |
 //! | whole interrupt, helix with the dearest eight, each set-point recorded | | 982, in a ramp in which two slides turn at once | 1000 |
 //!
 //! What kept them within their bars is registers: a part of the tick that has its own call (linear terms, sides, periodic errors)

@@ -36,10 +36,8 @@ impl Join {
         let root = libm::sqrtf(rate * rate + 2.0 * twice * place);
         let [shortest, longest] = TICKS;
         let ticks = ((rate + root) / twice).max(shortest);
-        if !(ticks <= longest) {
-            return None;
-        }
-        Some(Self {
+        // No number is not within either.
+        (ticks <= longest).then(|| Self {
             apart_nm,
             drift_nm: rate_nm.map(|nm| (nm as f32 * ticks) as i32),
             u: 0,
