@@ -1,6 +1,6 @@
 //! From one correction to another without a step: a new table, another zone, switched on or off.
 use crate::history::History;
-use crate::law::Law;
+use crate::law::{Law, ZoneLaw};
 use crate::senses::smooth;
 use crate::settings::Settings;
 use crate::voice::{Place, Voice};
@@ -102,6 +102,11 @@ impl Fade {
 
     fn begin(&mut self, wanted: Option<Part>, laws: &[Law; 2], at: &Place, history: &History) {
         self.from = self.to;
+        // Who adds the offset to a path of its own gets it for a place ahead: the lag's delay would only have to be foreseen as well.
+        let inverse = |zone: &ZoneLaw| match at.ahead {
+            Some(_) => zone.inverse.without_lag(),
+            None => zone.inverse,
+        };
         let to = wanted.and_then(|part| zone(laws, part).map(|zone| (part, zone)));
         self.to = to.map(|(part, zone)| {
             // Errors of position go on being counted from where they were.
@@ -109,7 +114,7 @@ impl Fade {
             let reference_m = zone.reference_m().unwrap_or(here);
             (
                 part,
-                Voice::new(reference_m, history.stencil(&zone.inverse)),
+                Voice::new(reference_m, history.stencil(&inverse(zone))),
             )
         });
         self.done = 0.0;

@@ -37,6 +37,15 @@ impl Inverse {
             whole: Operator::new(cumulants),
         }
     }
+
+    /// By even derivatives alone.
+    pub(crate) const fn without_lag(&self) -> Self {
+        Self {
+            lag_s: 0.0,
+            rest: self.whole,
+            whole: self.whole,
+        }
+    }
 }
 
 /// Five set-points a stride apart, and what each counts.

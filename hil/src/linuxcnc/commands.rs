@@ -54,7 +54,7 @@ impl Commands {
     }
 
     /// A command to the component.
-    fn to_component(&mut self, words: &[&OsStr]) -> Result<Value, LinuxCncError> {
+    fn ask(&mut self, words: &[&OsStr]) -> Result<Value, LinuxCncError> {
         let mut all = vec![OsStr::new("--json")];
         all.extend(words);
         all.extend([OsStr::new("--port"), OsStr::new("linuxcnc")]);
@@ -69,7 +69,7 @@ impl Commands {
 
     /// CRC of the table in use.
     fn in_use(&mut self) -> Result<Value, LinuxCncError> {
-        let status = self.to_component(&["status".as_ref()])?;
+        let status = self.ask(&["status".as_ref()])?;
         let slot = status["active_slot"].as_u64().unwrap_or(u64::MAX);
         let slot = usize::try_from(slot).unwrap_or(usize::MAX);
         match status["slots"].get(slot) {
@@ -87,8 +87,8 @@ impl Commands {
             "-o".as_ref(),
             table.as_os_str(),
         ])?;
-        self.to_component(&["flash".as_ref(), model.as_os_str()])?;
-        self.to_component(&["verify".as_ref(), table.as_os_str()])?;
+        self.ask(&["flash".as_ref(), model.as_os_str()])?;
+        self.ask(&["verify".as_ref(), table.as_os_str()])?;
         Ok(())
     }
 
@@ -104,23 +104,22 @@ impl Commands {
         ])?;
         self.flash(&other)?;
         let second = self.in_use()?;
-        self.to_component(&["rollback".as_ref()])?;
+        self.ask(&["rollback".as_ref()])?;
         let third = self.in_use()?;
         if first == second || first != third {
             return Err(LinuxCncError::Failed(format!(
                 "tables in use: {first}, flashed {second}, rolled back {third}"
             )));
         }
-        self.to_component(&["monitor".as_ref(), "--count".as_ref(), "2".as_ref()])?;
-        self.to_component(&["log".as_ref(), "--once".as_ref()])?;
+        self.ask(&["monitor".as_ref(), "--count".as_ref(), "2".as_ref()])?;
+        self.ask(&["log".as_ref(), "--once".as_ref()])?;
         Ok(())
     }
 
     /// Switches the correction off or on.
     pub(super) fn bypass(&mut self, on: bool) -> Result<(), LinuxCncError> {
         let word = if on { "on" } else { "off" };
-        self.to_component(&["bypass".as_ref(), word.as_ref()])
-            .map(drop)
+        self.ask(&["bypass".as_ref(), word.as_ref()]).map(drop)
     }
 
     /// Stops a circle that LinuxCNC runs.
@@ -135,7 +134,7 @@ impl Commands {
         let mut twin = self.clone();
         let stopper = std::thread::spawn(move || {
             std::thread::sleep(UNDER_WAY);
-            twin.to_component(&["stop".as_ref()]).map(|_| twin.done)
+            twin.ask(&["stop".as_ref()]).map(|_| twin.done)
         });
         let recording = samples::run(session, "stopped", program.as_bytes(), 120)?;
         let gone = |_| LinuxCncError::failed("the thread that stops is gone");

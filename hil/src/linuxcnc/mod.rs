@@ -30,6 +30,7 @@ use serde_json::{Value, json};
 pub use session::LinuxCncError;
 use session::Session;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// Of the radius error, the out-of-roundness and the contour error so many percent have to go.
 pub const BARS_PERCENT: [f64; 3] = [98.0, 70.0, 90.0];
@@ -379,6 +380,8 @@ pub fn run(setup: &Setup, note: &mut dyn FnMut(&str)) -> Result<Report, LinuxCnc
     commands.bypass(false)?;
     commands.stop(&mut session)?;
     session.set("giotto.enable", "0")?;
+    // The offset goes in half a second.
+    std::thread::sleep(Duration::from_secs(1));
     let after = samples::run(&mut session, "after", part.as_bytes(), 60)?;
     Ok(Report {
         circles: PROOF.to_vec(),

@@ -5,7 +5,7 @@ use giotto::whole_file;
 use giotto_firmware::store::{ImageBuffer, Store};
 use giotto_shared::table::MAX_IMAGE_BYTES;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Where they are kept.
 #[derive(Debug)]
@@ -29,10 +29,10 @@ impl Kept {
                 name.push(".store");
                 PathBuf::from(name)
             }
-            None => PathBuf::from(format!(
-                "/dev/shm/giotto-linuxcnc.{}.store",
-                page.process()?
-            )),
+            None => {
+                forget_the_dead();
+                PathBuf::from(format!("{MEMORY}{PREFIX}{}{SUFFIX}", page.process()?))
+            }
         };
         let mut flash = Flash::new();
         if let Ok(bytes) = std::fs::read(&file)
@@ -79,6 +79,26 @@ impl Kept {
         whole_file::write(&self.file, flash.bytes_mut())?;
         self.flash = flash;
         Ok(())
+    }
+}
+
+/// Where a store is kept that is forgotten with its LinuxCNC.
+const MEMORY: &str = "/dev/shm/";
+const PREFIX: &str = "giotto-linuxcnc.";
+const SUFFIX: &str = ".store";
+
+/// Takes away the stores of those LinuxCNCs that have ended.
+fn forget_the_dead() {
+    for entry in std::fs::read_dir(MEMORY).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let process = name
+            .to_str()
+            .and_then(|name| name.strip_prefix(PREFIX)?.strip_suffix(SUFFIX));
+        let process = process.and_then(|process| process.parse::<u32>().ok());
+        if process.is_some_and(|process| !Path::new(&format!("/proc/{process}")).exists()) {
+            // One that belongs to somebody else stays.
+            let _ = std::fs::remove_file(entry.path());
+        }
     }
 }
 
