@@ -108,8 +108,8 @@ impl Protocol for J519 {
         out.extend(answer.number.to_be_bytes());
         out.push(u8::from(answer.last));
         // Reads no signal; the pose is Cartesian; writes no signal.
-        out.extend([0; 5]);
-        out.extend([0; 10]);
+        out.extend([0; 13]);
+        out.extend([0xff; 2]);
         out.extend(pose.iter().flat_map(|value| value.to_be_bytes()));
         out
     }
@@ -139,12 +139,49 @@ mod tests {
         let bytes = j519.write(&answer);
         assert_eq!(bytes.len(), 64);
         assert_eq!(bytes[..13], [0, 0, 0, 1, 0, 0, 0, 1, 1, 2, 3, 4, 1]);
-        assert!(bytes[13..28].iter().all(|byte| *byte == 0));
+        assert!(bytes[13..26].iter().all(|byte| *byte == 0));
+        assert_eq!(bytes[26..28], [0xff; 2]);
         assert_eq!(
             bytes[28..40],
             [0x3f, 0x80, 0, 0, 0xc0, 0, 0, 0, 0x3f, 0, 0, 0]
         );
         assert_eq!(j519.greeting(), [[0, 0, 0, 0, 0, 0, 0, 1]]);
         assert_eq!(j519.farewell(), [[0, 0, 0, 2, 0, 0, 0, 1]]);
+    }
+    /// A status and the command to the same pose as the crate `fanuc_ucl` 2.0.2 writes them.
+    #[test]
+    fn the_same_bytes_as_by_others() {
+        let bytes = |hex: &str| -> Vec<u8> {
+            (0..hex.len() / 2)
+                .map(|k| u8::from_str_radix(&hex[2 * k..2 * k + 2], 16).unwrap())
+                .collect()
+        };
+        let pose = "444b2000c22100004422800043340000bf00000041400000";
+        let status = format!(
+            "0000000000000001_01020304_05_00_0000_0000_0000_0a0b0c0d_{pose}_{}_3f800000400000004040000040800000\
+             40a0000040c00000_{}",
+            "0".repeat(24),
+            "0".repeat(96)
+        );
+        let mut j519 = J519::new();
+        let Heard::Told(told) = j519.read(&bytes(&status.replace('_', ""))) else {
+            panic!()
+        };
+        assert_eq!(
+            (told.number, told.stamp_ms),
+            (0x0102_0304, Some(0x0a0b_0c0d))
+        );
+        assert_eq!(told.measured, Some([812.5, -40.25, 650.0]));
+        assert!(told.not_ready.is_none() && !told.idle);
+        let answer = Answer {
+            target: [812.5, -40.25, 650.0],
+            last: true,
+            ..Answer::default()
+        };
+        let command = format!(
+            "0000000100000001_00000000_01_00_0000_0000_00_00_0000_0000_0000_ffff_{pose}_{}",
+            "0".repeat(24)
+        );
+        assert_eq!(j519.write(&answer), bytes(&command.replace('_', "")));
     }
 }

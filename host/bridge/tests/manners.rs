@@ -8,7 +8,7 @@ mod robot;
 
 use giotto_bridge::{Door, Kind, Mode, Motion, Path, Phase, Setup, SetupError};
 use robot::bytes::{self, ABB_RUNS, AbbState};
-use robot::{Place, SLEW_AND_OFFSET, table_image};
+use robot::{Place, SLEW_AND_OFFSET, table_image, table_with};
 use std::time::Duration;
 
 fn door(kind: Kind) -> Door {
@@ -255,6 +255,18 @@ fn engaging_and_leaving_are_ramps_and_leave_nothing() {
         // In half a second from 0.21 mm: 1.9 times the mean of 1.7 µm a cycle, and the circle's own turn.
         assert!(biggest_step(&answers) < 0.02, "{}", biggest_step(&answers));
     }
+}
+
+/// The table's rate is that from one answer to the next, also where ten cycles lie between them.
+#[test]
+fn the_tables_rate_holds_over_gaps() {
+    // The circle asks for 0.85 mm/s.
+    let setup = Setup::new(Kind::Rsi, table_with([0.9e-3, 0.004]));
+    let gaps: Vec<_> = (0..15).map(|k| 600 + 50 * k..610 + 50 * k).collect();
+    let (door, answers) = rsi_session(setup, &gaps, u32::MAX, 1500);
+    let most = biggest_step(&answers);
+    assert!(most <= 0.9 * 4e-3 + 1.1e-4 && most > 3.4e-3, "{most}");
+    assert!(door.counters().limited > 50, "{door:?}");
 }
 
 #[test]

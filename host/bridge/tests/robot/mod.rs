@@ -24,6 +24,11 @@ pub const INNER_S: f64 = 1e-3;
 
 /// A table for it, by the cumulants of these two: τ² + T²/12, 6τ⁴ − T⁴/120.
 pub fn table_image() -> Vec<u8> {
+    table_with(SLEW_AND_OFFSET)
+}
+
+/// The same with other bounds, m/s and m.
+pub fn table_with([slew_m_s, offset_m]: [f64; 2]) -> Vec<u8> {
     let kappa2 = LAG_S * LAG_S + AVERAGE_S * AVERAGE_S / 12.0;
     let kappa4 = 6.0 * LAG_S.powi(4) - AVERAGE_S.powi(4) / 120.0;
     let zone = Zone {
@@ -41,8 +46,8 @@ pub fn table_image() -> Vec<u8> {
         machine: "robot of the tests".try_into().unwrap(),
         zones: [zone].into_iter().collect(),
         limits: Limits {
-            offset_m: SLEW_AND_OFFSET[1] as f32,
-            slew_m_s: SLEW_AND_OFFSET[0] as f32,
+            offset_m: offset_m as f32,
+            slew_m_s: slew_m_s as f32,
         },
     };
     let mut bytes = vec![0; MAX_IMAGE_BYTES];

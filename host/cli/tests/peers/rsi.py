@@ -26,14 +26,16 @@ class Robot(EchoServer):
 server = Robot(config, delay_ms=4, mode="absolute")
 for state in ("RIst", "RSol"):
     server.state[state].update(X=100.0, Y=0.0, Z=0.0)
-answered, largest = 0, 0.0
+answered, rejected, largest = 0, 0, 0.0
 for cycle in range(cycles):
     begun = time.monotonic()
     server.send_once()
-    if server.receive_and_process() is True:
+    outcome = server.receive_and_process()
+    rejected += outcome is False
+    if outcome is True:
         answered += 1
         korr = server.last_corrections.get("RKorr", {})
         largest = max(largest, math.sqrt(sum(korr.get(axis, 0.0) ** 2 for axis in "XYZ")))
     time.sleep(max(0.0, 0.004 - (time.monotonic() - begun)))
 server.udp_socket.close()
-print(json.dumps({"cycles": cycles, "answered": answered, "faulty": server.faulty_packets, "largest_mm": largest}))
+print(json.dumps({"cycles": cycles, "answered": answered, "rejected": rejected, "largest_mm": largest}))
