@@ -191,7 +191,7 @@ mod tests {
     /// Set-points of the program at 1 kHz, by its own words: lines and arcs at their feed, stops.
     fn walked(circles: &[Circle]) -> Vec<Sample> {
         let mut places = vec![[0.0; 2]];
-        let mut stop = |places: &mut Vec<[f64; 2]>| {
+        let stop = |places: &mut Vec<[f64; 2]>| {
             let [x, y] = *places.last().unwrap();
             places.extend(std::iter::repeat_n([x, y], 600));
         };
