@@ -69,24 +69,30 @@ impl Config {
         if !(RATE_HZ[0]..=RATE_HZ[1]).contains(&self.rate_hz) {
             return Err(ConfigError("rate_hz"));
         }
+        let most = |field: ConfigField| field.most().unwrap_or(0.0);
+        let MotionLimits {
+            feed_m_s,
+            acceleration_m_s2,
+            jerk_m_s3,
+        } = self.motion;
         let upper_bounds = [
-            (self.motion.feed_m_s, 10.0, "motion.feed_m_s"),
+            (feed_m_s, most(ConfigField::Feed), "motion.feed_m_s"),
             (
-                self.motion.acceleration_m_s2,
-                1e3,
+                acceleration_m_s2,
+                most(ConfigField::Acceleration),
                 "motion.acceleration_m_s2",
             ),
-            (self.motion.jerk_m_s3, 1e6, "motion.jerk_m_s3"),
-            (
-                self.positioning_m_s,
-                self.motion.feed_m_s,
-                "positioning_m_s",
-            ),
-            (self.offset_m, 0.05, "offset_m"),
-            (self.slew_m_s, 1.0, "slew_m_s"),
+            (jerk_m_s3, most(ConfigField::Jerk), "motion.jerk_m_s3"),
+            (self.positioning_m_s, feed_m_s, "positioning_m_s"),
+            (self.offset_m, most(ConfigField::Offset), "offset_m"),
+            (self.slew_m_s, most(ConfigField::Slew), "slew_m_s"),
             (self.engage_s, 10.0, "engage_s"),
             (self.take_up_s, 1.0, "take_up_s"),
-            (self.stream_window_s, 1.0, "stream_window_s"),
+            (
+                self.stream_window_s,
+                most(ConfigField::Window),
+                "stream_window_s",
+            ),
         ];
         for (value, most, name) in upper_bounds {
             // NaN fails the comparison too.

@@ -2,7 +2,8 @@
 use super::port::PortArgs;
 use super::{Failure, Output};
 use giotto_link::{Controller, ControllerError};
-use giotto_shared::wire::{Command, MachineConfig, Refusal};
+use giotto_shared::path::MAX_POSITION_M;
+use giotto_shared::wire::{Command, ConfigField, MachineConfig, Refusal};
 use serde_json::{Map, Value, json};
 
 /// Arguments of `giotto config`.
@@ -34,17 +35,43 @@ enum Verb {
     },
 }
 
-/// A number of the configuration: its name, how many of its unit make one of the controller's, and where it is.
-type Number = (&'static str, f64, fn(&mut MachineConfig) -> &mut f32);
+/// A number of the configuration: its name, how many of its unit make one of the controller's, where it is, and what it is called
+/// on the wire.
+type Number = (
+    &'static str,
+    f64,
+    fn(&mut MachineConfig) -> &mut f32,
+    ConfigField,
+);
 
 const NUMBERS: [Number; 7] = [
-    ("feed_mm_s", 1e-3, |c| &mut c.feed_m_s),
-    ("acceleration_mm_s2", 1e-3, |c| &mut c.acceleration_m_s2),
-    ("jerk_mm_s3", 1e-3, |c| &mut c.jerk_m_s3),
-    ("positioning_mm_s", 1e-3, |c| &mut c.positioning_m_s),
-    ("offset_mm", 1e-3, |c| &mut c.offset_m),
-    ("offset_rate_mm_s", 1e-3, |c| &mut c.slew_m_s),
-    ("stream_window_ms", 1e-3, |c| &mut c.stream_window_s),
+    ("feed_mm_s", 1e-3, |c| &mut c.feed_m_s, ConfigField::Feed),
+    (
+        "acceleration_mm_s2",
+        1e-3,
+        |c| &mut c.acceleration_m_s2,
+        ConfigField::Acceleration,
+    ),
+    ("jerk_mm_s3", 1e-3, |c| &mut c.jerk_m_s3, ConfigField::Jerk),
+    (
+        "positioning_mm_s",
+        1e-3,
+        |c| &mut c.positioning_m_s,
+        ConfigField::Positioning,
+    ),
+    ("offset_mm", 1e-3, |c| &mut c.offset_m, ConfigField::Offset),
+    (
+        "offset_rate_mm_s",
+        1e-3,
+        |c| &mut c.slew_m_s,
+        ConfigField::Slew,
+    ),
+    (
+        "stream_window_ms",
+        1e-3,
+        |c| &mut c.stream_window_s,
+        ConfigField::Window,
+    ),
 ];
 const SOFT: [&str; 3] = ["soft_x_mm", "soft_y_mm", "soft_z_mm"];
 const CLOCK: &str = "internal_clock";
@@ -52,7 +79,7 @@ const CLOCK: &str = "internal_clock";
 fn document(config: &MachineConfig) -> Map<String, Value> {
     let mut copy = *config;
     let mut all = Map::new();
-    for (name, unit, place) in NUMBERS {
+    for (name, unit, place, _) in NUMBERS {
         // Single precision, shown to its digits.
         let value = f64::from(*place(&mut copy)) / unit;
         let digits = format!("{value:.6e}").parse::<f64>().unwrap_or(value);
@@ -86,7 +113,7 @@ fn change(config: &mut MachineConfig, text: &str) -> Result<(), Failure> {
             .filter(|value| value.is_finite());
         value.ok_or_else(|| wrong("expected a number"))
     };
-    if let Some((_, unit, place)) = NUMBERS.iter().find(|(known, ..)| *known == name) {
+    if let Some((_, unit, place, _)) = NUMBERS.iter().find(|(known, ..)| *known == name) {
         *place(config) = (number(value)? * unit) as f32;
     } else if let Some(axis) = SOFT.iter().position(|known| *known == name) {
         let (least, most) = value
@@ -100,6 +127,23 @@ fn change(config: &mut MachineConfig, text: &str) -> Result<(), Failure> {
         return Err(wrong("no such limit").help(format_args!("names: {}", names())));
     }
     Ok(())
+}
+
+/// What a controller takes, in the user's units.
+fn possible(field: ConfigField) -> String {
+    let number = NUMBERS.iter().find(|(.., own)| *own == field);
+    match (number, field.most()) {
+        (Some((name, ..)), _) if field == ConfigField::Positioning => {
+            format!("{name} may be above 0 and no more than {}", NUMBERS[0].0)
+        }
+        (Some((name, unit, ..)), Some(most)) => {
+            format!("{name} may be above 0 and up to {}", most / unit)
+        }
+        _ => {
+            let most = MAX_POSITION_M * 1e3;
+            format!("soft limits are LEAST,MOST within -{most} to {most} mm, the smaller one first")
+        }
+    }
 }
 
 fn show(controller: &mut Controller, out: Output) -> Result<(), Failure> {
@@ -149,10 +193,9 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
                 .try_for_each(|text| change(&mut config, text))?;
             let told = controller.command(Command::Configure(config));
             told.map_err(|error| match error {
-                ControllerError::Refused(Refusal::Config(_)) => {
-                    Failure::controller(format_args!("{}: {error}", values.join(" "))).help(
-                        "giotto config get shows what it keeps now; its firmware bounds each limit",
-                    )
+                ControllerError::Refused(Refusal::Config(field)) => {
+                    Failure::controller(format_args!("{}: {error}", values.join(" ")))
+                        .help(possible(field))
                 }
                 error => error.into(),
             })?;

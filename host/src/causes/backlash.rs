@@ -41,6 +41,10 @@ impl CauseModel for Backlash {
         &WORDS
     }
 
+    fn makes_steps(&self) -> bool {
+        true
+    }
+
     fn size(&self) -> &'static Parameter {
         &SIZE
     }

@@ -65,6 +65,10 @@ impl CauseModel for LateralPlay {
         }
     }
 
+    fn makes_steps(&self) -> bool {
+        true
+    }
+
     fn flexible(&self) -> bool {
         true
     }

@@ -225,6 +225,11 @@ pub trait CauseModel: Sync {
         self.allows(value)
     }
 
+    /// Whether it makes a step or teeth where its actuator turns round: a short pulse there looks like their shoulder.
+    fn makes_steps(&self) -> bool {
+        false
+    }
+
     /// Whether it can take on the form of other things: beside much that is unexplained it needs to be larger.
     fn flexible(&self) -> bool {
         !self.shape_names().is_empty()

@@ -121,8 +121,7 @@ impl CauseModel for ReversalSpike {
     /// Friction opposes the new direction: the spike is outward. An inward one is a compensation that is set too high, unless
     /// the actuator has play or sticks: then it is the shoulder of that step for the most part.
     fn allows_beside(&self, peak_um: f64, others: &[Cause]) -> bool {
-        let steps = [Cause::Backlash, Cause::StickSlip, Cause::LateralPlay];
-        peak_um > 0.0 || !others.iter().any(|other| steps.contains(other))
+        peak_um > 0.0 || !others.iter().any(|other| other.model().makes_steps())
     }
 
     fn signature(

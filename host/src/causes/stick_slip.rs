@@ -39,6 +39,10 @@ impl CauseModel for StickSlip {
         &WORDS
     }
 
+    fn makes_steps(&self) -> bool {
+        true
+    }
+
     fn size(&self) -> &'static Parameter {
         &SIZE
     }

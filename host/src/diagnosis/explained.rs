@@ -10,7 +10,7 @@ use super::spread::Spread;
 use super::survey::{Lag, Prepared, Response};
 use super::tangent::Tangents;
 use super::tone::Tone;
-use crate::causes::{Cause, Site};
+use crate::causes::{Cause, CauseModel, Evidence, Site, shown_by};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
@@ -78,7 +78,8 @@ impl Explained {
             Kind::Pattern(_) => None,
         });
         let teeth = self.teeth.iter().filter(|teeth| own.contains(&teeth.axis));
-        named.chain(teeth.map(|_| Cause::StickSlip)).collect()
+        let teeth = teeth.filter_map(|_| shown_by(Evidence::Roughness).map(CauseModel::cause));
+        named.chain(teeth).collect()
     }
 
     /// Enters explanations, each chosen from so many starting shapes; gives their numbers.

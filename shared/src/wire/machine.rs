@@ -50,3 +50,18 @@ pub enum ConfigField {
     #[error("soft limits")]
     Soft,
 }
+
+impl ConfigField {
+    /// Most that any controller takes, SI (m/s, m/s², m/s³, m, s); each is above 0. Nothing for the soft limits, and the
+    /// positioning feed is bounded by the feed beside it.
+    pub const fn most(self) -> Option<f64> {
+        match self {
+            Self::Feed | Self::Positioning => Some(10.0),
+            Self::Acceleration => Some(1e3),
+            Self::Jerk => Some(1e6),
+            Self::Offset => Some(0.05),
+            Self::Slew | Self::Window => Some(1.0),
+            Self::Soft => None,
+        }
+    }
+}

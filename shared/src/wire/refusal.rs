@@ -66,7 +66,7 @@ pub enum Refusal {
     #[error("a key is already provisioned")]
     KeyProvisioned,
     /// A number of the configuration is none, or beyond what the image allows.
-    #[error("configuration: the {0} is out of range")]
+    #[error("configuration, out of range: {0}")]
     Config(ConfigField),
     /// This controller has nowhere to store a configuration.
     #[error("this controller has nowhere to store a configuration")]
