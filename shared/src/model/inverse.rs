@@ -217,7 +217,9 @@ mod tests {
                 return None;
             }
         }
-        Some(x)
+        // A step that leaps over a fold lands where no solution is.
+        let met = (x + a / x + b / x.powi(3) - 1.0).abs() < 1e-7;
+        met.then_some(x)
     }
 
     proptest! {
