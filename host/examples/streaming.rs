@@ -4,7 +4,7 @@
 //! [--keep DIR]` writes a campaign of ballbar runs, or one file in a foreign layout, analyses it in a process of its own and
 //! prints seconds and peak memory (Linux: VmHWM, which counts everything the process ever held at once) as one line of JSON.
 use giotto::analysis;
-use giotto::campaign::import::{self, Format, Laps, Options};
+use giotto::campaign::import::{self, Options};
 use giotto::campaign::{Direction, Manifest};
 use std::error::Error;
 use std::f64::consts::TAU;
@@ -59,22 +59,8 @@ fn measure(path: &Path) -> Result<(), Box<dyn Error>> {
     let manifest = if path.extension().is_some_and(|e| e == "toml") {
         Manifest::open(path)?
     } else {
-        let options = Options {
-            radius_m: RADIUS_MM * 1e-3,
-            feed_m_s: FOREIGN_FEED_MM_S * 1e-3,
-            direction: Some(Direction::Ccw),
-            format: Format::Auto,
-            columns: None,
-            start_angle_rad: None,
-            started_s: None,
-            temperature_c: None,
-            centre_m: None,
-            even_angles: false,
-            plane: None,
-            setup: None,
-            machine: None,
-            laps: Laps::First,
-        };
+        let options =
+            Options::of_circle(RADIUS_MM * 1e-3, FOREIGN_FEED_MM_S * 1e-3, Direction::Ccw);
         import::open(path, &options, &|_, _| {})?.0
     };
     let opened = start.elapsed().as_secs_f64();

@@ -6,14 +6,17 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Folders of product code.
-const PRODUCT: [&str; 7] = [
+const PRODUCT: [&str; 10] = [
     "shared/src",
     "firmware/src",
+    "firmware/corrector/src",
+    "firmware/linuxcnc/src",
     "host/src",
     "host/nc/src",
     "host/link/src",
     "host/report/src",
     "host/cli/src",
+    "host/bridge/src",
 ];
 
 fn workspace() -> PathBuf {

@@ -139,6 +139,30 @@ fn what_has_no_name_is_left_unexplained() {
     ]);
 }
 
+/// A step at a fixed place inside a slow stroke is one edge a stroke; teeth are many.
+#[test]
+fn a_step_at_a_place_is_no_stick_slip() {
+    for seed in [389_000, 389_001] {
+        let kind = effects(&["unknown_quadrant"]);
+        let case = Case::new(&kind, 10.0, seed, Variety::Broad).unwrap();
+        let verdict = judge(&case.hidden(), &answer(&case));
+        assert!(
+            verdict.exact && verdict.false_findings.is_empty(),
+            "seed {seed}: {}",
+            verdict.said
+        );
+    }
+}
+
+/// An inward pulse beside teeth is a piece of them.
+#[test]
+fn teeth_are_no_compensation_set_too_high() {
+    let kind = effects(&["stick_slip"]);
+    let case = Case::new(&kind, 1.0, 193_001, Variety::Broad).unwrap();
+    let verdict = judge(&case.hidden(), &answer(&case));
+    assert!(verdict.false_findings.is_empty(), "{}", verdict.said);
+}
+
 /// A loud tone is found where teeth make everything rough: its own leakage does not hide it.
 #[test]
 fn a_loud_vibration_beside_teeth_is_named() {

@@ -19,7 +19,7 @@ mod session;
 
 use commands::Commands;
 use giotto::analysis::of_campaign;
-use giotto::campaign::import::{Format, Laps, Options, add};
+use giotto::campaign::import::{Format, Options, add};
 use giotto::campaign::{Direction, Plane, read};
 use giotto::diagnosis::{self, diagnose};
 use giotto::model_file::ModelFile;
@@ -192,20 +192,11 @@ fn import(
     direction: Direction,
 ) -> Result<(), LinuxCncError> {
     let options = Options {
-        radius_m: radius_mm * 1e-3,
-        feed_m_s: feed_mm_s * 1e-3,
-        direction: Some(direction),
         format: Format::Columns,
         columns: Some("time_ms,-,-,-,x_mm,y_mm,z_mm".to_owned()),
-        start_angle_rad: None,
-        started_s: None,
-        temperature_c: None,
-        centre_m: None,
-        even_angles: false,
-        plane: None,
         setup: Some("A".to_owned()),
         machine: Some("LinuxCNC scenario".to_owned()),
-        laps: Laps::First,
+        ..Options::of_circle(radius_mm * 1e-3, feed_mm_s * 1e-3, direction)
     };
     add(&[file], folder, &options, &|_, _| ())
         .map(drop)

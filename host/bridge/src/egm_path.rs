@@ -5,9 +5,9 @@
 //! down, to the right as seen along the path. For whole circles at one feed that is all there is; where a circle begins or
 //! ends and where the feed changes the door is too slow.
 use crate::Place;
-use crate::door::Setup;
 use crate::egm;
 use crate::protocol::{Answer, Heard, Mode, Protocol, Told};
+use crate::setup::Setup;
 use abbegm::msg::{
     EgmCartesian, EgmHeader, EgmPathCorr, EgmSensorPathCorr, egm_header::MessageType,
 };

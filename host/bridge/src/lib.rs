@@ -5,6 +5,7 @@
 //!
 //! | file | holds |
 //! |---|---|
+//! | `setup` | what a door is told once |
 //! | `door` | the one state machine: engage, answer, hold, leave, refuse |
 //! | `protocol` | what a door has to be able to: read the robot, write to it |
 //! | `egm`, `egm_path`, `rsi`, `j519` | ONE FILE A DOOR: its bytes and its habits |
@@ -34,13 +35,15 @@ mod protocol;
 pub mod record;
 mod rsi;
 mod sequence;
+mod setup;
 pub mod socket;
 
-pub use door::{Door, Phase, Setup, SetupError};
+pub use door::{Door, Phase};
 pub use path::{Path, PathError};
 pub use player::Motion;
 pub use protocol::{Kind, Mode};
 pub use sequence::Counters;
+pub use setup::{Setup, SetupError};
 
 /// A place or an offset, mm.
 pub type Place = [f64; 3];

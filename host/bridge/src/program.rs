@@ -2,9 +2,9 @@
 //!
 //! A circle of 100 mm radius at 20 mm/s stands in each for a first try; the places have to be taught. None was ever loaded on a
 //! real controller.
-use crate::door::Setup;
 use crate::protocol::{Kind, Mode};
 use crate::rsi::SENTYPE;
+use crate::setup::Setup;
 
 /// The door has another end there.
 #[derive(Clone, Debug)]

@@ -5,8 +5,8 @@
 //! last correction. In relative mode (`HOLDON="0"`) a lost answer loses a part of it: it is given again when the robot has
 //! counted the answer as late (`DEF_Delay`).
 use crate::Place;
-use crate::door::Setup;
 use crate::protocol::{Answer, Heard, Mode, Protocol, Told};
+use crate::setup::Setup;
 use quick_xml::events::{BytesStart, Event};
 use std::collections::VecDeque;
 

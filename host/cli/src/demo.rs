@@ -4,12 +4,11 @@ use super::destination::{Destination, Kind as FileKind};
 use super::failure::Failure;
 use super::grid::{Grid, width};
 use super::output::Output;
+use super::proof_shown;
 use crate::ring::{
-    CIRCLES, DemoError, LEFT_M, Learned, Proof, REDUCTION_PERCENT, Size, bundled, learn, picture,
-    prove,
+    CIRCLES, DemoError, LEFT_M, Learned, Proof, REDUCTION_PERCENT, bundled, learn, picture, prove,
 };
 use giotto_link::{Controller, OpenOptions, Port, open};
-use giotto_shared::Direction;
 use indicatif::ProgressBar;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -131,46 +130,17 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     )))
 }
 
-pub(super) fn um(size: Size) -> Value {
-    json!({
-        "radius_error_rms_um": size.radius_error_rms_m * 1e6,
-        "out_of_roundness_um": size.out_of_roundness_m * 1e6,
-    })
-}
-
-pub(super) const fn word(direction: Direction) -> &'static str {
-    match direction {
-        Direction::Ccw => "ccw",
-        Direction::Cw => "cw",
-    }
-}
-
 /// The contract's document; what the machine is, the seed and the form of each circle beside it.
 fn document(kind: Kind, machine: &str, seed: u64, proof: &Proof) -> Value {
-    let circles: Vec<Value> = proof
-        .circles
-        .iter()
-        .map(|pair| {
-            let (before, after) = (&pair.before.analysis, &pair.after.analysis);
-            json!({
-                "radius_mm": (before.radius_m * 1e9).round() / 1e6,
-                "feed_mm_s": (before.feed_m_s * 1e9).round() / 1e6,
-                "direction": word(before.direction),
-                "before_um": before.radius_error_m * 1e6,
-                "after_um": after.radius_error_m * 1e6,
-                "out_of_roundness_um": [before.out_of_roundness_m * 1e6, after.out_of_roundness_m * 1e6],
-            })
-        })
-        .collect();
     json!({
         "controller": kind.name(),
         "simulated": true,
         "machine": machine,
         "seed": seed,
-        "before": um(proof.before()),
-        "after": um(proof.after()),
+        "before": proof_shown::um(proof.before()),
+        "after": proof_shown::um(proof.after()),
         "reduction_percent": proof.reduction_percent(),
-        "circles": circles,
+        "circles": proof_shown::circles(proof),
     })
 }
 
@@ -271,29 +241,7 @@ fn show_proof(proof: &Proof, out: Output) {
         flashed.bytes, flashed.slot, flashed.generation
     ));
     out.say("6 run       circles whose radii and speeds are not in the campaign, last of the steady turns measured:");
-    let header = [
-        "R mm",
-        "mm/s",
-        "way",
-        "ΔR before",
-        "ΔR after",
-        "roundness before",
-        "after (µm)",
-    ];
-    let mut circles = Grid::new(&header, 0, 3);
-    for pair in &proof.circles {
-        let (before, after) = (&pair.before.analysis, &pair.after.analysis);
-        circles.row([
-            format!("{:.0}", before.radius_m * 1e3),
-            format!("{:.0}", before.feed_m_s * 1e3),
-            word(before.direction).to_owned(),
-            format!("{:.2}", before.radius_error_m * 1e6),
-            format!("{:+.2}", after.radius_error_m * 1e6),
-            format!("{:.1}", before.out_of_roundness_m * 1e6),
-            format!("{:.1}", after.out_of_roundness_m * 1e6),
-        ]);
-    }
-    out.say(indented(&circles));
+    out.say(indented(&proof_shown::grid(proof, 0)));
     let (before, after) = (proof.before(), proof.after());
     if proof.clamped > 0 {
         out.say(format_args!(

@@ -6,7 +6,7 @@ use super::output::Output;
 use super::paragraph::sentence;
 use super::source::{length, tell};
 use giotto::analysis;
-use giotto::campaign::import::{self, Format, Laps, Options as Import};
+use giotto::campaign::import::{self, Format, Options as Import};
 use giotto::campaign::{self, Campaign, Direction};
 use giotto::diagnosis::{Action, Diagnosis, Options, diagnose};
 use std::io::{BufRead, IsTerminal, Write};
@@ -204,20 +204,8 @@ impl<L: BufRead> Dialogue<L> {
             None
         };
         Ok(Import {
-            radius_m: radius * 1e-3,
-            feed_m_s: feed * 1e-3,
-            direction: Some(direction),
-            format: Format::Auto,
-            columns: None,
-            start_angle_rad: None,
-            started_s: None,
-            temperature_c: None,
-            centre_m: None,
-            even_angles: false,
-            plane: None,
-            setup: None,
             machine,
-            laps: Laps::First,
+            ..Import::of_circle(radius * 1e-3, feed * 1e-3, direction)
         })
     }
 }

@@ -259,6 +259,21 @@ fn limits_are_shown_changed_kept_and_refused() {
     ] {
         assert_eq!(served.said(&["config", "set", wrong]).0, code, "{wrong}");
     }
+    // What would be taken is said in the unit of the name, and it is taken.
+    let (_, words) = served.said(&["config", "set", "acceleration_mm_s2=1e9"]);
+    assert!(words.contains("up to 1000000"), "{words}");
+    assert_eq!(
+        served
+            .said(&["config", "set", "acceleration_mm_s2=1000000"])
+            .0,
+        0
+    );
+    assert_eq!(
+        served
+            .said(&["config", "set", "acceleration_mm_s2=1000001"])
+            .0,
+        4
+    );
 }
 
 #[test]

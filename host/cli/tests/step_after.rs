@@ -108,3 +108,22 @@ fn where_the_table_leaves_nothing_there_is_nothing_to_do() {
             .contains("the table at work")
     );
 }
+
+#[test]
+fn a_given_model_that_explains_all_is_said_to_be_enough() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let machine = "both = { kv_per_s = 40.0 }\nx = { backlash_um = 12.0 }\n";
+    measured(folder, "first", machine, 1);
+    let (code, _, words) = giotto(folder, "diagnose first -o model.toml");
+    assert_eq!(code, 0, "{words}");
+    measured(folder, "second", machine, 2);
+    let (code, found, words) = giotto(folder, "diagnose second --model model.toml");
+    assert_eq!(code, 0, "{words}");
+    assert_eq!(found["findings"], serde_json::json!([]), "{found}");
+    let words = found["recommendation"]["words"].as_str().unwrap();
+    assert!(
+        words.contains("given model") && !words.contains("fit"),
+        "{words}"
+    );
+}

@@ -194,6 +194,37 @@ fn a_poor_campaign_gets_a_page_that_says_what_is_missing() {
     elements(&page);
 }
 
+/// A loud round circle has a larger range than an oval one, and no worse form.
+#[test]
+fn the_worst_form_is_not_the_loudest_noise() {
+    let (mut campaign, _) = measured(&[0.1, 0.2], &[0.02, 0.1, 0.2], 1800);
+    let index = |campaign: &Campaign, radius_m: f64, feed_m_s: f64| {
+        let same =
+            |run: &giotto::campaign::Run| run.radius_m == radius_m && run.feed_m_s == feed_m_s;
+        campaign.runs.iter().position(same).unwrap()
+    };
+    let loud = index(&campaign, 0.1, 0.02);
+    for (k, value) in campaign.runs[loud]
+        .samples
+        .deviation_m
+        .iter_mut()
+        .enumerate()
+    {
+        *value += if k % 2 == 0 { 30e-6 } else { -30e-6 };
+    }
+    let diagnosis = diagnose(&campaign, &Options::default()).unwrap();
+    let worst = super::verdict::worst(&diagnosis).unwrap();
+    assert_ne!(worst.index, loud);
+    // The oval of the squareness grows with the radius: 60 µm/m over 0.2 m.
+    assert_eq!(campaign.runs[worst.index].radius_m, 0.2);
+    assert!((worst.form_m - 12e-6).abs() < 3e-6, "{}", worst.form_m);
+    let [circle, ..] = super::verdict::sentences(&campaign, &diagnosis);
+    assert!(
+        circle.contains("radius 200 mm") && circle.contains("too small"),
+        "{circle}"
+    );
+}
+
 #[test]
 fn seventy_eight_runs_stay_far_below_three_megabytes() {
     let feeds: Vec<f64> = (1..=13).map(|i| 0.05 * f64::from(i)).collect();

@@ -1,7 +1,7 @@
 //! One session: the socket, Ctrl-C, what is shown while it runs, what is said at its end.
 use crate::destination::{Destination, Kind};
 use crate::failure::cannot_write;
-use crate::{Failure, Output};
+use crate::{Failure, Output, interrupt};
 use giotto::whole_file;
 use giotto_bridge::record::Record;
 use giotto_bridge::{Counters, Door, Phase, socket};
@@ -9,8 +9,7 @@ use serde_json::json;
 use std::io::{self, Write};
 use std::net::{SocketAddr, UdpSocket};
 use std::path::Path;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::atomic::Ordering::Relaxed;
 use std::time::{Duration, Instant};
 
 /// Between two looks of a person at a terminal, and between two lines elsewhere.
@@ -29,9 +28,7 @@ pub(super) struct Session<'a> {
 
 /// What is known at its end.
 struct Ended {
-    door: Door,
     robot: Option<SocketAddr>,
-    listen: SocketAddr,
     interrupted: bool,
     largest_mm: f64,
     seconds: f64,
@@ -65,38 +62,18 @@ impl Session<'_> {
                 ended.ok_or_else(|| Failure::input("nothing was recorded"))?
             }
         };
-        let (robot, interrupted, largest_mm, seconds, rows) = ended;
-        self.tell(
-            &Ended {
-                door,
-                robot,
-                listen,
-                interrupted,
-                largest_mm,
-                seconds,
-                rows,
-            },
-            out,
-        )
+        self.tell(&door, listen, &ended, out)
     }
 
-    /// Guides the robot; its address, whether a person has ended it, the largest correction, how long, rows recorded.
-    #[allow(clippy::type_complexity, reason = "taken apart at the only call")]
+    /// Guides the robot.
     fn guide(
         &self,
         socket: &UdpSocket,
         door: &mut Door,
         file: &mut dyn Write,
         out: Output,
-    ) -> io::Result<(Option<SocketAddr>, bool, f64, f64, u64)> {
-        let wish = Arc::new(AtomicBool::new(false));
-        let heard = Arc::clone(&wish);
-        // Where there are no signals to listen to, Ctrl-C does what it always did.
-        let _ = ctrlc::set_handler(move || {
-            if heard.swap(true, Relaxed) {
-                std::process::exit(130);
-            }
-        });
+    ) -> io::Result<Ended> {
+        let wish = interrupt::listen();
         let began = Instant::now();
         let mut live = Live::new(out);
         let mut record = Record::begin(file)?;
@@ -121,17 +98,29 @@ impl Session<'_> {
         let rows = record.rows();
         record.end()?;
         let seconds = began.elapsed().as_secs_f64();
-        Ok((robot, wish.load(Relaxed), largest_mm, seconds, rows))
+        Ok(Ended {
+            robot,
+            interrupted: wish.load(Relaxed),
+            largest_mm,
+            seconds,
+            rows,
+        })
     }
 
     /// Counts as words or as one document; then whether it was a session at all.
-    fn tell(&self, ended: &Ended, out: Output) -> Result<(), Failure> {
-        let (door, counters) = (&ended.door, ended.door.counters());
+    fn tell(
+        &self,
+        door: &Door,
+        listen: SocketAddr,
+        ended: &Ended,
+        out: Output,
+    ) -> Result<(), Failure> {
+        let counters = door.counters();
         let record = self.record.map(|path| path.display().to_string());
         if out.json {
             out.document(&json!({
                 "door": self.name,
-                "listen": ended.listen.to_string(),
+                "listen": listen.to_string(),
                 "robot": ended.robot.map(|robot| robot.to_string()),
                 "seconds": ended.seconds,
                 "latency_s": door.latency_s(),
@@ -172,8 +161,7 @@ impl Session<'_> {
                 Err(Failure::interrupted("no robot was heard until then"))
             }
             _ if counters.received == 0 => Err(Failure::controller(format_args!(
-                "no robot was heard on {} in {:.0} s",
-                ended.listen,
+                "no robot was heard on {listen} in {:.0} s",
                 self.patience.as_secs_f64()
             ))
             .help("check its remote address and port, the firewall, and that its program runs")),

@@ -2,7 +2,7 @@
 use crate::failure::Failure;
 use crate::ring::{Measured, Pair, Proof, image};
 use giotto::analysis;
-use giotto::campaign::import::{Format, Laps, Options, add};
+use giotto::campaign::import::{Options, add};
 use giotto::campaign::{Campaign, Run, read};
 use giotto_link::Controller;
 use giotto_link::linuxcnc::drive::{self, Sample};
@@ -12,6 +12,7 @@ use giotto_shared::wire::Command;
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 /// A stop of a program lasts so long, s; standing still for half of it is one.
@@ -94,7 +95,11 @@ fn cut<'a>(samples: &'a [Sample], circles: &[Circle], period_s: f64) -> Vec<&'a 
 }
 
 /// Runs circles in LinuxCNC; the campaign is kept in `folder`.
-pub(super) fn measure(circles: &[(f64, f64)], folder: &Path) -> Result<Campaign, Failure> {
+pub(super) fn measure(
+    circles: &[(f64, f64)],
+    folder: &Path,
+    wish: &AtomicBool,
+) -> Result<Campaign, Failure> {
     let circles = both_ways(circles);
     let failed =
         |what: &dyn std::fmt::Display| Failure::input(format_args!("{}: {what}", folder.display()));
@@ -104,7 +109,7 @@ pub(super) fn measure(circles: &[(f64, f64)], folder: &Path) -> Result<Campaign,
     let period_s = drive::period_s()?;
     let motion_s = |(r, f, _): &Circle| (TURNS * TAU * r + 4.0 * r) / f + 10.0;
     let whole_s: f64 = circles.iter().map(motion_s).sum();
-    let samples = drive::run(&file, Duration::from_secs_f64(2.0 * whole_s))?;
+    let samples = drive::run(&file, Duration::from_secs_f64(2.0 * whole_s), wish)?;
     let runs = cut(&samples, &circles, period_s);
     if runs.len() != circles.len() {
         return Err(Failure::controller(format_args!(
@@ -128,20 +133,9 @@ pub(super) fn measure(circles: &[(f64, f64)], folder: &Path) -> Result<Campaign,
 
 fn options((radius_mm, feed_mm_s, direction): &Circle) -> Options {
     Options {
-        radius_m: radius_mm * 1e-3,
-        feed_m_s: feed_mm_s * 1e-3,
-        direction: Some(*direction),
-        format: Format::Auto,
-        columns: None,
-        start_angle_rad: None,
-        started_s: None,
-        temperature_c: None,
-        centre_m: None,
-        even_angles: false,
-        plane: None,
         setup: Some("A".to_owned()),
         machine: Some("LinuxCNC".to_owned()),
-        laps: Laps::First,
+        ..Options::of_circle(radius_mm * 1e-3, feed_mm_s * 1e-3, *direction)
     }
 }
 
@@ -151,15 +145,16 @@ pub(super) fn prove(
     table: &Table,
     circles: &[(f64, f64)],
     folder: &Path,
+    wish: &AtomicBool,
 ) -> Result<Proof, Failure> {
     let failed = |error: &dyn std::fmt::Display| Failure::input(format_args!("the table: {error}"));
     let image = image(table).map_err(|error| failed(&error))?;
     controller.command(Command::Bypass { on: true })?;
-    let before = measure(circles, &folder.join("before"))?;
+    let before = measure(circles, &folder.join("before"), wish)?;
     let flashed = controller.flash(&image, &mut |_| ())?;
     let counters = controller.status()?.counters;
     controller.command(Command::Bypass { on: false })?;
-    let after = measure(circles, &folder.join("after"))?;
+    let after = measure(circles, &folder.join("after"), wish)?;
     let since = controller.status()?.counters;
     let measured = |run: Run| -> Result<Measured, Failure> {
         let analysis = analysis::of_run(&run, None).map_err(|error| failed(&error))?;

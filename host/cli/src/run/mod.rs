@@ -7,10 +7,8 @@ mod stream;
 mod stream_file;
 
 use super::port::PortArgs;
-use super::{Failure, Output};
+use super::{Failure, Output, interrupt};
 use giotto_link::Controller;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// Arguments of `giotto run`.
 #[derive(clap::Args, Debug)]
@@ -32,17 +30,7 @@ enum Path {
 /// Opens the controller; from now on Ctrl-C stops what it runs and keeps what was recorded, a second one ends this program.
 fn open(port: &PortArgs, out: Output) -> Result<Controller, Failure> {
     let mut controller = port.open(out)?;
-    let wish = Arc::new(AtomicBool::new(false));
-    let heard = Arc::clone(&wish);
-    // Where there are no signals to listen to, Ctrl-C does what it always did.
-    let listening = ctrlc::set_handler(move || {
-        if heard.swap(true, Relaxed) {
-            std::process::exit(130);
-        }
-    });
-    if listening.is_ok() {
-        controller.stop_on(wish);
-    }
+    controller.stop_on(interrupt::listen());
     Ok(controller)
 }
 

@@ -3,6 +3,8 @@
 Arguments: `limits`, or `run FILE SECONDS`. One JSON document on stdout.
 """
 import json
+import os
+import select
 import sys
 import time
 
@@ -43,6 +45,12 @@ def limits():
     }
 
 
+def waited_for():
+    """Whoever asked holds our standard input open for as long as it waits."""
+    readable, _, _ = select.select([sys.stdin], [], [], 0)
+    return not readable or bool(os.read(sys.stdin.fileno(), 1))
+
+
 def run(file, seconds):
     ready()
     complaint()
@@ -50,25 +58,32 @@ def run(file, seconds):
     command.wait_complete(10)
     command.program_open(file)
     command.wait_complete(10)
-    command.auto(linuxcnc.AUTO_RUN, 0)
-    time.sleep(0.3)
-    until = time.time() + float(seconds)
-    while time.time() < until:
-        stat.poll()
-        said = complaint()
-        if said:
+    done = False
+    try:
+        command.auto(linuxcnc.AUTO_RUN, 0)
+        time.sleep(0.3)
+        until = time.time() + float(seconds)
+        while time.time() < until:
+            stat.poll()
+            said = complaint()
+            if said:
+                raise RuntimeError(said)
+            if stat.task_state != linuxcnc.STATE_ON:
+                raise RuntimeError("the machine was switched off")
+            if stat.interp_state == linuxcnc.INTERP_IDLE:
+                done = True
+                return {"done": True}
+            if not waited_for():
+                raise RuntimeError("nobody waits for the program any more")
+            time.sleep(0.02)
+        raise RuntimeError("the program did not end within %s s" % seconds)
+    finally:
+        # Ctrl-C and whatever else comes: no machine goes on by itself.
+        if not done:
             command.abort()
-            raise RuntimeError(said)
-        if stat.task_state != linuxcnc.STATE_ON:
-            raise RuntimeError("the machine was switched off")
-        if stat.interp_state == linuxcnc.INTERP_IDLE:
-            return {"done": True}
-        time.sleep(0.02)
-    command.abort()
-    raise RuntimeError("the program did not end within %s s" % seconds)
 
 
 try:
     print(json.dumps(limits() if sys.argv[1] == "limits" else run(sys.argv[2], sys.argv[3])))
-except Exception as error:  # said to whoever asked
-    print(json.dumps({"error": str(error)}))
+except BaseException as error:  # said to whoever asked
+    print(json.dumps({"error": str(error) or type(error).__name__}))

@@ -69,6 +69,28 @@ impl Options {
     }
 }
 
+impl Options {
+    /// A circle of this radius and feed in an XY plane, all else as the file says it.
+    pub const fn of_circle(radius_m: f64, feed_m_s: f64, direction: Direction) -> Self {
+        Self {
+            radius_m,
+            feed_m_s,
+            direction: Some(direction),
+            format: Format::Auto,
+            columns: None,
+            start_angle_rad: None,
+            started_s: None,
+            temperature_c: None,
+            centre_m: None,
+            even_angles: false,
+            plane: None,
+            setup: None,
+            machine: None,
+            laps: Laps::First,
+        }
+    }
+}
+
 /// Which laps of a recording become runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Laps {
@@ -146,7 +168,7 @@ pub struct Reason {
 /// The first problem met, in the lines of the foreign file; the campaign is then as it was.
 ///
 /// ```
-/// use giotto::campaign::import::{Format, Laps, Options, add};
+/// use giotto::campaign::import::{Options, add};
 /// use giotto::campaign;
 ///
 /// let folder = tempfile::tempdir()?;
@@ -158,20 +180,8 @@ pub struct Reason {
 /// std::fs::write(&file, rows)?;
 ///
 /// let options = Options {
-///     radius_m: 0.1,
-///     feed_m_s: 0.05,
-///     direction: Some(campaign::Direction::Ccw),
-///     format: Format::Auto,
-///     columns: None,
-///     start_angle_rad: None,
-///     started_s: None,
-///     temperature_c: None,
-///     centre_m: None,
-///     even_angles: false,
-///     plane: None,
-///     setup: None,
 ///     machine: Some("mill".into()),
-///     laps: Laps::First,
+///     ..Options::of_circle(0.1, 0.05, campaign::Direction::Ccw)
 /// };
 /// let target = folder.path().join("campaign");
 /// let added = add(&[file], &target, &options, &|_, _| {})?;

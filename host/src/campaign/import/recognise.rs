@@ -5,6 +5,7 @@ use super::layout::{Head, Layout, Quantity, latin1, split};
 use super::plain_text;
 use super::rows::{EXPECTED, Slice};
 use super::xml;
+use crate::campaign::samples::FEWEST;
 use crate::campaign::{CampaignError, Place, Problem};
 use std::io::Read;
 use std::path::Path;
@@ -101,6 +102,10 @@ fn layout(path: &Path, lines: &Head, reading: Reading<'_>) -> Result<Layout, Cam
             }
             Ok(*layout)
         }
+        Ok(Detected::Unknown { .. }) if is_names_alone(lines) => refuse(Problem::TooFew {
+            found: 0,
+            expected: FEWEST,
+        }),
         Ok(Detected::Unknown { names }) => refuse(Problem::UnknownFormat {
             found: crate::campaign::table::shorten(lines.line(0)),
             wanted: reading.format.to_string(),
@@ -108,6 +113,13 @@ fn layout(path: &Path, lines: &Head, reading: Reading<'_>) -> Result<Layout, Cam
             names,
         }),
     }
+}
+
+/// Whether there are names of columns, and nothing below them.
+fn is_names_alone(lines: &Head) -> bool {
+    let mut filled = lines.lines.iter().filter(|line| !line.trim().is_empty());
+    let first = filled.next();
+    filled.next().is_none() && first.is_some_and(|line| line.contains([',', ';', '\t']))
 }
 
 /// The order of bytes of UTF-16: by its mark, or by every second byte being zero.

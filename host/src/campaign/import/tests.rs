@@ -1,6 +1,6 @@
 //! Files of every kind, made up: what the machine did and how the file writes it vary, what it drew is known.
 use super::batch::Said;
-use super::{Format, Laps, Options, add, add_each};
+use super::{Options, add, add_each};
 use crate::analysis;
 use crate::campaign::{Direction, Manifest};
 use rand::{RngExt, SeedableRng};
@@ -139,22 +139,7 @@ fn csv<const N: usize>(header: &str, rows: &[[f64; N]]) -> String {
 }
 
 fn options() -> Options {
-    Options {
-        radius_m: R_MM * 1e-3,
-        feed_m_s: FEED_MM_S * 1e-3,
-        direction: Some(Direction::Ccw),
-        format: Format::Auto,
-        columns: None,
-        start_angle_rad: None,
-        started_s: None,
-        temperature_c: None,
-        centre_m: None,
-        even_angles: false,
-        plane: None,
-        setup: None,
-        machine: None,
-        laps: Laps::First,
-    }
+    Options::of_circle(R_MM * 1e-3, FEED_MM_S * 1e-3, Direction::Ccw)
 }
 
 /// A run as it is found.
