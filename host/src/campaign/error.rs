@@ -167,7 +167,7 @@ pub enum Problem {
     NotANumber { text: String, column: String },
     #[error("empty field; expected {column} as a number")]
     EmptyField { column: String },
-    #[error("empty line in the data; expected a row")]
+    #[error("empty line or comment in the data; expected a row")]
     EmptyLine,
     #[error("\"{text}\" is not finite; expected {column} as a finite number")]
     NotFinite { text: String, column: String },

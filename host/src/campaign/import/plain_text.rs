@@ -1,5 +1,5 @@
 //! What spreadsheets write otherwise, brought into the shape that rows are read in: lines that end by a carriage return alone,
-//! and thousands that are grouped (`"1,234.5678"`).
+//! and thousands that are grouped (`"1,234.5678"`, `1'234.5678`, `1 234,5678` with a blank that breaks no line).
 
 /// The text with line feeds and without groups; nothing where it is plain as it stands.
 pub(super) fn of(bytes: &[u8]) -> Option<Vec<u8>> {
@@ -17,16 +17,51 @@ pub(super) fn of(bytes: &[u8]) -> Option<Vec<u8>> {
             None => at = comma + 1,
         }
     }
-    if out.is_empty() && !returns {
+    let marked = MARKS
+        .iter()
+        .any(|mark| memchr::memmem::find(bytes, mark).is_some());
+    if out.is_empty() && !returns && !marked {
         return None;
     }
     out.extend_from_slice(&bytes[copied..]);
+    let mut changed = copied > 0 || returns;
+    for mark in MARKS {
+        changed |= take_out(mark, &mut out);
+    }
     if returns {
         out.iter_mut()
             .filter(|b| **b == b'\r')
             .for_each(|b| *b = b'\n');
     }
-    Some(out)
+    changed.then_some(out)
+}
+
+/// Marks that group thousands and nothing else: apostrophes, and blanks that break no line, in UTF-8 and in Latin-1.
+const MARKS: [&[u8]; 5] = [
+    "\u{a0}".as_bytes(),
+    "\u{202f}".as_bytes(),
+    "\u{2019}".as_bytes(),
+    b"\xa0",
+    b"'",
+];
+
+/// Takes a mark out of all numbers in which it stands between a digit and three more; whether there was one.
+fn take_out(mark: &[u8], text: &mut Vec<u8>) -> bool {
+    let digit = |at: usize| text.get(at).is_some_and(u8::is_ascii_digit);
+    let groups = memchr::memmem::find_iter(text, mark).filter(|&at| {
+        let behind = at + mark.len();
+        at > 0 && digit(at - 1) && (0..3).all(|k| digit(behind + k)) && !digit(behind + 3)
+    });
+    let groups: Vec<usize> = groups.collect();
+    let mut plain = Vec::with_capacity(text.len());
+    let mut copied = 0;
+    for at in &groups {
+        plain.extend_from_slice(&text[copied..*at]);
+        copied = at + mark.len();
+    }
+    plain.extend_from_slice(&text[copied..]);
+    *text = plain;
+    !groups.is_empty()
 }
 
 /// Where the grouped number begins and ends whose first comma is at `comma`: a field of its own, between quotes, tabs or
@@ -85,6 +120,8 @@ mod tests {
             ("\"-1,234,567.5\"\n", "\"-1234567.5\"\n"),
             ("0.1\t-1,234.5\t2,000.\n", "0.1\t-1234.5\t2000.\n"),
             ("1,234.5;3,210.25\r\n", "1234.5;3210.25\r\n"),
+            ("0.5;-1'234.5;2'345'678.25\n", "0.5;-1234.5;2345678.25\n"),
+            ("1\u{202f}234,5;2\u{a0}345\n", "1234,5;2345\n"),
         ] {
             assert_eq!(of(text).as_deref(), Some(plain), "{text}");
         }
@@ -103,6 +140,9 @@ mod tests {
             "\"1,23.4\"",
             "\"12345,678.9\"",
             "a line\r\nand another\r\n",
+            // A stamp, a quoted name, a unit behind a blank.
+            "1,2,'08.11.2022 16:17:28.353,P\n",
+            "'234' 12\u{a0}mm\n",
             ",,,.;",
             "",
         ] {

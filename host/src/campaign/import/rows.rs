@@ -138,7 +138,7 @@ impl Slice {
                 ))
             };
             if let (Some(blank), true) = (blank, rest.rows > 0 || rest.failed.is_some()) {
-                return refuse(blank, 1, Problem::EmptyLine); // blank lines may end a file, not divide it
+                return refuse(blank, 1, Problem::EmptyLine); // blank lines and comments may end a file, not divide it
             }
             if let Some((line, column, problem)) = rest.failed {
                 return refuse(lines + line, column, problem);
@@ -268,7 +268,8 @@ impl<'a> Plan<'a> {
                     let end =
                         memchr::memchr(b'\n', &bytes[at..]).map_or(bytes.len(), |p| at + p + 1);
                     let line = &bytes[at..end];
-                    if line.trim_ascii().is_empty() {
+                    let words = line.trim_ascii_start();
+                    if words.is_empty() || words.starts_with(b"#") || words.starts_with(b"%") {
                         blank = blank.or(Some(lines));
                         (at, lines) = (end, lines + 1);
                         continue;

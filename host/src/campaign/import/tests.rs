@@ -523,6 +523,8 @@ fn headers_in_every_shape_are_understood() {
         ("italian", comma(table("Tempo (s);X (mm);Y (mm);", &plain, ";")).into(), true, ""),
         ("carriage returns", table("Time (s),X (mm),Y (mm)", &plain, ",").replace('\n', "\r").into(), true, ""),
         ("grouped", table("Time (s)\tX (mm)\tY (mm)", &rows(&|_, p| vec![p[0], p[1] + 1000.0, p[2] + 1000.0]), "\t").replace("\t1", "\t1,").into(), true, ""),
+        ("apostrophes", table("Time (s);X (mm);Y (mm)", &rows(&|_, p| vec![p[0], p[1] + 1000.0, p[2] + 1000.0]), ";").replace(";1", ";1'").into(), true, ""),
+        ("comment at the end", (table("time_s,x_mm,y_mm", &plain, ",") + "# end, operator: J\n\n").into(), true, ""),
         ("UTF-16", utf16(&table("Time (s)\tX (mm)\tY (mm)", &plain, "\t")), true, ""),
         ("UTF-16 German", utf16(&comma(table("Zeit [s];X [mm];Y [mm]", &plain, ";"))), true, ""),
         ("ISO", iso(&|t| format!("2024-05-02T09:00:{:06.3}Z", 20.0 + t)).into(), true, ""),
