@@ -3,6 +3,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`Actuator`], [`Plane`], [`Frame`] | the drives of a machine, and where a circle lies in it |
+//! | [`kinematics`] | arms: from joints to the place of the tool and back, with derivatives |
 //! | [`circle`] | mergeable moments of a point set, algebraic and geometric circle, plane of 3-D points |
 //! | [`model`] | the radius model ΔR = β1 f²/R + β2 f⁴/R³ (Eq. 15 of the source paper), cumulants, inverse |
 //! | [`term`] | the profile terms that diagnosis fits, the table carries and the engine evaluates |
@@ -48,6 +49,7 @@ pub mod direction;
 pub mod encoding;
 pub mod fixed;
 mod frame;
+pub mod kinematics;
 pub mod law;
 pub mod model;
 pub mod path;

@@ -1,4 +1,5 @@
 //! The error of a machine beside the radius law, in the few numbers that undo it.
+use super::arm::{ArmErrors, JointErrors};
 use crate::Actuator;
 use num_traits::Float;
 
@@ -52,6 +53,8 @@ pub struct Profile<T> {
     pub cyclic: [CyclicError<T>; MAX_CYCLIC],
     /// By the slide along which the guide is bowed, then by the slide that is off, 1/m.
     pub bow_per_m: [[T; 3]; 3],
+    /// Of the joints, where the table knows the arm.
+    pub arm: ArmErrors<T>,
 }
 
 /// Why a term cannot be undone together with others.
@@ -60,11 +63,13 @@ pub enum Unmergeable {
     /// A number is not finite, or a pitch or decay is not positive.
     #[error("has a number that is not finite, or a pitch or decay that is not positive")]
     Value,
-    /// One more of its kind than can be undone at once: periodic errors, or spikes of one slide with unlike decays.
+    /// One more of its kind than can be undone at once: periodic errors, or pulses of one actuator with unlike decays.
     #[error("is one more of its kind than can be undone at once")]
     TooMany,
-    /// A joint, or one slide where two are needed.
-    #[error("is for a joint, or for one slide where two are needed")]
+    /// A joint where a slide is needed or the other way round, or one slide where two are needed.
+    #[error(
+        "is for a joint where it takes a slide, for a slide where it takes a joint, or for one slide where two are needed"
+    )]
     Actuator,
 }
 
@@ -97,4 +102,16 @@ pub(crate) fn slide_index(actuator: Actuator) -> Result<usize, Unmergeable> {
         Actuator::Z => Ok(2),
         _ => Err(Unmergeable::Actuator),
     }
+}
+
+/// Errors of a joint.
+pub(crate) fn joint_errors<T: Float>(
+    profile: &mut Profile<T>,
+    joint: Actuator,
+) -> Result<&mut JointErrors<T>, Unmergeable> {
+    if joint.is_slide() {
+        return Err(Unmergeable::Actuator);
+    }
+    let errors = profile.arm.joint.get_mut(joint.index());
+    errors.ok_or(Unmergeable::Actuator)
 }

@@ -3,7 +3,7 @@
 //! ```text
 //! offset  size  what
 //!      0     4  magic 47 49 4F 54 ("GIOT")          ┐
-//!      4     2  format version, 2                   │ fixed for all versions, so that a newer table
+//!      4     2  format version, 3                   │ fixed for all versions, so that a newer table
 //!      6     2  flags: bit 0 = signed               │ is told from a broken one
 //!      8     4  length n of the whole image, bytes  │
 //!     12     4  CRC-32 of bytes 0..12 and 16..n     ┘
@@ -14,14 +14,18 @@
 //!
 //! The CRC is ISO-HDLC (the one of Ethernet and zip). The order of checks is magic, length, CRC, version,
 //! flags, schema, body, numbers: a flipped bit is called a flipped bit, not a newer version.
-use super::{Limits, MAX_TERMS, MAX_ZONES, Table, TableError, Zone};
+use super::validate::no_arm;
+use super::{Arm, Limits, MAX_TERMS, MAX_ZONES, Table, TableError, Zone};
 use crate::encoding::{Crc32, crc32, take};
+use crate::term::Term;
 
 /// First four bytes of a table.
 pub const MAGIC: [u8; 4] = *b"GIOT";
-/// Format written and read by this build. Format 1 knew X and Y of one plane only: whether its terms meant this
+/// Format written by this build; format 2, which knew no arms, is read as well. Format 1 knew X and Y of one plane only: whether its terms meant this
 /// machine's X and Y its bytes do not say.
-pub const FORMAT_VERSION: u16 = 2;
+pub const FORMAT_VERSION: u16 = 3;
+/// Format whose tables have no arm, and the hash of its schema.
+const WITHOUT_ARM: (u16, u32) = (2, 0xd668_0447);
 /// Flag bit 0: a signature follows the body.
 pub const FLAG_SIGNED: u16 = 1;
 /// Length of the header.
@@ -35,7 +39,8 @@ pub const SCHEMA_HASH: u32 = crc32(include_bytes!("schema.txt"));
 const MAX_BODY_BYTES: usize = {
     let term = 1 + 1 + 3 * 4;
     let zone = (1 + 24) + 8 + 8 + 1 + 8 + (1 + MAX_TERMS * term);
-    (1 + 32) + (1 + MAX_ZONES * zone) + 8
+    let arm = (1 + (1 + (7 + 3 + 4) * 4 + 1)) + (1 + 12);
+    (1 + 32) + (1 + MAX_ZONES * zone) + 8 + arm
 };
 /// Longest image.
 pub const MAX_IMAGE_BYTES: usize = HEADER_BYTES + MAX_BODY_BYTES + SIGNATURE_BYTES;
@@ -143,7 +148,7 @@ pub fn decode_into(bytes: &[u8], table: &mut Table) -> Result<(), TableError> {
     let head = read(bytes, &mut |zone| {
         table.zones.push(zone).map_err(|_| TableError::Malformed)
     })?;
-    (table.machine, table.limits) = head;
+    (table.machine, table.limits, table.arm) = head;
     Ok(())
 }
 
@@ -164,8 +169,13 @@ pub fn check(bytes: &[u8]) -> Result<(), TableError> {
     .map(drop)
 }
 
-/// The body of an image whose header holds.
-fn body(bytes: &[u8]) -> Result<&[u8], TableError> {
+/// Whether this build reads tables of a format.
+pub const fn reads(version: u16) -> bool {
+    version == FORMAT_VERSION || version == WITHOUT_ARM.0
+}
+
+/// The body of an image whose header holds, and whether it may have an arm.
+fn body(bytes: &[u8]) -> Result<(&[u8], bool), TableError> {
     let header = Header::check(bytes)?;
     if bytes.len() > header.length {
         return Err(TableError::TooLong {
@@ -174,7 +184,7 @@ fn body(bytes: &[u8]) -> Result<&[u8], TableError> {
         });
     }
     match header.version {
-        FORMAT_VERSION => {}
+        version if reads(version) => {}
         0 => return Err(TableError::UnknownVersion { version: 0 }),
         version if version < FORMAT_VERSION => {
             return Err(TableError::OlderVersion {
@@ -195,11 +205,10 @@ fn body(bytes: &[u8]) -> Result<&[u8], TableError> {
         });
     }
     let found = word(bytes, 16).map_or(0, u32::from_le_bytes);
-    if found != SCHEMA_HASH {
-        return Err(TableError::SchemaMismatch {
-            found,
-            expected: SCHEMA_HASH,
-        });
+    let with_arm = header.version == FORMAT_VERSION;
+    let expected = if with_arm { SCHEMA_HASH } else { WITHOUT_ARM.1 };
+    if found != expected {
+        return Err(TableError::SchemaMismatch { found, expected });
     }
     let trailer = if header.flags & FLAG_SIGNED == 0 {
         0
@@ -208,11 +217,12 @@ fn body(bytes: &[u8]) -> Result<&[u8], TableError> {
     };
     let end = header.length.checked_sub(trailer);
     end.and_then(|end| bytes.get(HEADER_BYTES..end))
+        .map(|body| (body, with_arm))
         .ok_or(TableError::Malformed)
 }
 
 /// What a table has beside its zones.
-type Head = (heapless::String<32>, Limits);
+type Head = (heapless::String<32>, Limits, Option<Arm>);
 
 /// Reads an image zone by zone. Postcard writes a struct as its fields in order and a vector as its length (LEB128)
 /// and its elements; the tests compare with the whole.
@@ -220,23 +230,37 @@ fn read(
     bytes: &[u8],
     keep: &mut dyn FnMut(Zone) -> Result<(), TableError>,
 ) -> Result<Head, TableError> {
-    let (machine, rest) = take(body(bytes)?).ok_or(TableError::Malformed)?;
+    let (body, with_arm) = body(bytes)?;
+    let (machine, rest) = take(body).ok_or(TableError::Malformed)?;
     let (count, mut rest) = take::<u32>(rest).ok_or(TableError::Malformed)?;
     if count == 0 {
         return Err(TableError::NoZones);
     }
+    let mut of_arm = None;
     for index in 0..count {
         let (zone, after) = take::<Zone>(rest).ok_or(TableError::Malformed)?;
         zone.validate(index as usize)?;
+        if of_arm.is_none() && zone.terms.iter().any(Term::is_of_arm) {
+            of_arm = Some(index as u8);
+        }
         keep(zone)?;
         rest = after;
     }
-    let (limits, rest) = take::<Limits>(rest).ok_or(TableError::Malformed)?;
+    let (limits, mut rest) = take::<Limits>(rest).ok_or(TableError::Malformed)?;
+    let mut arm = None;
+    if with_arm {
+        (arm, rest) = take::<Option<Arm>>(rest).ok_or(TableError::Malformed)?;
+    }
     if !rest.is_empty() {
         return Err(TableError::Malformed);
     }
     limits.validate()?;
-    Ok((machine, limits))
+    match &arm {
+        Some(arm) => arm.validate()?,
+        // The first zone with one is named.
+        None => no_arm(of_arm)?,
+    }
+    Ok((machine, limits, arm))
 }
 
 /// Writes the unsigned image of `table` to the start of `out` and returns its length.

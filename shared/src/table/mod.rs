@@ -5,10 +5,11 @@ pub mod validate;
 
 pub use crate::bounds;
 pub use image::{
-    FORMAT_VERSION, Header, MAX_IMAGE_BYTES, SCHEMA_HASH, check, decode, decode_into, encode,
+    FORMAT_VERSION, Header, MAX_IMAGE_BYTES, SCHEMA_HASH, check, decode, decode_into, encode, reads,
 };
 pub use validate::{Field, TableError};
 
+use crate::kinematics::Kinematics;
 use crate::model::Cumulants;
 use crate::term::Term;
 use serde::{Deserialize, Serialize};
@@ -60,6 +61,15 @@ pub struct Limits {
     pub slew_m_s: f32,
 }
 
+/// The arm that a table corrects through its joints.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Arm {
+    /// Its kinematics; never slides.
+    pub kinematics: Kinematics<f32>,
+    /// Place from which zeros and lengths are counted, m: there they move nothing. `None`: they are taken as they are.
+    pub home_m: Option<[f32; 3]>,
+}
+
 /// A whole correction table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Table {
@@ -69,6 +79,8 @@ pub struct Table {
     pub zones: heapless::Vec<Zone, MAX_ZONES>,
     /// Bounds.
     pub limits: Limits,
+    /// `None`: the machine has slides.
+    pub arm: Option<Arm>,
 }
 
 impl Table {
@@ -82,6 +94,7 @@ impl Table {
             machine: heapless::String::new(),
             zones: heapless::Vec::new(),
             limits,
+            arm: None,
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Every way in which a table can be wrong, each its own error. Whatever passes may be handed to the engine.
-use super::{Limits, Table, Zone};
+use super::{Arm, Limits, Table, Zone};
+use crate::kinematics::Kinematics;
 use crate::term::{Number, Term, Unfit};
 use crate::{Actuator, bounds};
 use serde::{Deserialize, Serialize};
@@ -17,6 +18,9 @@ pub enum Field {
     Kappa2,
     Kappa4,
     Term(Number),
+    ArmLength,
+    ArmLink,
+    Orientation,
 }
 
 impl Field {
@@ -31,6 +35,9 @@ impl Field {
             Self::Kappa2 => "kappa2 (s^2)",
             Self::Kappa4 => "kappa4 (s^4)",
             Self::Term(number) => number.name(),
+            Self::ArmLength => "length of the arm (m)",
+            Self::ArmLink => "link of the arm (m)",
+            Self::Orientation => "orientation of the tool (length of a quaternion)",
         }
     }
 }
@@ -175,8 +182,8 @@ pub enum TableError {
         /// Version this build reads.
         supported: u16,
     },
-    /// A term of a joint: a zone has no kinematics to correct it through.
-    #[error("{at}: a term is for {actuator}, and a zone corrects slides only")]
+    /// A joint in a term that is of slides.
+    #[error("{at}: a term of slides is for {actuator}")]
     Joint {
         /// Which zone.
         at: Where,
@@ -190,6 +197,20 @@ pub enum TableError {
         at: Where,
         /// The slide.
         actuator: Actuator,
+    },
+    /// A slide in a term that is of joints.
+    #[error("{at}: a term of joints is for {actuator}")]
+    Slide {
+        /// Which zone.
+        at: Where,
+        /// The slide.
+        actuator: Actuator,
+    },
+    /// A term of joints in a table without the arm that it goes through.
+    #[error("{at}: a term is for a joint, and the table has no arm")]
+    NoArm {
+        /// Which zone.
+        at: Where,
     },
 }
 
@@ -251,8 +272,54 @@ impl Check {
                 hi,
             },
             Unfit::Joint(actuator) => TableError::Joint { at, actuator },
+            Unfit::Slide(actuator) => TableError::Slide { at, actuator },
             Unfit::Same(actuator) => TableError::SameActuator { at, actuator },
         })
+    }
+}
+
+/// Longest length of an arm, m.
+const ARM_MAX_M: f32 = 10.0;
+/// Shortest link, m.
+const LINK_MIN_M: f32 = 1.0e-3;
+/// Length of a quaternion of single precision, from files that round to four digits.
+const UNIT: [f32; 2] = [0.998, 1.002];
+
+/// An arm is needed.
+pub(super) fn no_arm(of_arm: Option<u8>) -> Result<(), TableError> {
+    of_arm.map_or(Ok(()), |zone| {
+        Err(TableError::NoArm {
+            at: Where(Some(zone)),
+        })
+    })
+}
+
+impl Arm {
+    /// Checks lengths and orientation.
+    ///
+    /// # Errors
+    /// [`TableError::NonFinite`], [`TableError::OutOfBounds`]; [`TableError::Malformed`] for slides.
+    pub fn validate(&self) -> Result<(), TableError> {
+        let check = Check(Where::HEAD);
+        let length = |value| check.magnitude(Field::ArmLength, value, ARM_MAX_M);
+        let link = |value| check.within(Field::ArmLink, value, [LINK_MIN_M, ARM_MAX_M]);
+        match &self.kinematics {
+            Kinematics::Slides => return Err(TableError::Malformed),
+            Kinematics::Scara(scara) => {
+                link(scara.l1_m)?;
+                link(scara.l2_m)?;
+            }
+            Kinematics::Opw(opw) => {
+                let beside = [opw.a1_m, opw.a2_m, opw.b_m, opw.c1_m, opw.c4_m];
+                beside.into_iter().chain(opw.tool_m).try_for_each(length)?;
+                link(opw.c2_m)?;
+                link(opw.c3_m)?;
+                let square: f32 = opw.orientation.iter().map(|part| part * part).sum();
+                check.within(Field::Orientation, libm::sqrtf(square), UNIT)?;
+            }
+        }
+        let mut home = self.home_m.iter().flatten();
+        home.try_for_each(|place| check.magnitude(Field::Place, *place, bounds::PLACE_MAX_M))
     }
 }
 
@@ -315,9 +382,13 @@ impl Table {
         if self.zones.is_empty() {
             return Err(TableError::NoZones);
         }
-        self.zones
-            .iter()
-            .enumerate()
-            .try_for_each(|(index, zone)| zone.validate(index))
+        let mut zones = self.zones.iter().enumerate();
+        zones.try_for_each(|(index, zone)| zone.validate(index))?;
+        if let Some(arm) = &self.arm {
+            return arm.validate();
+        }
+        let mut zones = self.zones.iter();
+        let of_arm = zones.position(|zone| zone.terms.iter().any(Term::is_of_arm));
+        no_arm(of_arm.map(|zone| zone as u8))
     }
 }

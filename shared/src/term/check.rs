@@ -18,6 +18,8 @@ pub enum Number {
     Pitch,
     Phase,
     Curvature,
+    Angle,
+    Waves,
 }
 
 impl Number {
@@ -33,6 +35,8 @@ impl Number {
             Self::Pitch => "pitch (m)",
             Self::Phase => "phase (rad)",
             Self::Curvature => "guide curvature (1/m)",
+            Self::Angle => "angle of a joint (rad)",
+            Self::Waves => "waves in a turn of a joint",
         }
     }
 }
@@ -61,9 +65,12 @@ pub enum Unfit {
         /// Largest allowed.
         hi: f32,
     },
-    /// A joint: zones have no kinematics.
-    #[error("{0} is a joint, and a zone corrects slides only")]
+    /// A joint where the term is of slides.
+    #[error("{0} is a joint, and this term is of slides")]
     Joint(Actuator),
+    /// A slide where the term is of joints.
+    #[error("{0} is a slide, and this term is of joints")]
+    Slide(Actuator),
     /// Two actuators that span no plane.
     #[error("{0} is given twice: a shift goes across the travel")]
     Same(Actuator),
@@ -97,6 +104,15 @@ pub(super) fn slide(actuator: Actuator) -> Result<(), Unfit> {
         Ok(())
     } else {
         Err(Unfit::Joint(actuator))
+    }
+}
+
+/// A joint.
+pub(super) fn joint(actuator: Actuator) -> Result<(), Unfit> {
+    if actuator.is_slide() {
+        Err(Unfit::Slide(actuator))
+    } else {
+        Ok(())
     }
 }
 

@@ -13,7 +13,13 @@ mod backlash;
 mod bandwidth_mismatch;
 mod check;
 mod cyclic;
+mod joint_backlash;
+mod joint_cyclic;
+mod joint_lag;
+mod joint_reversal;
+mod joint_zero;
 mod lateral_play;
+mod link_length;
 mod radius_offset;
 mod reach;
 mod reversal_spike;
@@ -124,7 +130,60 @@ pub enum Term<T> {
         /// c, 1/m: the bow over ±R is cR².
         curvature_per_m: T,
     },
+    /// A joint that lags and smooths more than the others.
+    JointLag {
+        /// The joint.
+        actuator: Actuator,
+        /// Δτ, lag beyond that of the others, s.
+        delta_tau_s: T,
+        /// Δκ2, second cumulant beyond that of the others, s².
+        delta_kappa2_s2: T,
+    },
+    /// Play of a joint's gear.
+    JointBacklash {
+        /// The joint.
+        actuator: Actuator,
+        /// From one side to the other, rad.
+        play_rad: T,
+    },
+    /// Friction pulse after a joint has turned back, behind the motion.
+    JointReversal {
+        /// The joint.
+        actuator: Actuator,
+        /// Height, rad.
+        peak_rad: T,
+        /// Time constant of the decay, s.
+        decay_s: T,
+    },
+    /// Periodic error of a joint's gear: `amplitude·sin(waves·q + phase)`.
+    JointCyclic {
+        /// The joint.
+        actuator: Actuator,
+        /// Amplitude, rad.
+        amplitude_rad: T,
+        /// Waves in a turn of the joint.
+        waves: T,
+        /// Phase at angle 0, rad.
+        phase_rad: T,
+    },
+    /// Offset of a joint's zero.
+    JointZero {
+        /// The joint.
+        actuator: Actuator,
+        /// Where it stands beyond where it is told to, rad.
+        offset_rad: T,
+    },
+    /// A link longer than programmed.
+    LinkLength {
+        /// The joint before the link.
+        actuator: Actuator,
+        /// By so much, m.
+        longer_m: T,
+    },
 }
+
+/// Longest lever of a joint that is reckoned with where limits are made, m.
+const LEVER_M: f64 = 2.0;
 
 /// What the file of a term provides.
 trait Kind<T: Float>: Copy {
@@ -157,6 +216,12 @@ macro_rules! with_kind {
             ReversalSpike reversal_spike { actuator, peak_m, decay_s },
             Cyclic cyclic { actuator, amplitude_m, pitch_m, phase_rad },
             Straightness straightness { actuator, across, curvature_per_m },
+            JointLag joint_lag { actuator, delta_tau_s, delta_kappa2_s2 },
+            JointBacklash joint_backlash { actuator, play_rad },
+            JointReversal joint_reversal { actuator, peak_rad, decay_s },
+            JointCyclic joint_cyclic { actuator, amplitude_rad, waves, phase_rad },
+            JointZero joint_zero { actuator, offset_rad },
+            LinkLength link_length { actuator, longer_m },
         )
     };
     (@ $term:expr, $kind:ident => $body:expr; $($name:ident $file:ident { $($field:ident),* },)*) => {
@@ -167,6 +232,21 @@ macro_rules! with_kind {
             })*
         }
     };
+}
+
+impl<T> Term<T> {
+    /// Whether it is of a joint or a link: it needs the kinematics of the arm.
+    pub const fn is_of_arm(&self) -> bool {
+        matches!(
+            self,
+            Self::JointLag { .. }
+                | Self::JointBacklash { .. }
+                | Self::JointReversal { .. }
+                | Self::JointCyclic { .. }
+                | Self::JointZero { .. }
+                | Self::LinkLength { .. }
+        )
+    }
 }
 
 impl<T: Float> Term<T> {

@@ -1,7 +1,8 @@
 //! The bytes of a table are a promise: pinned here, and every way to break them tried.
 use super::*;
+use crate::kinematics::{Branch, Kinematics, Opw};
 use crate::model::Cumulants;
-use crate::table::{Field, Limits, Travel, Zone, bounds, validate::Where};
+use crate::table::{Arm, Field, Limits, Travel, Zone, bounds, validate::Where};
 use crate::term::Term;
 use crate::{Actuator, Direction, Plane};
 use proptest::prelude::*;
@@ -29,7 +30,60 @@ fn table() -> Table {
             offset_m: 1e-3,
             slew_m_s: 0.05,
         },
+        arm: None,
     }
+}
+
+fn arm() -> Arm {
+    Arm {
+        kinematics: Kinematics::Opw(Opw {
+            a1_m: 0.15,
+            a2_m: 0.0,
+            b_m: 0.0,
+            c1_m: 0.4865,
+            c2_m: 0.7,
+            c3_m: 0.6,
+            c4_m: 0.065,
+            tool_m: [0.0, 0.065, 0.149],
+            orientation: [0.0, 0.0, 1.0, 0.0],
+            branch: Branch::ElbowUp,
+        }),
+        home_m: Some([-0.29, 0.987, 0.615]),
+    }
+}
+
+/// Every term of a joint.
+fn joint_terms(actuator: Actuator) -> [Term<f32>; 6] {
+    [
+        Term::JointLag {
+            actuator,
+            delta_tau_s: 1e-3,
+            delta_kappa2_s2: 1e-5,
+        },
+        Term::JointBacklash {
+            actuator,
+            play_rad: 1e-4,
+        },
+        Term::JointReversal {
+            actuator,
+            peak_rad: 1e-4,
+            decay_s: 0.02,
+        },
+        Term::JointCyclic {
+            actuator,
+            amplitude_rad: 1e-4,
+            waves: 100.0,
+            phase_rad: 0.3,
+        },
+        Term::JointZero {
+            actuator,
+            offset_rad: 1e-3,
+        },
+        Term::LinkLength {
+            actuator,
+            longer_m: 1e-3,
+        },
+    ]
 }
 
 /// Every term, of every actuator, pair and plane.
@@ -75,6 +129,9 @@ fn all_terms() -> Vec<Term<f32>> {
     for actuator in Actuator::SLIDES {
         terms.extend(own_terms(actuator));
     }
+    for actuator in Actuator::JOINTS {
+        terms.extend(joint_terms(actuator));
+    }
     terms
 }
 
@@ -118,11 +175,11 @@ fn reseal(image: &mut [u8]) {
 #[test]
 fn golden_bytes() {
     #[rustfmt::skip]
-    let expected: [u8; 64] = [
+    let expected: [u8; 65] = [
         0x47, 0x49, 0x4f, 0x54,                         // "GIOT"
-        2, 0,                                           // format 2
+        3, 0,                                           // format 3
         0, 0,                                           // flags
-        64, 0, 0, 0,                                    // length
+        65, 0, 0, 0,                                    // length
         0, 0, 0, 0,                                     // CRC (below)
         0, 0, 0, 0,                                     // schema (below)
         7, b'i', b'r', b'b', b'1', b'6', b'0', b'0',    // machine
@@ -135,6 +192,7 @@ fn golden_bytes() {
         0xa4, 0x8c, 0xb8, 0xb6,                         // kappa4 -5.5e-6
         0,                                              // no terms
         0x6f, 0x12, 0x83, 0x3a, 0xcd, 0xcc, 0x4c, 0x3d, // offset 1e-3, slew 0.05
+        0,                                              // no arm
     ];
     let image = bytes(&table());
     assert_eq!(image[..12], expected[..12]);
@@ -150,9 +208,54 @@ fn golden_bytes() {
 }
 
 /// `zlib.crc32` of the golden image without its CRC field.
-const GOLDEN_CRC: u32 = 0x37d9_bd46;
+const GOLDEN_CRC: u32 = 0x89b4_e99b;
 /// `zlib.crc32` of `schema.txt`.
-const GOLDEN_SCHEMA: u32 = 0xd668_0447;
+const GOLDEN_SCHEMA: u32 = 0x4437_9a07;
+
+/// A table of the format before, as it stands in the flash of a controller: its bytes are read, and have no arm.
+#[test]
+fn tables_without_arm_are_still_read() {
+    let mut image = bytes(&table());
+    image.pop();
+    image[4] = 2;
+    image[8] = 64;
+    image[16..20].copy_from_slice(&0xd668_0447u32.to_le_bytes());
+    let crc = crc_of(&image);
+    // zlib's, of the bytes that format 2 pinned.
+    assert_eq!(crc, 0x37d9_bd46);
+    image[12..16].copy_from_slice(&crc.to_le_bytes());
+    assert_eq!(decode(&image), Ok(table()));
+}
+
+#[test]
+fn an_arm_that_is_none_is_refused() {
+    let refused = |change: &dyn Fn(&mut Opw<f32>)| {
+        let mut wrong = arm();
+        if let Kinematics::Opw(opw) = &mut wrong.kinematics {
+            change(opw);
+        }
+        let mut table = table();
+        table.arm = Some(wrong);
+        table.validate().unwrap_err()
+    };
+    let field = |error| match error {
+        TableError::NonFinite { field, .. } | TableError::OutOfBounds { field, .. } => field,
+        other => panic!("{other}"),
+    };
+    assert_eq!(field(refused(&|o| o.a1_m = f32::NAN)), Field::ArmLength);
+    assert_eq!(field(refused(&|o| o.tool_m[1] = 20.0)), Field::ArmLength);
+    assert_eq!(field(refused(&|o| o.c3_m = 0.0)), Field::ArmLink);
+    assert_eq!(
+        field(refused(&|o| o.orientation = [0.7; 4])),
+        Field::Orientation
+    );
+    let mut table = table();
+    table.arm = Some(Arm {
+        kinematics: Kinematics::Slides,
+        home_m: None,
+    });
+    assert_eq!(table.validate(), Err(TableError::Malformed));
+}
 
 /// First byte of each variant, written out: a term that moves changes the meaning of every table.
 #[test]
@@ -174,6 +277,12 @@ fn discriminants_are_pinned() {
             Term::ReversalSpike { .. } => 9,
             Term::Cyclic { .. } => 10,
             Term::Straightness { .. } => 11,
+            Term::JointLag { .. } => 12,
+            Term::JointBacklash { .. } => 13,
+            Term::JointReversal { .. } => 14,
+            Term::JointCyclic { .. } => 15,
+            Term::JointZero { .. } => 16,
+            Term::LinkLength { .. } => 17,
         };
         assert_eq!(first(term), expected, "{term:?}");
     }
@@ -197,6 +306,7 @@ fn largest_table_fits_exactly() {
     table.machine = "12345678901234567890123456789012".try_into().unwrap();
     table.zones.clear();
     table.zones.resize(MAX_ZONES, longest).unwrap();
+    table.arm = Some(arm());
     let image = bytes(&table);
     assert_eq!(image.len(), MAX_IMAGE_BYTES - SIGNATURE_BYTES);
     assert_eq!(decode(&image), Ok(table.clone()));
@@ -213,6 +323,7 @@ fn every_term_survives_the_trip() {
     for term in all_terms() {
         let mut table = table();
         table.zones[0].terms.push(term).unwrap();
+        table.arm = Some(arm());
         assert_eq!(decode(&bytes(&table)), Ok(table));
     }
 }
@@ -262,7 +373,7 @@ fn each_breakage_has_its_own_error() {
         broken(&newer),
         TableError::NewerVersion {
             version: 9,
-            supported: 2
+            supported: 3
         }
     );
     // The same byte changed on the way, not by a newer giotto.
@@ -279,7 +390,7 @@ fn each_breakage_has_its_own_error() {
         older,
         TableError::OlderVersion {
             version: 1,
-            supported: 2
+            supported: 3
         }
     );
     assert_eq!(edit(6, 2), TableError::UnknownFlags { flags: 2 });
@@ -394,6 +505,14 @@ fn terms_of_joints_and_of_one_slide_twice_are_refused() {
         for term in own_terms(actuator) {
             assert_eq!(refused(term), TableError::Joint { at, actuator });
         }
+        for term in joint_terms(actuator) {
+            assert_eq!(refused(term), TableError::NoArm { at });
+        }
+    }
+    for actuator in Actuator::SLIDES {
+        for term in joint_terms(actuator) {
+            assert_eq!(refused(term), TableError::Slide { at, actuator });
+        }
     }
     let (actuator, across) = (Actuator::Z, Actuator::Z);
     let same = TableError::SameActuator { at, actuator };
@@ -422,7 +541,7 @@ fn signature_travels_outside_the_body() {
     let plain = encode(&table(), &mut out).unwrap();
     assert_eq!(signed_parts(&out[..plain]), None);
     let signed = attach_signature(&mut out, plain, |head, body| {
-        assert_eq!(head, [2, 0, 1, 0]);
+        assert_eq!(head, [3, 0, 1, 0]);
         assert_eq!(body.len(), plain - 16);
         [7; SIGNATURE_BYTES]
     });

@@ -1,0 +1,301 @@
+//! What undoes the errors of an arm: each joint's error from its own motion, brought to the tool by the Jacobian.
+//!
+//! The common answer of the joints belongs to the angles, not to the place: `q + s·q̈ + t·q⃛ + u·q⁗` for each joint, where the
+//! [`Operator`] alone would say `p + s·p̈ + u·p⁗`. The difference is what the curvature of the kinematics makes, the tilted ovals of
+//! an arm without defect. The third derivative, which only delays a circle in space, delays the waves of an angle unequally. To it come the errors of single joints and links ([`JointErrors`]).
+//!
+//! The correction is linear in the error: what that leaves is of second order, half the square of the angle's error times the
+//! lever, 0.1 µm at 0.5 mrad and 1 m.
+use super::Operator;
+use crate::kinematics::{Jet, Kinematics, ReachError, Real, Scalar};
+use crate::model::Cumulants;
+use num_traits::Float;
+
+/// Periodic errors of one gear that can be undone at once.
+pub const MAX_GEAR: usize = 2;
+
+/// A periodic error of a joint's gear: `amplitude·sin(waves·q + phase)`.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Gear<T> {
+    /// Amplitude, rad; 0: none.
+    pub amplitude_rad: T,
+    /// Waves in a turn of the joint.
+    pub waves: T,
+    /// Phase at angle 0, rad.
+    pub phase_rad: T,
+}
+
+/// What is wrong with one joint.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct JointErrors<T> {
+    /// Lag beyond that of the other joints, s: error `−lag·q̇`.
+    pub lag_s: T,
+    /// Half the second cumulant beyond that of the other joints, s²: error `+second·q̈`.
+    pub second_s2: T,
+    /// Offset of the zero, rad.
+    pub zero_rad: T,
+    /// Play of the gear, rad: error `−½play·sgn(q̇)`.
+    pub play_rad: T,
+    /// Height of the friction pulse after a reversal, rad: behind the motion.
+    pub peak_rad: T,
+    /// Time constant of its decay, s.
+    pub decay_s: T,
+    /// Periodic errors.
+    pub gear: [Gear<T>; MAX_GEAR],
+}
+
+/// What is wrong with an arm.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct ArmErrors<T> {
+    /// By joint.
+    pub joint: [JointErrors<T>; 6],
+    /// By the joint before the link: longer than programmed by so much, m.
+    pub longer_m: [T; 6],
+}
+
+/// One joint's turning back: which side of its play it stands on, and its friction pulse.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct JointSide<T> {
+    /// −1 to 1; 0 before the joint has moved.
+    sense: T,
+    /// Where the turn under way began, and where it leads.
+    from: T,
+    heading: T,
+    /// Share of the turn under way that is over.
+    done: T,
+    /// Friction pulse, rad, and how much the turn under way adds to it.
+    pulse_rad: T,
+    rise_rad: T,
+}
+
+/// Rate below which a joint's sense of travel is not known, rad/s: 10 µm/s at 1 m.
+const LEAST_RATE: f64 = 1e-5;
+
+fn number<T: Float>(value: f64) -> T {
+    T::from(value).unwrap_or_else(T::nan)
+}
+
+/// Smoothstep of degree 5, its argument within 0 and 1.
+fn smooth<T: Float>(x: T) -> T {
+    x * x * x * (x * (x * number(6.0) - number(15.0)) + number(10.0))
+}
+
+impl<T: Float> JointSide<T> {
+    /// One tick: `ahead` is the rate that the joint will have in the middle of a turn that would begin now.
+    fn tick(&mut self, ahead: T, errors: &JointErrors<T>, fade: T, turn_ticks: T) {
+        let before = if self.heading == T::zero() {
+            T::zero()
+        } else {
+            smooth(self.done)
+        };
+        let under_way = self.heading != T::zero() && self.done < T::one();
+        let turns = ahead.abs() > number(LEAST_RATE) && ahead.signum() != self.heading;
+        let mut rise = T::zero();
+        if under_way {
+            self.done = (self.done + turn_ticks.recip()).min(T::one());
+            rise = smooth(self.done) - before;
+        } else if turns {
+            // The pulse comes with a turn back, not with the first motion.
+            let reverses = self.heading != T::zero();
+            (self.from, self.heading) = (self.sense, ahead.signum());
+            self.done = turn_ticks.recip().min(T::one());
+            self.rise_rad = if reverses {
+                errors.peak_rad * self.heading - self.pulse_rad
+            } else {
+                T::zero()
+            };
+            rise = smooth(self.done);
+        }
+        self.pulse_rad = self.pulse_rad * fade + self.rise_rad * rise;
+        if self.heading != T::zero() {
+            self.sense = self.from + (self.heading - self.from) * smooth(self.done);
+        }
+    }
+}
+
+/// State of the six joints between ticks.
+pub type JointSides<T> = [JointSide<T>; 6];
+
+/// What undoes the answer that all joints have in common.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Common<T> {
+    /// Second and fourth derivative.
+    pub operator: Operator<T>,
+    /// κ3/6, s³: of the third derivative.
+    pub third_s3: T,
+}
+
+impl<T: Float> Common<T> {
+    /// Of a chain with these cumulants; the third is that of a lag and an average with the same second and fourth, if there are such
+    /// ([`third_of_lag_and_average`](Cumulants::third_of_lag_and_average)).
+    pub fn new(cumulants: &Cumulants<T>) -> Self {
+        Self {
+            operator: Operator::new(cumulants),
+            third_s3: cumulants.third_of_lag_and_average() / number(6.0),
+        }
+    }
+
+    fn offset(&self, [_, _, second, third, fourth]: [T; 5]) -> T {
+        self.operator.offset(second, fourth) + self.third_s3 * third
+    }
+}
+
+/// An arm's correction, ready for the tick.
+///
+/// ```
+/// use giotto_shared::kinematics::{Elbow, Kinematics, Scara, path};
+/// use giotto_shared::law::{ArmErrors, ArmLaw, Common, Pace};
+///
+/// let arm = Kinematics::Scara(Scara { l1_m: 0.4_f64, l2_m: 0.3, elbow: Elbow::Positive });
+/// let mut errors = ArmErrors::default();
+/// errors.joint[0].lag_s = 1e-3;
+/// let pace = Pace { tick_s: 1e-3, turn_s: 8e-3 };
+/// let law = ArmLaw::new(arm, Common::default(), errors, None, &pace)?;
+/// // At 0.1 m/s along X at (0.3, 0.4): joint 1 lags by 1 ms, so the command goes ahead of it.
+/// let still = [0.0; 3];
+/// let along_x = path(&[[0.3, 0.4, 0.0], [0.1, 0.0, 0.0], still, still, still]);
+/// let [x, y, _] = law.offset(&along_x, &mut Default::default())?;
+/// assert!(x.hypot(y) > 20e-6);
+/// # Ok::<(), giotto_shared::kinematics::ReachError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ArmLaw<T> {
+    kinematics: Kinematics<T>,
+    common: Common<T>,
+    errors: ArmErrors<T>,
+    /// What of a friction pulse a tick leaves, by joint.
+    fade: [T; 6],
+    turn_ticks: T,
+    lead_s: T,
+    /// Offset of zeros and lengths where they are counted from, m.
+    still_m: [T; 3],
+    lengths: bool,
+}
+
+/// Times of a tick, s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pace<T> {
+    /// From one tick to the next.
+    pub tick_s: T,
+    /// In which play is taken up.
+    pub turn_s: T,
+}
+
+impl<T: Real> ArmLaw<T> {
+    /// Where a place is given, zeros and lengths are counted from it: there they
+    /// move nothing.
+    ///
+    /// # Errors
+    /// The arm cannot stand at that place.
+    pub fn new(
+        kinematics: Kinematics<T>,
+        common: Common<T>,
+        errors: ArmErrors<T>,
+        home_m: Option<[T; 3]>,
+        pace: &Pace<T>,
+    ) -> Result<Self, ReachError> {
+        let half = number::<T>(0.5);
+        let fade = errors.joint.map(|joint| {
+            if joint.peak_rad == T::zero() {
+                T::zero()
+            } else {
+                (-pace.tick_s / joint.decay_s).exp()
+            }
+        });
+        let mut law = Self {
+            kinematics,
+            common,
+            errors,
+            fade,
+            turn_ticks: (pace.turn_s / pace.tick_s).max(T::one()),
+            // A reversal is noticed half a tick late on average, and the turn begins in that tick.
+            lead_s: half * pace.turn_s,
+            still_m: [T::zero(); 3],
+            lengths: errors.longer_m.iter().any(|longer| *longer != T::zero()),
+        };
+        if let Some(home_m) = home_m {
+            let q = kinematics.angles(home_m)?;
+            law.still_m = law.still(&q, &kinematics.levers(&q));
+        }
+        Ok(law)
+    }
+
+    /// The kinematics it goes through.
+    pub const fn kinematics(&self) -> &Kinematics<T> {
+        &self.kinematics
+    }
+
+    /// What zeros and lengths do to the place, with the opposite sign, m.
+    fn still(&self, q: &[T; 6], levers: &[[T; 3]; 6]) -> [T; 3] {
+        let mut out = [T::zero(); 3];
+        for (joint, lever) in self.errors.joint.iter().zip(levers) {
+            add(&mut out, *lever, -joint.zero_rad);
+        }
+        if self.lengths {
+            for (joint, longer) in self.errors.longer_m.iter().enumerate() {
+                if let Some(along) = self.kinematics.along_link(joint, q) {
+                    add(&mut out, along, -*longer);
+                }
+            }
+        }
+        out
+    }
+
+    /// One tick: what is to be added to the place on `path`, m, beside what the operator adds to a path that knows no joints.
+    ///
+    /// # Errors
+    /// The arm cannot stand there; the state is as it was.
+    pub fn offset(
+        &self,
+        path: &[Jet<T>; 3],
+        sides: &mut JointSides<T>,
+    ) -> Result<[T; 3], ReachError> {
+        let q = self.kinematics.angles(*path)?;
+        let angles = q.map(Scalar::value);
+        let levers = self.kinematics.levers(&angles);
+        let mut out = [T::zero(); 3];
+        if self.still_m != out
+            || self.lengths
+            || self.errors.joint.iter().any(|j| j.zero_rad != T::zero())
+        {
+            out = self.still(&angles, &levers);
+            for (out, still) in out.iter_mut().zip(self.still_m) {
+                *out = *out - still;
+            }
+        }
+        let half = number::<T>(0.5);
+        let joints = q.iter().zip(levers).zip(&self.errors.joint);
+        for (((q, lever), errors), (side, fade)) in joints.zip(sides.iter_mut().zip(self.fade)) {
+            let along = q.derivatives();
+            let [angle, rate, second, ..] = along;
+            if errors.play_rad != T::zero() || errors.peak_rad != T::zero() {
+                side.tick(rate + self.lead_s * second, errors, fade, self.turn_ticks);
+            }
+            let mut wanted = self.common.offset(along) + errors.lag_s * rate
+                - errors.second_s2 * second
+                + half * errors.play_rad * side.sense
+                + side.pulse_rad;
+            for gear in &errors.gear {
+                if gear.amplitude_rad != T::zero() {
+                    let sine = (gear.waves * angle + gear.phase_rad).sin();
+                    wanted = wanted - gear.amplitude_rad * sine;
+                }
+            }
+            add(&mut out, lever, wanted);
+        }
+        for (out, place) in out.iter_mut().zip(path) {
+            *out = *out - self.common.offset(place.derivatives());
+        }
+        Ok(out)
+    }
+}
+
+/// Adds a vector times a number.
+fn add<T: Float>(to: &mut [T; 3], vector: [T; 3], times: T) {
+    for (to, along) in to.iter_mut().zip(vector) {
+        *to = *to + along * times;
+    }
+}
+
+#[cfg(test)]
+mod tests;
