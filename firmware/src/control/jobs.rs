@@ -12,26 +12,28 @@ pub(super) struct Jobs<I> {
     go: bool,
     epoch: u8,
     dropped: u32,
-    /// A stream whose set-points are waited for.
-    stream: Option<StreamPlan>,
+    /// A stream whose set-points are waited for, if so.
+    stream: StreamPlan,
+    waits: bool,
 }
 
 /// What is at the head of the queue.
 enum Head {
     Segment,
-    Stream(StreamPlan),
+    Stream,
     Points,
 }
 
 impl<I> Jobs<I> {
-    pub(super) const fn new(queue: I) -> Self {
+    pub(super) fn new(queue: I) -> Self {
         Self {
             queue,
             closed: false,
             go: false,
             epoch: 0,
             dropped: 0,
-            stream: None,
+            stream: StreamPlan::default(),
+            waits: false,
         }
     }
 
@@ -43,13 +45,13 @@ impl<I> Jobs<I> {
 
     /// The stream that may begin now.
     #[inline]
-    pub(super) fn begins(&mut self) -> Option<StreamPlan> {
-        let plan = self.stream?;
-        let over = self.closed || plan.epoch() != self.epoch;
-        if over || self.go {
-            self.stream = None;
+    pub(super) fn begins(&mut self) -> Option<&StreamPlan> {
+        if !self.waits {
+            return None;
         }
-        (self.go && !over).then_some(plan)
+        let over = self.closed || self.stream.epoch() != self.epoch;
+        self.waits = !(over || self.go);
+        (self.go && !over).then_some(&self.stream)
     }
 
     /// Jobs thrown away.
@@ -94,7 +96,7 @@ impl<I: Receiver<Job>> Jobs<I> {
 impl<I: Receiver<Job>> Inbox for Jobs<I> {
     #[inline]
     fn take(&mut self, place: &mut Planned) -> bool {
-        let closed = self.closed;
+        let (closed, stream) = (self.closed, &mut self.stream);
         let head = self.queue.look(|job| match job {
             Job::Segment(planned) => {
                 if !closed {
@@ -102,7 +104,12 @@ impl<I: Receiver<Job>> Inbox for Jobs<I> {
                 }
                 Head::Segment
             }
-            Job::Stream(plan) => Head::Stream(*plan),
+            Job::Stream(plan) => {
+                if !closed {
+                    stream.copy(plan);
+                }
+                Head::Stream
+            }
             Job::Points(_) => Head::Points,
         });
         match head {
@@ -111,12 +118,12 @@ impl<I: Receiver<Job>> Inbox for Jobs<I> {
                 self.queue.discard();
                 return true;
             }
-            Some(Head::Stream(plan)) if !closed => {
+            Some(Head::Stream) if !closed => {
                 self.queue.discard();
-                self.stream = Some(plan);
+                self.waits = true;
                 return false;
             }
-            Some(Head::Points) if self.stream.is_some() => return false,
+            Some(Head::Points) if self.waits => return false,
             // Of a stream that is over, or of a program that was stopped.
             Some(_) => {}
         }

@@ -71,7 +71,7 @@ where
         };
         if let Some(plan) = self.jobs.begins() {
             self.stream
-                .start(&plan, self.executor.rest_nm(), 0, self.bypass);
+                .start(plan, self.executor.rest_nm(), 0, self.bypass);
             self.streaming = true;
             self.executor.count_uncorrected(!plan.corrected());
         }

@@ -103,6 +103,7 @@ fn table(terms: &[Term<f32>]) -> Table {
         machine: heapless::String::new(),
         zones: [zone].into_iter().collect(),
         limits,
+        arm: None,
     }
 }
 

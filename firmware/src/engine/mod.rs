@@ -30,6 +30,7 @@
 //! and a moving average with the table's κ2 and κ4, if there are such
 //! ([`third_of_lag_and_average`](giotto_shared::model::Cumulants::third_of_lag_and_average)), and acts only where the
 //! feed changes on an arc. At constant feed the set-points are those of κ2 and κ4 alone.
+mod arm;
 pub mod bench;
 mod config;
 mod descent;

@@ -1,4 +1,5 @@
 //! A segment in the form that the tick runs: integers only, everything that could fail already done.
+use super::arm::ArmPlan;
 use super::descent::Slowing;
 use super::profile_terms::Extra;
 use super::ramp::Shapes;
@@ -189,6 +190,8 @@ pub struct Planned {
     pub(crate) start_nm: [i32; 3],
     pub(crate) end_nm: [i32; 3],
     pub(crate) extra: Extra,
+    /// What the joints of an arm ask for.
+    pub(crate) arm: ArmPlan,
 }
 
 impl Planned {
@@ -209,6 +212,7 @@ impl Planned {
         (self.offset_nm, self.slew_nm) = (from.offset_nm, from.slew_nm);
         self.settle_step = from.settle_step;
         (self.start_nm, self.end_nm) = (from.start_nm, from.end_nm);
+        self.arm.copy(&from.arm);
         if from.extended {
             self.extra.copy(&from.extra, from.kind == Kind::Helix);
         }

@@ -15,6 +15,7 @@ mod brake;
 mod join;
 mod plan;
 
+use super::arm::{Arm, ArmPlan};
 use super::engage::Engage;
 use super::guard::Guard;
 use super::{Counters, Output, flag};
@@ -98,6 +99,7 @@ pub struct Stream<const N: usize = PLACES> {
     join: Option<Join>,
     brake: Brake,
     engage: Engage,
+    arm: Arm,
     counters: StreamCounters,
 }
 
@@ -142,6 +144,7 @@ impl<const N: usize> Stream<N> {
             brake: Brake::default(),
             guard: Guard::new(0, 0),
             engage: Engage::new(1, false),
+            arm: Arm::new(),
             counters: StreamCounters::default(),
         }
     }
@@ -158,7 +161,7 @@ impl<const N: usize> Stream<N> {
     #[inline(never)]
     pub fn start(&mut self, plan: &StreamPlan, position_nm: [i32; 3], sequence: u16, bypass: bool) {
         let [x, y, z] = position_nm;
-        self.plan = *plan;
+        self.plan.copy(plan);
         for kept in &mut self.kept {
             *kept = Kept {
                 axes: [[x; 4], [y; 4], [z; 4]],
@@ -167,7 +170,9 @@ impl<const N: usize> Stream<N> {
         }
         self.engage = Engage::new(plan.engage_ticks, !bypass);
         self.guard = Guard::new(plan.offset_nm, plan.slew_nm);
-        self.guard.watch(bypass);
+        self.arm.forget();
+        self.arm.begin(&plan.arm, position_nm);
+        self.watch();
         (self.place, self.regular, self.sequence) = (0, u32::from(sequence), sequence);
         (self.velocity, self.change) = ([0; 3], [0; 3]);
         (self.carried, self.settling) = (0, 0);
@@ -212,7 +217,7 @@ impl<const N: usize> Stream<N> {
     /// Disengages (`true`) or engages (`false`) the correction, without a step.
     pub fn set_bypass(&mut self, bypass: bool) {
         self.engage.set(!bypass);
-        self.guard.watch(!self.engage.full());
+        self.watch();
     }
 
     /// The sender has no more: comes to rest and ends.
@@ -300,6 +305,11 @@ impl<const N: usize> Stream<N> {
         self.with_care([lx, ly, lz])
     }
 
+    /// Nothing passes easily while the correction is on its way in or out, or goes through the joints of an arm.
+    fn watch(&mut self) {
+        self.guard.watch(!self.engage.full() || self.arm.acts());
+    }
+
     /// The newest set-point, nm.
     pub(crate) fn last_nm(&self) -> [i32; 3] {
         self.back(0)
@@ -335,8 +345,14 @@ impl<const N: usize> Stream<N> {
             offset: [_, wx, wy, wz],
         } = self.kept[self.place as usize & Self::MASK];
         let (nominal, wanted) = ([x[2], y[2], z[2]], [wx, wy, wz]);
+        let mut wanted = wanted;
+        if self.arm.acts() {
+            for (wanted, joints) in wanted.iter_mut().zip(self.arm.tick(nominal)) {
+                *wanted = wanted.wrapping_add(joints);
+            }
+        }
         let wanted = self.engage.apply(wanted);
-        self.guard.watch(!self.engage.full());
+        self.watch();
         let (offset, verdict) = self.guard.pass_after(last, wanted);
         let [ox, oy, oz] = offset;
         self.kept[self.place as usize & Self::MASK].offset = [0, ox, oy, oz];
@@ -433,7 +449,7 @@ impl<const N: usize> Stream<N> {
     /// Set-points stay away, or lead where no stop is within the coordinates.
     fn starve(&mut self) -> [i32; 3] {
         self.engage.set(false);
-        self.guard.watch(true);
+        self.watch();
         self.begin_rest(StreamState::Stopping);
         self.brake()
     }
@@ -477,6 +493,14 @@ impl<const N: usize> Stream<N> {
     /// coordinates do.
     fn brake(&mut self) -> [i32; 3] {
         let mut taken = self.last_nm();
+        if self.settling == self.emptying() {
+            // What holds zeros and play goes last: where the stream ends nothing is left of it.
+            let none = ArmPlan {
+                engage_ticks: self.plan.engage_ticks,
+                ..ArmPlan::default()
+            };
+            self.arm.begin(&none, taken);
+        }
         if self.settling > self.emptying() {
             for (taken, step) in taken.iter_mut().zip(self.brake.step()) {
                 let next = taken.saturating_add(step);

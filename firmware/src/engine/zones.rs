@@ -1,6 +1,6 @@
 //! The table as the planner uses it: each zone's operator and merged terms, checked once.
-use giotto_shared::law::{Operator, Profile};
-use giotto_shared::table::{Limits, Table, Travel, Zone};
+use giotto_shared::law::{Common, Operator, Profile};
+use giotto_shared::table::{Arm, Limits, MAX_ZONES, Table, Travel, Zone};
 use giotto_shared::term::{self, ProfileError};
 
 /// Why a table cannot be used. Zones count from 0.
@@ -13,7 +13,9 @@ pub enum ZoneError {
 }
 
 /// What a segment asks the table.
-pub(crate) struct Asked {
+pub(crate) struct Asked<'a> {
+    /// Places that an arm has to reach.
+    pub(crate) path_m: &'a [[f32; 3]],
     /// Centre of an arc, middle of a line.
     pub(crate) place_m: [f32; 3],
     pub(crate) radius_m: Option<f32>,
@@ -31,6 +33,10 @@ pub(crate) struct Built {
     pub(crate) profile: Option<Profile<f32>>,
     /// Where position errors are counted from: the middle of the zone's place.
     pub(crate) reference_m: Option<[f32; 3]>,
+    /// What all joints of an arm have in common.
+    pub(crate) common: Common<f32>,
+    /// Tells the zones of all tables apart; never 0.
+    pub(crate) number: u16,
 }
 
 impl Built {
@@ -62,6 +68,8 @@ impl Built {
         let third_s3 = cumulants.third_of_lag_and_average() / 6.0;
         Ok(Self {
             operator: Operator::new(&cumulants),
+            common: Common::new(&cumulants),
+            number: 0,
             third_s3,
             profile,
             reference_m,
@@ -74,12 +82,15 @@ impl Built {
 #[derive(Clone, Debug)]
 pub(crate) struct Zones {
     table: Table,
+    /// Tables so far.
+    tables: u16,
 }
 
 impl Default for Zones {
     fn default() -> Self {
         Self {
             table: Table::empty(),
+            tables: 0,
         }
     }
 }
@@ -91,6 +102,7 @@ impl Zones {
         fill: impl FnOnce(&mut Table) -> Result<(), E>,
     ) -> Result<(), E> {
         let loaded = fill(&mut self.table).and_then(|()| Ok(check(&self.table)?));
+        self.tables = self.tables.wrapping_add(1);
         if loaded.is_err() {
             self.clear();
         }
@@ -100,6 +112,7 @@ impl Zones {
     /// No table.
     pub(crate) fn clear(&mut self) {
         self.table.zones.clear();
+        self.table.arm = None;
         self.table.limits = Limits {
             offset_m: 0.0,
             slew_m_s: 0.0,
@@ -107,10 +120,24 @@ impl Zones {
     }
 
     /// The first zone that fits.
-    pub(crate) fn choose(&self, asked: &Asked) -> Option<Built> {
-        let zone = self.table.zones.iter().find(|zone| fits(zone, asked))?;
+    pub(crate) fn choose(&self, asked: &Asked<'_>) -> Option<Built> {
+        let mut zones = self.table.zones.iter();
+        let index = zones.position(|zone| fits(zone, asked))?;
+        if !self.arm().is_none_or(|arm| reaches(arm, asked.path_m)) {
+            return None;
+        }
         // Checked when it was loaded.
-        Built::new(zone, 0).ok()
+        let built = Built::new(self.table.zones.get(index)?, 0).ok()?;
+        let of_table = self.tables.wrapping_mul(MAX_ZONES as u16);
+        Some(Built {
+            number: of_table.wrapping_add(index as u16).max(1),
+            ..built
+        })
+    }
+
+    /// The arm that the table corrects through its joints.
+    pub(crate) const fn arm(&self) -> Option<&Arm> {
+        self.table.arm.as_ref()
     }
 
     /// The table's limits; 0 without a table.
@@ -125,6 +152,14 @@ pub(crate) fn check(table: &Table) -> Result<(), ZoneError> {
     if !(limit(table.limits.offset_m) && limit(table.limits.slew_m_s)) {
         return Err(ZoneError::Value(None));
     }
+    // An arm that cannot stand where its zeros and lengths are counted from is none.
+    let stands = |arm: &Arm| {
+        arm.home_m
+            .is_none_or(|home| arm.kinematics.angles(home).is_ok())
+    };
+    if !table.arm.as_ref().is_none_or(stands) {
+        return Err(ZoneError::Value(None));
+    }
     table
         .zones
         .iter()
@@ -132,7 +167,13 @@ pub(crate) fn check(table: &Table) -> Result<(), ZoneError> {
         .try_for_each(|(index, zone)| Built::new(zone, index).map(drop))
 }
 
-fn fits(zone: &Zone, asked: &Asked) -> bool {
+/// Whether an arm can stand at all of these places.
+fn reaches(arm: &Arm, path_m: &[[f32; 3]]) -> bool {
+    let kinematics = &arm.kinematics;
+    path_m.iter().all(|place| kinematics.angles(*place).is_ok())
+}
+
+fn fits(zone: &Zone, asked: &Asked<'_>) -> bool {
     // Programmed values and bounds are rounded to single precision: a bound that was meant to be met is met.
     let inside = |value: f32, [low, high]: [f32; 2]| {
         let slack = 1e-6 * value.abs();

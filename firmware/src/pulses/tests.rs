@@ -255,6 +255,7 @@ fn plan(feed_m_s: f32) -> StreamPlan {
             offset_m: 5e-3,
             slew_m_s: 0.1,
         },
+        arm: None,
     };
     let mut planner = Planner::new(&Config::robot(1000), [0; 3]);
     planner.set_table(Some(&table)).unwrap();

@@ -57,6 +57,7 @@ fn image(number: u8) -> Vec<u8> {
             offset_m: 1e-3,
             slew_m_s: 0.05,
         },
+        arm: None,
     };
     let mut bytes = std::vec![0; MAX_IMAGE_BYTES];
     let length = table::encode(&table, &mut bytes).unwrap();

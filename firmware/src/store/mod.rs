@@ -34,7 +34,7 @@ pub mod ram;
 
 use config::CONFIG_BYTES;
 use embedded_storage::nor_flash::NorFlash;
-use giotto_shared::table::{Header, MAX_IMAGE_BYTES, image::FORMAT_VERSION};
+use giotto_shared::table::{Header, MAX_IMAGE_BYTES, reads};
 use giotto_shared::wire::{FlashFault, SlotState, TableInfo};
 use key::{KEY_BYTES, KEY_COPIES, KEYS};
 use record::{RECORD_BYTES, Record};
@@ -324,7 +324,7 @@ impl<F: NorFlash> Store<F> {
         let state = match header {
             Err(_) if blank => SlotState::Empty,
             Err(_) => SlotState::Invalid,
-            Ok(header) if header.version != FORMAT_VERSION => SlotState::OtherFormat {
+            Ok(header) if !reads(header.version) => SlotState::OtherFormat {
                 version: header.version,
             },
             Ok(header) => SlotState::Table(TableInfo {

@@ -137,8 +137,8 @@ impl<T: Float> Opw<T> {
         let beside = S::constant(self.b_m);
         let forward2 = cx * cx + cy * cy - beside * beside;
         let shoulder_m = number::<T>(SHOULDER_M);
-        // Not a number is not determined either.
-        if !(forward2.value() >= shoulder_m * shoulder_m) {
+        let square = forward2.value();
+        if square.is_nan() || square < shoulder_m * shoulder_m {
             return Err(ReachError::Shoulder);
         }
         // In the plane of the arm, from axis 2 to the wrist.
@@ -161,7 +161,7 @@ impl<T: Float> Opw<T> {
         let span2 = along * along + height * height;
         let bend = (span2 - upper * upper - fore * fore) / ((upper + upper) * fore);
         let size = bend.value().abs();
-        if !(size <= T::one()) {
+        if size.is_nan() || size > T::one() {
             return Err(ReachError::OutOfReach);
         }
         if size > number(STRETCHED) {
@@ -191,7 +191,8 @@ impl<T: Float> Opw<T> {
         let ([zx, zy, zz], [_, _, xz], [_, _, yz]) = (z, x, y);
         let sine2 = zx * zx + zy * zy;
         let least = number::<T>(WRIST);
-        if !(sine2.value() >= least * least) {
+        let square = sine2.value();
+        if square.is_nan() || square < least * least {
             return Err(ReachError::Wrist);
         }
         let turned_over = |v: S| if self.branch.flipped() { -v } else { v };

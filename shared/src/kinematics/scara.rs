@@ -41,8 +41,7 @@ impl<T: Float> Scara<T> {
         let (l1, l2) = (S::constant(self.l1_m), S::constant(self.l2_m));
         let cosine = (x * x + y * y - l1 * l1 - l2 * l2) / ((l1 + l1) * l2);
         let size = cosine.value().abs();
-        // Not a number is not reached either.
-        if !(size <= T::one()) {
+        if size.is_nan() || size > T::one() {
             return Err(ReachError::OutOfReach);
         }
         if size > number(STRETCHED) {

@@ -59,6 +59,7 @@ fn table(
             offset_m: 0.005,
             slew_m_s: 0.1,
         },
+        arm: None,
     };
     let mut bytes = std::vec![0; MAX_IMAGE_BYTES];
     let length = image::encode(&table, &mut bytes).unwrap();

@@ -31,6 +31,7 @@ mod phase;
 mod stop;
 mod transitions;
 
+use crate::engine::arm::Arm;
 use crate::engine::descent::Descent;
 use crate::engine::engage::Engage;
 use crate::engine::guard::Guard;
@@ -125,6 +126,7 @@ pub struct Executor {
     rest_offset_nm: [i32; 3],
     target_nm: [i32; 3],
     sides: Sides,
+    arm: Arm,
     /// Segments planned before the last stop or fault carry an older epoch and are thrown away.
     epoch: u8,
     /// On the way to a standstill that was asked for.
@@ -165,6 +167,7 @@ impl Executor {
             rest_offset_nm: [0; 3],
             target_nm: [0; 3],
             sides: Sides::default(),
+            arm: Arm::new(),
             epoch: 0,
             halting: false,
             pause: false,
@@ -221,6 +224,7 @@ impl Executor {
     pub fn set_position(&mut self, position_nm: [i32; 3]) -> bool {
         if self.idle() {
             self.rest_nm = position_nm;
+            self.arm.stand(position_nm);
         }
         self.idle()
     }
@@ -228,7 +232,7 @@ impl Executor {
     /// Disengages (`true`) or engages (`false`) the correction, without a step.
     pub fn set_bypass(&mut self, bypass: bool) {
         self.engage.set(!bypass);
-        self.guard.watch(!self.engage.full());
+        self.watch();
     }
 
     /// Whether the correction is disengaged or on its way to be.
@@ -321,16 +325,28 @@ impl Executor {
         self.finish(nominal, wanted, flags)
     }
 
-    /// Engagement, bounds, and out.
+    /// Nothing passes easily while the correction is on its way in or out, or goes through the joints of an arm.
+    #[inline(always)]
+    fn watch(&mut self) {
+        self.guard.watch(!self.engage.full() || self.arm.acts());
+    }
+
+    /// The joints of an arm, engagement, bounds, and out.
     #[inline(never)]
     fn finish(&mut self, nominal: [i32; 3], wanted: [i32; 3], flags: u16) -> Output {
         // At rest nobody has looked yet.
         if self.guard.pass_easily(wanted) {
             return Output::new(nominal, wanted, flags);
         }
+        let mut wanted = wanted;
+        if self.arm.acts() {
+            for (wanted, joints) in wanted.iter_mut().zip(self.arm.tick(nominal)) {
+                *wanted = wanted.wrapping_add(joints);
+            }
+        }
         let wanted = self.engage.apply(wanted);
         let (offset, verdict) = self.guard.pass(wanted);
-        self.guard.watch(!self.engage.full());
+        self.watch();
         let mut flags = flags;
         if verdict.offset_cut | verdict.slew_cut {
             self.counters.offset_cuts = self

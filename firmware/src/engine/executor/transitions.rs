@@ -90,7 +90,10 @@ impl Executor {
     pub(super) fn begin_sides(&mut self) -> Output {
         self.mode = Mode::Sided;
         self.guard.set(self.segment.offset_nm, self.segment.slew_nm);
-        self.guard.watch(!self.engage.full());
+        if self.segment.kind != Kind::Dwell {
+            self.arm.begin(&self.segment.arm, self.rest_nm);
+        }
+        self.watch();
         let uncorrected = u32::from(!self.segment.corrected);
         self.counters.uncorrected = self.counters.uncorrected.wrapping_add(uncorrected);
         self.fall = self.segment.rise.turned_round();
@@ -122,11 +125,15 @@ impl Executor {
     #[inline(never)]
     pub(super) fn settle(&mut self) -> Output {
         let target = self.target_nm;
-        let (x, end) = self.clock.rise();
+        let there = same(self.rest_offset_nm, target);
+        let (x, end) = if there { (0, true) } else { self.clock.rise() };
         let share = shapes(&self.ramp, x).s_q31;
-        if end || same(self.rest_offset_nm, target) {
+        if end {
             self.rest_offset_nm = target;
-            self.begin_segment();
+            // So does what the joints of an arm ask for.
+            if !self.arm.fading() {
+                self.begin_segment();
+            }
             return self.finish(self.rest_nm, target, flag::SETTLING);
         }
         let mut offset = self.rest_offset_nm;

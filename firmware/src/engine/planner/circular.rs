@@ -5,7 +5,7 @@ use super::law::ArcLaw;
 use super::numbers::{arm, length, seen_from, to_m};
 use super::timing::{Motion, end_term};
 use super::worst::{self, Worst};
-use super::{Planner, Refused, terms};
+use super::{Planner, Refused, joints, terms};
 use crate::engine::descent::Slowing;
 use crate::engine::planned::{Axis, Kind, Planned, Timing};
 use crate::engine::ramp::FIRST;
@@ -78,7 +78,9 @@ impl Planner {
         let place_m = to_m(round.centre_nm);
         self.check_reach(place_m, round.radius_m)?;
         let radius_m = Some(round.radius_m);
+        let on_circle = joints::on_circle(place_m, arm(round.u), arm(round.v));
         let asked = Asked {
+            path_m: &on_circle,
             place_m,
             radius_m,
             feed_m_s: round.feed_m_s,
@@ -136,6 +138,7 @@ impl Planner {
             self.bound(segment, &bounds);
             segment.rise = law.rounded();
             correct(segment, round, zone, &motion, law.steady())?;
+            self.joints(Some(zone), segment);
         }
         segment.rise.end_term_q1 = end_term(&timing);
         Ok(())

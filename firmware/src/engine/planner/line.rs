@@ -34,6 +34,7 @@ impl Planner {
         let [x, y, z] = start;
         let place_m = [x + 0.5 * span[0], y + 0.5 * span[1], z + 0.5 * span[2]];
         let zone = self.zones.choose(&Asked {
+            path_m: &[start, place_m, to_m(to)],
             place_m,
             radius_m: None,
             feed_m_s: feed,
@@ -68,6 +69,7 @@ impl Planner {
         if let (Some(zone), Some(law)) = (&zone, law) {
             self.bound(segment, &bounds);
             segment.rise = law.rounded();
+            self.joints(Some(zone), segment);
             if let Some(profile) = &zone.profile {
                 // Without a place there is no point that errors of position could be counted from.
                 let seen = zone

@@ -9,6 +9,7 @@
 //! | `circle`, `arc`, `line` | each its geometry and timing |
 //! | `circular` | what circles and arcs have in common |
 //! | `law`, `terms` | the correction, from the numbers of a zone to those of the tick |
+//! | `joints` | what an arm's joints ask for |
 //! | `soft` | the soft limits |
 //! | `worst`, `demand` | what a path asks for at most, and the ramp that keeps it within the bounds |
 //! | `machine` | the configuration, in the form that planning needs |
@@ -17,6 +18,7 @@ mod arc;
 mod circle;
 mod circular;
 mod demand;
+mod joints;
 mod law;
 mod line;
 mod machine;
@@ -35,7 +37,7 @@ use demand::Bounds;
 use giotto_shared::path::{ExactSegment, PathError, Quantity};
 use giotto_shared::table::Table;
 use machine::Machine;
-use numbers::{inside, positive, to_m};
+use numbers::{inside, positive};
 use timing::{Motion, turns_per_tick};
 
 /// Why a segment was not accepted. Nothing has moved.
@@ -160,8 +162,9 @@ impl Planner {
     pub fn stream(&self, feed_m_s: f32, places: usize) -> Result<StreamPlan, Refused> {
         let feed_m_s = positive(feed_m_s, Quantity::Feed)?;
         self.check_feed(feed_m_s)?;
-        let place_m = to_m(self.position_nm);
+        let place_m = self.here_m();
         let zone = self.zones.choose(&Asked {
+            path_m: &[place_m],
             place_m,
             radius_m: None,
             feed_m_s,
@@ -171,6 +174,7 @@ impl Planner {
         let needs = StreamNeeds {
             epoch: self.epoch,
             longest: places as u32,
+            arm: self.arm_plan(zone.as_ref()),
             operator: zone.map(|z| z.operator),
             rate_hz: self.machine.rate_hz,
             window_s: self.machine.stream_window_s,
@@ -216,6 +220,7 @@ impl Planner {
             start_nm: self.position_nm,
             end_nm: self.position_nm,
             epoch: self.epoch,
+            arm: self.arm_plan(None),
             ..Planned::default()
         };
         self.bound(segment, &self.bounds(false));

@@ -1,5 +1,6 @@
 //! A stream in numbers: weights of the differentiator, bounds, and how it comes to rest.
 use super::brake::Limits;
+use crate::engine::arm::ArmPlan;
 use giotto_shared::fixed::{mulh, mulh_add, single_to_fixed};
 use giotto_shared::law::Operator;
 
@@ -22,6 +23,8 @@ pub struct StreamPlan {
     pub(super) offset_nm: i32,
     pub(super) slew_nm: i32,
     pub(super) corrected: bool,
+    /// What the joints of an arm ask for.
+    pub(super) arm: ArmPlan,
 }
 
 /// Fraction bits of the weights: they may reach 128 in size.
@@ -35,6 +38,7 @@ const ADDED_SHARE: f32 = 0.3;
 /// What a plan is made from.
 pub(crate) struct StreamNeeds {
     pub(crate) epoch: u8,
+    pub(crate) arm: ArmPlan,
     pub(crate) operator: Option<Operator<f32>>,
     pub(crate) rate_hz: f32,
     /// Distance of the places wanted, s.
@@ -90,6 +94,7 @@ impl StreamPlan {
             offset_nm,
             slew_nm,
             corrected: n.operator.is_some(),
+            arm: n.arm,
         })
     }
 
@@ -103,6 +108,18 @@ impl StreamPlan {
         let inner = p1.wrapping_add(p3).wrapping_sub(twice).wrapping_mul(SCALE);
         let outer = p0.wrapping_add(p4).wrapping_sub(twice).wrapping_mul(SCALE);
         mulh_add(mulh(outer, self.outer), inner, self.inner)
+    }
+
+    /// Becomes another one, as far as that one says anything: all at once it is a call of memcpy, most of it for an arm that
+    /// most machines have not.
+    pub(crate) fn copy(&mut self, from: &Self) {
+        self.epoch = from.epoch;
+        (self.stride, self.inner, self.outer) = (from.stride, from.inner, from.outer);
+        (self.step_nm, self.hold_ticks) = (from.step_nm, from.hold_ticks);
+        (self.limits, self.engage_ticks) = (from.limits, from.engage_ticks);
+        (self.offset_nm, self.slew_nm) = (from.offset_nm, from.slew_nm);
+        self.corrected = from.corrected;
+        self.arm.copy(&from.arm);
     }
 
     /// Limits of acceleration and jerk, nm per tick² and per tick³.

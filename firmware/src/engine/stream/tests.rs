@@ -1,5 +1,6 @@
 //! Streams: law, latency, bypass, gaps.
 extern crate std;
+use super::super::arm::ArmPlan;
 use super::*;
 use giotto_shared::law::Operator;
 use giotto_shared::path::smoothstep;
@@ -21,6 +22,7 @@ pub(super) fn plan_with(operator: Operator<f32>) -> StreamPlan {
     StreamPlan::build(&StreamNeeds {
         epoch: 0,
         longest: PLACES as u32,
+        arm: ArmPlan::default(),
         operator: Some(operator),
         rate_hz: 1000.0,
         window_s: 0.015,

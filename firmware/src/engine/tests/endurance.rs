@@ -115,6 +115,7 @@ fn table(random: &mut Random) -> Table {
             offset_m: 0.02,
             slew_m_s: 0.2,
         },
+        arm: None,
     }
 }
 

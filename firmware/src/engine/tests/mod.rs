@@ -1,5 +1,6 @@
 //! Set-points against an independent `f64` statement of the law.
 extern crate std;
+mod arm;
 mod contour;
 mod endurance;
 mod motion;
@@ -32,6 +33,7 @@ pub(crate) fn table(kappa2_s2: f32, kappa4_s4: f32) -> Table {
             offset_m: 0.05,
             slew_m_s: 1.0,
         },
+        arm: None,
     }
 }
 

@@ -137,6 +137,14 @@ fn error_at(
             across,
             curvature_per_m,
         } => e[across.index()] = w(curvature_per_m) * rel(actuator.index()).powi(2),
+        Term::JointLag { .. }
+        | Term::JointBacklash { .. }
+        | Term::JointReversal { .. }
+        | Term::JointCyclic { .. }
+        | Term::JointZero { .. }
+        | Term::LinkLength { .. } => {
+            panic!("{term:?}: terms of joints are tested through their arm")
+        }
     }
     e
 }

@@ -296,6 +296,7 @@ fn image(name: &str) -> Vec<u8> {
             offset_m: 1e-3,
             slew_m_s: 0.05,
         },
+        arm: None,
     };
     let mut out = [0; MAX_IMAGE_BYTES];
     let length = table::encode(&table, &mut out).unwrap();
