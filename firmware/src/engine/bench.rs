@@ -4,9 +4,10 @@
 //! first tick with [`flag::MOVING`](super::flag::MOVING) begins what counts, ticks without it (rest, settling) do not.
 use super::planner::Planner;
 use super::{Config, Executor, Output, Planned, Stream, StreamSample};
+use giotto_shared::kinematics::{Branch, Kinematics, Opw};
 use giotto_shared::model::Cumulants;
 use giotto_shared::path::{Segment, smoothstep};
-use giotto_shared::table::{Limits, Table, Travel, Zone};
+use giotto_shared::table::{Arm, Limits, Table, Travel, Zone};
 use giotto_shared::term::Term;
 use giotto_shared::{Actuator, Plane};
 
@@ -107,27 +108,84 @@ fn table(terms: &[Term<f32>]) -> Table {
     }
 }
 
+/// Terms of an arm, dear ones: two lags, play and pulses that turn at once, gears, a length.
+pub const OF_JOINTS: [Term<f32>; 8] = [
+    Term::JointLag {
+        actuator: Actuator::Joint2,
+        delta_tau_s: 1e-3,
+        delta_kappa2_s2: 1e-5,
+    },
+    Term::JointBacklash {
+        actuator: Actuator::Joint1,
+        play_rad: 2e-5,
+    },
+    Term::JointReversal {
+        actuator: Actuator::Joint1,
+        peak_rad: 1e-5,
+        decay_s: 0.05,
+    },
+    Term::JointBacklash {
+        actuator: Actuator::Joint3,
+        play_rad: 2e-5,
+    },
+    gear(Actuator::Joint1),
+    gear(Actuator::Joint2),
+    gear(Actuator::Joint3),
+    Term::LinkLength {
+        actuator: Actuator::Joint2,
+        longer_m: 1e-4,
+    },
+];
+
+const fn gear(actuator: Actuator) -> Term<f32> {
+    Term::JointCyclic {
+        actuator,
+        amplitude_rad: 1e-5,
+        waves: 50.0,
+        phase_rad: 0.5,
+    }
+}
+
+/// Where the source paper drew its circles, m, and the robot that drew them.
+const PAPER_CENTRE_M: [f64; 3] = [-0.29, 0.987, 0.615];
+const IRB1600: Kinematics<f32> = Kinematics::Opw(Opw {
+    a1_m: 0.15,
+    a2_m: 0.0,
+    b_m: 0.0,
+    c1_m: 0.4865,
+    c2_m: 0.7,
+    c3_m: 0.6,
+    c4_m: 0.065,
+    tool_m: [0.0, 0.065, 0.149],
+    orientation: [0.0, 0.0, 1.0, 0.0],
+    branch: Branch::ElbowUp,
+});
+
 /// Where the arc of [`Arc`] starts, and its plan.
 pub(crate) fn planned(terms: &[Term<f32>], rise_m: f64) -> ([i32; 3], Option<Planned>) {
+    plan(CENTRE_M, &table(terms), rise_m)
+}
+
+fn plan(centre_m: [f64; 3], table: &Table, rise_m: f64) -> ([i32; 3], Option<Planned>) {
     let config = Config::robot(1000);
     let normal = [0.0, 0.5, 1.0];
     // cos and sin of −0.3 rad along two vectors of the plane: X, and the normal crossed with it.
     let (cos, sin, length) = (0.955_336_5, -0.295_520_2, 1.118_034);
     let arm = [cos, sin * normal[2] / length, -sin * normal[1] / length];
     let mut start = [0; 3];
-    for ((nm, centre), arm) in start.iter_mut().zip(CENTRE_M).zip(arm) {
+    for ((nm, centre), arm) in start.iter_mut().zip(centre_m).zip(arm) {
         *nm = ((centre + RADIUS_M * arm) * 1e9) as i32;
     }
     let mut planner = Planner::new(&config, start);
     let arc = Segment::Arc {
-        centre_m: CENTRE_M,
+        centre_m,
         normal,
         sweep_rad: 3.0 * core::f64::consts::PI,
         rise_m,
         feed_m_s: FEED_M_S,
     };
     let mut planned = Planned::default();
-    let done = planner.set_table(Some(&table(terms))).is_ok()
+    let done = planner.set_table(Some(table)).is_ok()
         && arc
             .exact(start)
             .is_ok_and(|exact| planner.segment(&exact, &mut planned).is_ok());
@@ -145,8 +203,21 @@ impl Arc {
     /// One and a half turns with the β model and these terms. Each axis reverses at constant feed, and X
     /// in the rising ramp too. With a rise (m) it is a helix.
     pub fn new(terms: &[Term<f32>], rise_m: f64) -> Self {
+        Self::of(planned(terms, rise_m))
+    }
+
+    /// The same on a six-joint arm with errors of its joints.
+    pub fn of_arm() -> Self {
+        let mut table = table(&OF_JOINTS);
+        table.arm = Some(Arm {
+            kinematics: IRB1600,
+            home_m: Some(PAPER_CENTRE_M.map(|m| m as f32)),
+        });
+        Self::of(plan(PAPER_CENTRE_M, &table, 0.0))
+    }
+
+    fn of((start, planned): ([i32; 3], Option<Planned>)) -> Self {
         let mut queue = heapless::spsc::Queue::new();
-        let (start, planned) = planned(terms, rise_m);
         // Whether there is one is looked at in `sound`; the queue is empty.
         if let Some(planned) = planned {
             let _ = queue.enqueue(planned);

@@ -164,7 +164,8 @@ pub(crate) fn turn(radial: i32, tangential: i32, c: i32, s: i32) -> (i32, i32) {
     )
 }
 
-/// A segment ready to run.
+/// A segment ready to run. What an arm asks for is last: the tick of all others reaches theirs by short offsets.
+#[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Planned {
     pub(crate) axes: [Axis; 3],

@@ -1,5 +1,5 @@
 //! Derivatives of closed forms along a path, by Taylor arithmetic: exact, without differences, bounded in time.
-use super::Scalar;
+use super::{Real, Scalar};
 use core::array;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 use num_traits::Float;
@@ -87,7 +87,7 @@ impl<T: Float> Div for Jet<T> {
     }
 }
 
-impl<T: Float> Scalar for Jet<T> {
+impl<T: Real> Scalar for Jet<T> {
     type Base = T;
 
     fn constant(value: T) -> Self {
@@ -116,7 +116,7 @@ impl<T: Float> Scalar for Jet<T> {
     fn sine_cosine(self) -> (Self, Self) {
         let [a0, a1, a2, a3, a4] = self.0;
         let (d1, d2, d3) = (a2 * whole(2), a3 * whole(3), a4 * whole(4));
-        let (s0, c0) = a0.sin_cos();
+        let (s0, c0) = a0.sine_cosine();
         let (s1, c1) = (c0 * a1, -(s0 * a1));
         let half = whole::<T>(2).recip();
         let (s2, c2) = ((c1 * a1 + c0 * d1) * half, -(s1 * a1 + s0 * d1) * half);

@@ -103,7 +103,7 @@ impl<T> Kinematics<T> {
     }
 }
 
-impl<T: Float> Kinematics<T> {
+impl<T: Real> Kinematics<T> {
     /// Place of the measured point, m.
     pub fn place(&self, q: &[T; 6]) -> [T; 3] {
         match self {

@@ -6,8 +6,7 @@
 use super::rotation::{
     Matrix, about_y, about_z, axes, cross, difference, of_quaternion, product, sum, turned,
 };
-use super::{ReachError, STRETCHED, Scalar, number};
-use num_traits::Float;
+use super::{ReachError, Real, STRETCHED, Scalar, number};
 use serde::{Deserialize, Serialize};
 
 /// Lengths of the arm, its tool and its orientation.
@@ -82,7 +81,7 @@ struct Posture<T> {
     tool: [T; 3],
 }
 
-impl<T: Float> Opw<T> {
+impl<T: Real> Opw<T> {
     /// From the wrist to the measured point, in the flange's frame.
     fn hand_m(&self) -> [T; 3] {
         let [x, y, z] = self.tool_m;

@@ -1,18 +1,19 @@
 //! Rotations as matrices, row by row.
+use super::Real;
 use num_traits::Float;
 
 /// A rotation: its rows.
 pub type Matrix<T> = [[T; 3]; 3];
 
 /// About Y by an angle, rad.
-pub fn about_y<T: Float>(angle_rad: T) -> Matrix<T> {
-    let ((s, c), o, l) = (angle_rad.sin_cos(), T::zero(), T::one());
+pub fn about_y<T: Real>(angle_rad: T) -> Matrix<T> {
+    let ((s, c), o, l) = (angle_rad.sine_cosine(), T::zero(), T::one());
     [[c, o, s], [o, l, o], [-s, o, c]]
 }
 
 /// About Z by an angle, rad.
-pub fn about_z<T: Float>(angle_rad: T) -> Matrix<T> {
-    let ((s, c), o, l) = (angle_rad.sin_cos(), T::zero(), T::one());
+pub fn about_z<T: Real>(angle_rad: T) -> Matrix<T> {
+    let ((s, c), o, l) = (angle_rad.sine_cosine(), T::zero(), T::one());
     [[c, -s, o], [s, c, o], [o, o, l]]
 }
 

@@ -1,4 +1,5 @@
 //! What a closed form is computed with: a number, or a number with its derivatives along a path.
+use crate::angle::{RAD_PER_UNIT, sincos};
 use core::ops::{Add, Div, Mul, Neg, Sub};
 use num_traits::Float;
 
@@ -27,7 +28,7 @@ pub trait Scalar:
 }
 
 macro_rules! number {
-    ($($float:ty),*) => {$(
+    ($float:ty, $sine_cosine:expr) => {
         impl Scalar for $float {
             type Base = Self;
 
@@ -41,15 +42,25 @@ macro_rules! number {
                 Float::sqrt(self)
             }
             fn sine_cosine(self) -> (Self, Self) {
-                Float::sin_cos(self)
+                $sine_cosine(self)
             }
             fn angle(self, y: Self) -> Self {
                 Float::atan2(y, self)
             }
         }
-    )*};
+    };
 }
-number!(f32, f64);
+number!(f64, Float::sin_cos);
+number!(f32, single);
+
+/// Sine and cosine by the tick's own series: to 24 bits of a turn. Those of `libm` compute in `f64`, which a Cortex-M4F has
+/// not: a thousand instructions each.
+fn single(angle_rad: f32) -> (f32, f32) {
+    const UNITS_PER_RAD: f32 = (1.0 / RAD_PER_UNIT) as f32;
+    const OF_Q31: f32 = 1.0 / 2_147_483_648.0;
+    let (cos, sin) = sincos((angle_rad * UNITS_PER_RAD) as i64 as u32);
+    (sin as f32 * OF_Q31, cos as f32 * OF_Q31)
+}
 
 /// A plain number: `f32` or `f64`.
 pub trait Real: Float + Scalar<Base = Self> {}

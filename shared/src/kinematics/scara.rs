@@ -1,6 +1,5 @@
 //! Two links that turn about Z, then the height as a slide along Z.
-use super::{ReachError, STRETCHED, Scalar, number};
-use num_traits::Float;
+use super::{ReachError, Real, STRETCHED, Scalar, number};
 use serde::{Deserialize, Serialize};
 
 /// A SCARA, or any two-link arm. The forearm's own turn of the hand does not move the measured point.
@@ -23,10 +22,10 @@ pub enum Elbow {
     Negative,
 }
 
-impl<T: Float> Scara<T> {
+impl<T: Real> Scara<T> {
     pub(super) fn place(&self, q: &[T; 6]) -> [T; 3] {
         let [q1, q2, height, ..] = *q;
-        let ((s1, c1), (s12, c12)) = (q1.sin_cos(), (q1 + q2).sin_cos());
+        let ((s1, c1), (s12, c12)) = (q1.sine_cosine(), (q1 + q2).sine_cosine());
         [
             self.l1_m * c1 + self.l2_m * c12,
             self.l1_m * s1 + self.l2_m * s12,
@@ -60,7 +59,7 @@ impl<T: Float> Scara<T> {
     pub(super) fn levers(&self, q: &[T; 6]) -> [[T; 3]; 6] {
         let (zero, one) = (T::zero(), T::one());
         let ([x, y, _], [q1, q2, ..]) = (self.place(q), *q);
-        let (s12, c12) = (q1 + q2).sin_cos();
+        let (s12, c12) = (q1 + q2).sine_cosine();
         let still = [zero; 3];
         [
             [-y, x, zero],
@@ -79,7 +78,7 @@ impl<T: Float> Scara<T> {
             1 => q1 + q2,
             _ => return None,
         };
-        let (sin, cos) = angle_rad.sin_cos();
+        let (sin, cos) = angle_rad.sine_cosine();
         Some([cos, sin, T::zero()])
     }
 }

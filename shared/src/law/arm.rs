@@ -277,7 +277,7 @@ impl<T: Real> ArmLaw<T> {
                 + side.pulse_rad;
             for gear in &errors.gear {
                 if gear.amplitude_rad != T::zero() {
-                    let sine = (gear.waves * angle + gear.phase_rad).sin();
+                    let (sine, _) = (gear.waves * angle + gear.phase_rad).sine_cosine();
                     wanted = wanted - gear.amplitude_rad * sine;
                 }
             }

@@ -126,7 +126,10 @@ mod image {
 
     /// From rest to rest. All ticks under way, and those at constant feed.
     fn arc(terms: &[Term<f32>], rise_m: f64, floor: u32) -> Option<[Range; 2]> {
-        let mut arc = Arc::new(terms, rise_m);
+        run(Arc::new(terms, rise_m), floor)
+    }
+
+    fn run(mut arc: Arc, floor: u32) -> Option<[Range; 2]> {
         let mut ranges = [Range::NONE, Range::NONE];
         while !arc.done() {
             let before = SYST::get_current();
@@ -241,6 +244,9 @@ mod image {
         say("helix_beta", &all);
         let [all, _] = arc(&TERMS, HELIX_M, floor)?;
         say("helix_extended", &all);
+        let [all, steady] = run(Arc::of_arm(), floor)?;
+        say("arm", &all);
+        say("arm_steady", &steady);
         let [all, moving] = interrupt(floor)?;
         say("interrupt", &all);
         say("interrupt_moving", &moving);
