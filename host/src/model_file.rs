@@ -129,6 +129,9 @@ pub struct Valid {
     pub radius_mm: [f64; 2],
     /// Smallest and largest feed, mm/s.
     pub feed_mm_s: [f64; 2],
+    /// Middle of the circles in the base of an arm, mm: from there the zeros and lengths of a table are counted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub centre_mm: Option<[f64; 3]>,
 }
 
 impl ModelFile {
@@ -368,13 +371,18 @@ impl Servo {
 
 impl Valid {
     fn fault(&self) -> Option<Fault> {
-        [("radius_mm", self.radius_mm), ("feed_mm_s", self.feed_mm_s)]
-            .into_iter()
-            .find_map(|(key, [lo, hi])| {
-                let ok = 0.0 < lo && lo <= hi && hi.is_finite();
-                let expected = "two positive numbers, the smaller first";
-                Fault::unless(ok, &["valid", key], format!("[{lo}, {hi}]"), expected)
-            })
+        let ranges = [("radius_mm", self.radius_mm), ("feed_mm_s", self.feed_mm_s)];
+        let fault = ranges.into_iter().find_map(|(key, [lo, hi])| {
+            let ok = 0.0 < lo && lo <= hi && hi.is_finite();
+            let expected = "two positive numbers, the smaller first";
+            Fault::unless(ok, &["valid", key], format!("[{lo}, {hi}]"), expected)
+        });
+        fault.or_else(|| {
+            let centre = self.centre_mm?;
+            let ok = centre.iter().all(|mm| mm.abs() <= 1e5);
+            let expected = "three numbers in mm, −100000 to 100000, in the robot's base";
+            Fault::unless(ok, &["valid", "centre_mm"], format!("{centre:?}"), expected)
+        })
     }
 }
 

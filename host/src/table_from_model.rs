@@ -1,9 +1,10 @@
 //! From a model to the table that a controller corrects with: one zone, where the model was fitted.
-use crate::causes::{Cause, Effect};
+use crate::causes::{ArmChain, Cause, Effect};
+use crate::kinematics::Kinematics;
 use crate::model_file::ModelFile;
 use giotto_shared::law::Operator;
 use giotto_shared::model::Cumulants;
-use giotto_shared::table::{self, Limits, Table, TableError, Travel, Zone, bounds};
+use giotto_shared::table::{self, Arm, Limits, Table, TableError, Travel, Zone, bounds};
 use giotto_shared::term::{Extent, Term};
 
 /// Room that the limits of the table leave above the largest correction inside its zone.
@@ -42,9 +43,10 @@ enum Share {
     Nothing,
 }
 
-fn share(effect: &Effect) -> Share {
+fn share(effect: &Effect, arm: Option<&ArmChain>) -> Share {
     let model = effect.cause().model();
-    let term = model.term(effect).map(Share::Term);
+    let of_joint = || arm.and_then(|arm| model.joint_term(effect, arm));
+    let term = model.term(effect).or_else(of_joint).map(Share::Term);
     term.or_else(|| model.kappa4_s4(effect).map(Share::Kappa4))
         .unwrap_or(Share::Nothing)
 }
@@ -77,8 +79,13 @@ pub fn table_from_model(model: &ModelFile) -> Result<ModelTable, ModelTableError
     let mut cumulants = model.servo.cumulants();
     let mut terms: Vec<Term<f64>> = Vec::new();
     let mut left_out = Vec::new();
+    let chain = model.kinematics.map(|kinematics| ArmChain {
+        turning: kinematics.turning(),
+        lag_s: lag_s(&cumulants),
+        placed: model.valid.centre_mm.is_some(),
+    });
     for effect in &model.effects {
-        match share(effect) {
+        match share(effect, chain.as_ref()) {
             Share::Term(term) => terms.push(term),
             Share::Kappa4(kappa4) => cumulants.kappa4_s4 += kappa4,
             Share::Nothing => left_out.push(effect.cause()),
@@ -107,19 +114,35 @@ pub fn table_from_model(model: &ModelFile) -> Result<ModelTable, ModelTableError
     let mut zones = heapless::Vec::new();
     // A table holds at least one zone.
     let _ = zones.push(zone);
-    let limits = limits(&cumulants, &terms, radius_m, feed_m_s);
+    let of_arm = chain.is_some();
+    let limits = limits((&cumulants, of_arm), &terms, radius_m, feed_m_s);
     let table = Table {
         machine: cut(&model.machine),
         zones,
         limits,
+        arm: model.kinematics.map(|kinematics| arm(kinematics, model)),
     };
     table.validate()?;
     Ok(ModelTable { table, left_out })
 }
 
+/// The arm as a table holds it.
+fn arm(kinematics: Kinematics, model: &ModelFile) -> Arm {
+    let centre_mm = model.valid.centre_mm;
+    Arm {
+        kinematics: kinematics.map(|value| value as f32),
+        home_m: centre_mm.map(|centre| centre.map(|mm| (mm * 1e-3) as f32)),
+    }
+}
+
+/// Time constant of the loop in a chain with these cumulants, taken for a loop behind an acceleration filter, s.
+fn lag_s(cumulants: &Cumulants<f64>) -> f64 {
+    (0.5 * cumulants.third_of_lag_and_average()).cbrt()
+}
+
 /// Limits that the largest correction inside the zone meets with room to spare.
 fn limits(
-    cumulants: &Cumulants<f64>,
+    (cumulants, of_arm): (&Cumulants<f64>, bool),
     terms: &[Term<f64>],
     radius_m: [f64; 2],
     feed_m_s: [f64; 2],
@@ -131,6 +154,8 @@ fn limits(
     let (second, fourth) = (operator.second_s2.abs(), operator.fourth_s4.abs());
     // R·(κ2/2·ω² + …·ω⁴) with ω = f/R falls with R, so the smallest circle asks for the most.
     let law = smallest * omega * omega * (second + fourth * omega * omega);
+    // What the curvature of an arm adds is not more than that.
+    let law = if of_arm { 2.0 * law } else { law };
     let extent = Extent {
         radius_m: largest,
         feed_m_s: fastest,
@@ -181,6 +206,7 @@ mod tests {
             valid: Valid {
                 radius_mm: [100.0, 300.0],
                 feed_mm_s: [20.0, 700.0],
+                centre_mm: None,
             },
             kinematics: None,
             effects: Vec::new(),

@@ -106,6 +106,7 @@ fn advance(place: &mut Place, time_s: f64) {
     }
     place.velocity_m_s = ahead.turned(place.velocity_m_s);
     place.acceleration_m_s2 = ahead.turned(place.acceleration_m_s2);
+    place.higher = place.higher.map(|higher| ahead.turned(higher));
     place.turn.outward = ahead.turned(place.turn.outward);
     place.ahead = Some(ahead);
 }
@@ -337,14 +338,23 @@ impl Corrector {
         for (slide, joint) in self.settings.joint.into_iter().enumerate() {
             if let Some(joint) = joint {
                 let derivatives = self.history.derivatives(joint);
-                if let (Some(v), Some(a)) = (
-                    place.velocity_m_s.get_mut(slide),
-                    place.acceleration_m_s2.get_mut(slide),
-                ) {
-                    (*v, *a) = (
-                        derivatives.velocity / metre,
-                        derivatives.acceleration / metre,
-                    );
+                let [third, fourth] = &mut place.higher;
+                let slots = [
+                    &mut place.velocity_m_s,
+                    &mut place.acceleration_m_s2,
+                    third,
+                    fourth,
+                ];
+                let values = [
+                    derivatives.velocity,
+                    derivatives.acceleration,
+                    derivatives.third,
+                    derivatives.fourth,
+                ];
+                for (slot, value) in slots.into_iter().zip(values) {
+                    if let Some(slot) = slot.get_mut(slide) {
+                        *slot = value / metre;
+                    }
                 }
             }
         }

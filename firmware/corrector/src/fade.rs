@@ -5,6 +5,7 @@ use crate::senses::smooth;
 use crate::settings::Settings;
 use crate::voice::{Place, Voice};
 use core::cmp::Ordering;
+use giotto_shared::law::Pace;
 
 /// Corrections nearer to each other than this are exchanged at once, m.
 const SAME_M: f64 = 1e-9;
@@ -66,7 +67,11 @@ impl Fade {
         let settled = self.done >= 1.0;
         let begins = settled && wanted != self.to.map(|(part, _)| part);
         if begins {
-            self.begin(wanted, laws, at, history);
+            let pace = Pace {
+                tick_s: history.tick_s(),
+                turn_s: settings.take_up_s,
+            };
+            self.begin(wanted, laws, at, (history, &pace));
         }
         let sound = |voice: &mut Option<(Part, Voice)>| match voice {
             Some((part, voice)) => {
@@ -100,7 +105,13 @@ impl Fade {
         offset
     }
 
-    fn begin(&mut self, wanted: Option<Part>, laws: &[Law; 2], at: &Place, history: &History) {
+    fn begin(
+        &mut self,
+        wanted: Option<Part>,
+        laws: &[Law; 2],
+        at: &Place,
+        (history, pace): (&History, &Pace<f64>),
+    ) {
         self.from = self.to;
         // Who adds the offset to a path of its own gets it for a place ahead: the lag's delay would only have to be foreseen as well.
         let inverse = |zone: &ZoneLaw| match at.ahead {
@@ -114,7 +125,7 @@ impl Fade {
             let reference_m = zone.reference_m().unwrap_or(here);
             (
                 part,
-                Voice::new(reference_m, history.stencil(&inverse(zone))),
+                Voice::new(zone, reference_m, history.stencil(&inverse(zone)), pace),
             )
         });
         self.done = 0.0;

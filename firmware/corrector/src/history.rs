@@ -21,11 +21,13 @@ pub(crate) struct History {
     tick_s: f64,
 }
 
-/// First and second derivative of one joint's path, machine units and seconds.
+/// Derivatives of one joint's path, machine units and seconds.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Derivatives {
     pub(crate) velocity: f64,
     pub(crate) acceleration: f64,
+    pub(crate) third: f64,
+    pub(crate) fourth: f64,
 }
 
 impl History {
@@ -74,10 +76,12 @@ impl History {
     pub(crate) fn derivatives(&self, joint: usize) -> Derivatives {
         let [p0, p1, p2, p3, p4] = self.five(joint);
         let h = self.stride as f64 * self.tick_s;
-        // Odd and even differences of fourth order.
+        // Odd and even differences of fourth order; of second order for the third and fourth derivative.
         Derivatives {
             velocity: (8.0 * (p1 - p3) - (p0 - p4)) / (12.0 * h),
             acceleration: (16.0 * (p1 + p3 - 2.0 * p2) - (p0 + p4 - 2.0 * p2)) / (12.0 * h * h),
+            third: ((p0 - p4) - 2.0 * (p1 - p3)) / (2.0 * h * h * h),
+            fourth: ((p0 + p4) - 4.0 * (p1 + p3) + 6.0 * p2) / (h * h * h * h),
         }
     }
 

@@ -1,9 +1,10 @@
 //! A table in the form that the tick runs: inverse and merged terms of each zone, in double precision, SI.
 use crate::stencil::Inverse;
 use giotto_shared::bounds::{OFFSET_MAX_M, SLEW_MAX_M_S};
-use giotto_shared::law::Profile;
+use giotto_shared::kinematics::Kinematics;
+use giotto_shared::law::{Common, Profile};
 use giotto_shared::model::Cumulants;
-use giotto_shared::table::{self, MAX_ZONES, Table, TableError, Travel, Zone};
+use giotto_shared::table::{self, Arm, MAX_ZONES, Table, TableError, Travel, Zone};
 use giotto_shared::term::{ProfileError, Term};
 
 /// Why a table cannot be used.
@@ -24,6 +25,8 @@ pub(crate) struct ZoneLaw {
     pub(crate) profile: Profile<f64>,
     /// Whether any profile term is there at all.
     pub(crate) has_terms: bool,
+    /// The arm that is corrected through its joints, with what they have in common.
+    pub(crate) arm: Option<ArmZone>,
     place_m: Option<[[f64; 2]; 3]>,
     pub(crate) radius_m: [f64; 2],
     feed_m_s: f64,
@@ -45,8 +48,26 @@ pub(crate) const STRAIGHT_M_S2: f64 = 1e-3;
 /// What feeds may be beyond a zone's and still count as meant, share.
 const SLACK: f64 = 0.02;
 
+/// An arm as a zone sees it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ArmZone {
+    pub(crate) kinematics: Kinematics<f64>,
+    pub(crate) home_m: Option<[f64; 3]>,
+    pub(crate) common: Common<f64>,
+}
+
+impl ArmZone {
+    fn new(arm: &Arm, cumulants: &Cumulants<f64>) -> Self {
+        Self {
+            kinematics: arm.kinematics.map(f64::from),
+            home_m: arm.home_m.map(|home| home.map(f64::from)),
+            common: Common::new(cumulants),
+        }
+    }
+}
+
 impl ZoneLaw {
-    fn new(zone: &Zone, index: usize) -> Result<Self, LawError> {
+    fn new(zone: &Zone, arm: Option<&Arm>, index: usize) -> Result<Self, LawError> {
         let mut profile = Profile::default();
         for (at, term) in zone.terms.iter().enumerate() {
             let term: Term<f64> = term.map(f64::from);
@@ -56,11 +77,13 @@ impl ZoneLaw {
         let place_m = zone.place_m.map(|[[x0, y0, z0], [x1, y1, z1]]| {
             [[x0, x1], [y0, y1], [z0, z1]].map(|range| range.map(f64::from))
         });
+        let cumulants = Cumulants {
+            kappa2_s2: f64::from(zone.cumulants.kappa2_s2),
+            kappa4_s4: f64::from(zone.cumulants.kappa4_s4),
+        };
         Ok(Self {
-            inverse: Inverse::new(&Cumulants {
-                kappa2_s2: f64::from(zone.cumulants.kappa2_s2),
-                kappa4_s4: f64::from(zone.cumulants.kappa4_s4),
-            }),
+            inverse: Inverse::new(&cumulants),
+            arm: arm.map(|arm| ArmZone::new(arm, &cumulants)),
             profile,
             has_terms: !zone.terms.is_empty(),
             place_m,
@@ -126,7 +149,7 @@ impl Law {
         table::decode_into(image, place).map_err(LawError::Table)?;
         let mut zones = [None; MAX_ZONES];
         for (index, (built, zone)) in zones.iter_mut().zip(&place.zones).enumerate() {
-            *built = Some(ZoneLaw::new(zone, index)?);
+            *built = Some(ZoneLaw::new(zone, place.arm.as_ref(), index)?);
         }
         *self = Self {
             zones,

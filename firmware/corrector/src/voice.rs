@@ -6,6 +6,8 @@ use crate::senses::Sensed;
 use crate::settings::Settings;
 use crate::stencil::Stencil;
 use core::f64::consts::TAU;
+use giotto_shared::kinematics::path;
+use giotto_shared::law::{ArmLaw, JointSides, Pace};
 
 /// What all voices see of the place that is corrected, SI, by slide.
 #[derive(Clone, Copy, Debug, Default)]
@@ -13,6 +15,8 @@ pub(crate) struct Place {
     pub(crate) place_m: [f64; 3],
     pub(crate) velocity_m_s: [f64; 3],
     pub(crate) acceleration_m_s2: [f64; 3],
+    /// Third and fourth derivative.
+    pub(crate) higher: [[f64; 3]; 2],
     pub(crate) turn: Turn,
     pub(crate) sensed: [Sensed; 3],
     /// How what is taken from the history turns until the place that is corrected; `None`: it is the same place.
@@ -35,11 +39,27 @@ pub(crate) struct Voice {
     pulse: [Pulse; 3],
     on_arc: OnArc,
     stencil: Stencil,
+    arm: Option<(ArmLaw<f64>, JointSides<f64>)>,
+    /// What the joints asked for last, m.
+    joints_m: [f64; 3],
 }
 
 impl Voice {
-    pub(crate) const fn new(reference_m: [f64; 3], stencil: Stencil) -> Self {
+    pub(crate) fn new(
+        zone: &ZoneLaw,
+        reference_m: [f64; 3],
+        stencil: Stencil,
+        pace: &Pace<f64>,
+    ) -> Self {
+        let arm = zone.arm.and_then(|arm| {
+            let errors = zone.profile.arm;
+            // An arm that cannot stand where zeros are counted from asks for nothing.
+            let law = ArmLaw::new(arm.kinematics, arm.common, errors, arm.home_m, pace);
+            law.ok().map(|law| (law, JointSides::default()))
+        });
         Self {
+            arm,
+            joints_m: [0.0; 3],
             reference_m,
             stencil,
             pulse: [Pulse {
@@ -68,6 +88,7 @@ impl Voice {
         if let Some(ahead) = &at.ahead {
             offset = ahead.turned(offset);
         }
+        self.by_joints(at, &mut offset);
         if zone.has_terms {
             self.by_motion(zone, at, &mut offset);
             self.by_sense(zone, at, history.tick_s(), &mut offset);
@@ -75,6 +96,27 @@ impl Voice {
             self.on_circles(zone, at, history.tick_s(), &mut offset);
         }
         offset
+    }
+
+    /// What the joints of an arm ask for. Where it cannot stand the last of it is held.
+    fn by_joints(&mut self, at: &Place, offset: &mut [f64; 3]) {
+        let Some((law, sides)) = &mut self.arm else {
+            return;
+        };
+        let [third, fourth] = at.higher;
+        let path = path(&[
+            at.place_m,
+            at.velocity_m_s,
+            at.acceleration_m_s2,
+            third,
+            fourth,
+        ]);
+        if let Ok(joints_m) = law.offset(&path, sides) {
+            self.joints_m = joints_m;
+        }
+        for (offset, joints) in offset.iter_mut().zip(self.joints_m) {
+            *offset += joints;
+        }
     }
 
     /// Errors by position, velocity and acceleration.

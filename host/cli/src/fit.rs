@@ -241,6 +241,7 @@ fn model_file(fit: &RadiusFit, runs: &[Observation], campaign: &str, machine: &s
         valid: Valid {
             radius_mm: range(|o| o.radius_m),
             feed_mm_s: range(|o| o.feed_m_s),
+            centre_mm: None,
         },
         kinematics: None,
         effects: Vec::new(),

@@ -256,5 +256,53 @@ fn in_words(term: &Term<f32>) -> String {
             of(across),
             n(curvature_per_m, 1e4)
         ),
+        _ => of_joint(term).unwrap_or_default(),
     }
+}
+
+/// A term of an arm as a person says it; `None` for another term.
+fn of_joint(term: &Term<f32>) -> Option<String> {
+    let n = |value: f32, factor: f64| number(f64::from(value) * factor);
+    Some(match *term {
+        Term::JointLag {
+            actuator,
+            delta_tau_s,
+            delta_kappa2_s2,
+        } => format!(
+            "{actuator} follows {} µs later than the others and rounds off its motion more: κ2 by {} ms²",
+            n(delta_tau_s, 1e6),
+            n(delta_kappa2_s2, 1e6)
+        ),
+        Term::JointBacklash { actuator, play_rad } => {
+            format!("play in the gear of {actuator} {} mrad", n(play_rad, 1e3))
+        }
+        Term::JointReversal {
+            actuator,
+            peak_rad,
+            decay_s,
+        } => format!(
+            "reversal spike of {actuator} {} mrad, dying away in {} ms",
+            n(peak_rad, 1e3),
+            n(decay_s, 1e3)
+        ),
+        Term::JointCyclic {
+            actuator,
+            amplitude_rad,
+            waves,
+            phase_rad,
+        } => format!(
+            "gear of {actuator} {} mrad, {} waves a turn, phase {}°",
+            n(amplitude_rad, 1e3),
+            n(waves, 1.0),
+            n(phase_rad.to_degrees(), 1.0)
+        ),
+        Term::JointZero {
+            actuator,
+            offset_rad,
+        } => format!("zero of {actuator} off by {} mrad", n(offset_rad, 1e3)),
+        Term::LinkLength { actuator, longer_m } => {
+            format!("link behind {actuator} longer by {} mm", n(longer_m, 1e3))
+        }
+        _ => return None,
+    })
 }

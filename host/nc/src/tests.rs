@@ -13,6 +13,7 @@ pub(super) fn model(servo: Servo) -> ModelFile {
         valid: Valid {
             radius_mm: [50.0, 300.0],
             feed_mm_s: [20.0, 700.0],
+            centre_mm: None,
         },
         kinematics: None,
         effects: Vec::new(),

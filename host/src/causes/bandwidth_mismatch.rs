@@ -1,6 +1,8 @@
 //! Unequal second cumulants: `r = −(Δκ2/4)(f²/R)·|G|·cos2ψ`, the same both ways: a filter before or behind the servo. Of a
 //! joint `δq = ½Δκ2·q̈`.
-use super::{Cause, CauseModel, Effect, Harmonics, Parameter, RunView, Seat, Site, Words};
+use super::{
+    ArmChain, Cause, CauseModel, Effect, Harmonics, Parameter, RunView, Seat, Site, Words,
+};
 use crate::simulation::machine::Machine;
 use giotto_shared::term::Term;
 
@@ -82,6 +84,20 @@ impl CauseModel for BandwidthMismatch {
         };
         Some(Term::BandwidthMismatch {
             plane,
+            delta_kappa2_s2: effect.value(),
+        })
+    }
+
+    fn joint_term(&self, effect: &Effect, _arm: &ArmChain) -> Option<Term<f64>> {
+        let Site::One(actuator) = effect.site() else {
+            return None;
+        };
+        if actuator.is_slide() {
+            return None;
+        }
+        Some(Term::JointLag {
+            actuator,
+            delta_tau_s: 0.0,
             delta_kappa2_s2: effect.value(),
         })
     }

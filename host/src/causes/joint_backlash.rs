@@ -4,8 +4,11 @@
 //! The play is crossed while the joint turns round, which the shape parameter `play_rad` (|B|) gives the signature as a ramp.
 //! Where the play lies before the joint's loop, the loop smooths the step: `smoothed_s` is the time constant of that, and since
 //! the machine angle is behind the command by the same time, the smoothed step begins so much before the reversal.
-use super::{Bend, Cause, CauseModel, Effect, Fitted, Parameter, RunView, Seat, Site, Words};
+use super::{
+    ArmChain, Bend, Cause, CauseModel, Effect, Fitted, Parameter, RunView, Seat, Site, Words,
+};
 use crate::simulation::machine::Machine;
+use giotto_shared::term::Term;
 use std::f64::consts::TAU;
 
 /// See the module.
@@ -23,7 +26,7 @@ const WORDS: Words = Words {
     elsewhere: None,
     never_told_from: &[],
     next: "the joint alone, forth and back by a degree, with a dial gauge at the tool",
-    not_compensable: Some("the table has no model of the arm"),
+    not_compensable: None,
 };
 
 /// Largest play, rad: more is a broken gear.
@@ -152,6 +155,16 @@ impl CauseModel for JointBacklash {
             joint.backlash_rad += effect.value() * 1e-3;
             joint.smoothed_s = effect.get(&SMOOTHED_S);
         }
+    }
+
+    fn joint_term(&self, effect: &Effect, _arm: &ArmChain) -> Option<Term<f64>> {
+        let Site::One(actuator) = effect.site() else {
+            return None;
+        };
+        Some(Term::JointBacklash {
+            actuator,
+            play_rad: effect.value() * 1e-3,
+        })
     }
 }
 

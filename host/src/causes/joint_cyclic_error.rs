@@ -1,8 +1,11 @@
 //! Periodic error of a joint's gear: `δq = A·sin(w·q + φ)`, seen as `n̂ᵀJe·δq`: a chirp over the circle that does not depend on
 //! the speed. w is the number of waves to one turn of the joint: its gear's ratio, or twice that.
-use super::{Bend, Cause, CauseModel, Effect, Fitted, Parameter, RunView, Seat, Site, Words};
+use super::{
+    ArmChain, Bend, Cause, CauseModel, Effect, Fitted, Parameter, RunView, Seat, Site, Words,
+};
 use crate::simulation::arm::Gear;
 use crate::simulation::machine::Machine;
+use giotto_shared::term::Term;
 use std::f64::consts::TAU;
 
 /// See the module.
@@ -20,7 +23,7 @@ const WORDS: Words = Words {
     elsewhere: None,
     never_told_from: &[],
     next: "a slow turn of the joint alone over a few waves, with an encoder or a tracker at the tool",
-    not_compensable: Some("the table has no model of the arm"),
+    not_compensable: None,
 };
 
 /// In the contract's unit.
@@ -193,5 +196,17 @@ impl CauseModel for JointCyclicError {
                 phase_rad: effect.get(&PHASE_RAD),
             });
         }
+    }
+
+    fn joint_term(&self, effect: &Effect, _arm: &ArmChain) -> Option<Term<f64>> {
+        let Site::One(actuator) = effect.site() else {
+            return None;
+        };
+        Some(Term::JointCyclic {
+            actuator,
+            amplitude_rad: effect.value() * 1e-3,
+            waves: effect.get(&RATIO),
+            phase_rad: effect.get(&PHASE_RAD),
+        })
     }
 }

@@ -5,9 +5,11 @@
 //! choice. A lag that all joints have alike only delays the circle, so the value is what this joint has more than the mean.
 //! Without kinematics only the mean is known: the effective A12 − A21.
 use super::{
-    Bend, Cause, CauseModel, Effect, Fitted, Harmonics, Parameter, RunView, Seat, Site, Words,
+    ArmChain, Bend, Cause, CauseModel, Effect, Fitted, Harmonics, Parameter, RunView, Seat, Site,
+    Words,
 };
 use crate::simulation::machine::Machine;
+use giotto_shared::term::Term;
 
 /// See the module.
 pub struct JointLagMismatch;
@@ -27,7 +29,9 @@ const WORDS: Words = Words {
     ]),
     never_told_from: &[],
     next: "the same circles at another place of the work space, where the Jacobian differs",
-    not_compensable: Some("the table has no model of the arm: its size changes with the place"),
+    not_compensable: Some(
+        "its size changes with the place: with the kinematics given it is told which joint, and corrected there",
+    ),
 };
 
 /// In the contract's unit.
@@ -126,5 +130,23 @@ impl CauseModel for JointLagMismatch {
             (Site::Machine, _) => machine.cross_lag_s += effect.value(),
             _ => {}
         }
+    }
+
+    fn joint_term(&self, effect: &Effect, arm: &ArmChain) -> Option<Term<f64>> {
+        let Site::One(actuator) = effect.site() else {
+            return None;
+        };
+        let delta_tau_s = effect.value() * beyond_others(arm.turning);
+        // (τ + δ)² − τ²: a slower loop smooths more, too; a longer dead time does not.
+        let delta_kappa2_s2 = if effect.get(&TURNED) > 0.5 {
+            (2.0 * arm.lag_s + delta_tau_s) * delta_tau_s
+        } else {
+            0.0
+        };
+        Some(Term::JointLag {
+            actuator,
+            delta_tau_s,
+            delta_kappa2_s2,
+        })
     }
 }

@@ -3,8 +3,11 @@
 //!
 //! The size is stated at the tool: A times the distance of the tool from the joint's axis at the first circle.
 use super::reversal_spike::Pulse;
-use super::{Bend, Cause, CauseModel, Effect, Fitted, Parameter, RunView, Seat, Site, Words};
+use super::{
+    ArmChain, Bend, Cause, CauseModel, Effect, Fitted, Parameter, RunView, Seat, Site, Words,
+};
 use crate::simulation::machine::{Friction, Machine};
+use giotto_shared::term::Term;
 use std::f64::consts::TAU;
 
 /// See the module.
@@ -22,7 +25,7 @@ const WORDS: Words = Words {
     elsewhere: None,
     never_told_from: &[],
     next: "the same circle elsewhere: the spikes move with the joint angles",
-    not_compensable: Some("the table has no model of the arm"),
+    not_compensable: None,
 };
 
 /// In the contract's unit.
@@ -204,5 +207,16 @@ impl CauseModel for JointReversal {
         friction.rise_s = effect.get(&RISE_S);
         friction.presliding_m = effect.get(&PRESLIDING_MRAD) * 1e-3;
         joint.friction = Some(friction);
+    }
+
+    fn joint_term(&self, effect: &Effect, _arm: &ArmChain) -> Option<Term<f64>> {
+        let Site::One(actuator) = effect.site() else {
+            return None;
+        };
+        Some(Term::JointReversal {
+            actuator,
+            peak_rad: effect.value() * 1e-6 / (effect.get(&ARM_MM) * 1e-3),
+            decay_s: effect.get(&DECAY_S),
+        })
     }
 }

@@ -1,8 +1,11 @@
 //! A joint that stands at another angle than its controller reads: `r = n̂ᵀJe·δ`, the same at every speed, both ways: over a
 //! circle a change of size and an oval, ∝ R, that depend on the place. From one place it looks as a link of another length does.
 use super::arm::sites_with_shape;
-use super::{Cause, CauseModel, Effect, Harmonics, Parameter, RunView, Seat, Site, Words};
+use super::{
+    ArmChain, Cause, CauseModel, Effect, Harmonics, Parameter, RunView, Seat, Site, Words,
+};
 use crate::simulation::machine::Machine;
+use giotto_shared::term::Term;
 
 /// See the module.
 pub struct JointZero;
@@ -19,7 +22,7 @@ const WORDS: Words = Words {
     elsewhere: None,
     never_told_from: &[],
     next: "the same circle at three more places of the work space",
-    not_compensable: Some("the table has no model of the arm"),
+    not_compensable: None,
 };
 
 /// In the contract's unit.
@@ -61,5 +64,15 @@ impl CauseModel for JointZero {
         if let (Site::One(joint), Some(arm)) = (effect.site(), &mut machine.arm) {
             arm.joints[joint.index()].zero_rad += effect.value() * 1e-3;
         }
+    }
+
+    fn joint_term(&self, effect: &Effect, arm: &ArmChain) -> Option<Term<f64>> {
+        let Site::One(actuator) = effect.site() else {
+            return None;
+        };
+        arm.placed.then_some(Term::JointZero {
+            actuator,
+            offset_rad: effect.value() * 1e-3,
+        })
     }
 }

@@ -1,8 +1,11 @@
 //! A link that is longer or shorter than the controller computes with: `r = n̂·u·δ`, u the link's direction, the same at every
 //! speed, both ways: a change of size and an oval, ∝ R, that depend on the place. It is named by the joint before the link.
 use super::arm::sites_with_shape;
-use super::{Cause, CauseModel, Effect, Harmonics, Parameter, RunView, Seat, Site, Words};
+use super::{
+    ArmChain, Cause, CauseModel, Effect, Harmonics, Parameter, RunView, Seat, Site, Words,
+};
 use crate::simulation::machine::Machine;
+use giotto_shared::term::Term;
 
 /// See the module.
 pub struct LinkLength;
@@ -19,7 +22,7 @@ const WORDS: Words = Words {
     elsewhere: None,
     never_told_from: &[],
     next: "the same circle at three more places of the work space",
-    not_compensable: Some("the table has no model of the arm"),
+    not_compensable: None,
 };
 
 /// In the contract's unit.
@@ -61,5 +64,15 @@ impl CauseModel for LinkLength {
         if let (Site::One(joint), Some(arm)) = (effect.site(), &mut machine.arm) {
             arm.longer_m[joint.index()] += effect.value() * 1e-3;
         }
+    }
+
+    fn joint_term(&self, effect: &Effect, arm: &ArmChain) -> Option<Term<f64>> {
+        let Site::One(actuator) = effect.site() else {
+            return None;
+        };
+        arm.placed.then_some(Term::LinkLength {
+            actuator,
+            longer_m: effect.value() * 1e-3,
+        })
     }
 }

@@ -309,7 +309,9 @@ pub trait CauseModel: Sync {
 
     /// Whether the controller can correct it: by a term, or by κ4 of the chain.
     fn is_compensable(&self, effect: &Effect) -> bool {
-        self.term(effect).is_some() || self.kappa4_s4(effect).is_some()
+        self.term(effect).is_some()
+            || self.joint_term(effect, &ArmChain::ANY).is_some()
+            || self.kappa4_s4(effect).is_some()
     }
 
     /// What it adds to κ4 of the chain of all axes, s⁴, where a table corrects it so.
@@ -321,6 +323,31 @@ pub trait CauseModel: Sync {
     fn term(&self, _effect: &Effect) -> Option<Term<f64>> {
         None
     }
+
+    /// The same of a joint, where the controller is told the arm.
+    fn joint_term(&self, _effect: &Effect, _arm: &ArmChain) -> Option<Term<f64>> {
+        None
+    }
+}
+
+/// What all joints of an arm have in common.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ArmChain {
+    /// How many turn.
+    pub turning: usize,
+    /// Time constant of their loops, s; 0 where it is not known.
+    pub lag_s: f64,
+    /// Whether it is known from where zeros and lengths are counted.
+    pub placed: bool,
+}
+
+impl ArmChain {
+    /// For asking whether there is a term at all.
+    pub(crate) const ANY: Self = Self {
+        turning: 6,
+        lag_s: 0.0,
+        placed: true,
+    };
 }
 
 /// What a fit says of a cause beside its size.

@@ -477,6 +477,7 @@ pub fn extended_model(
         valid: crate::model_file::Valid {
             radius_mm: range(&|r| r.radius_m),
             feed_mm_s: range(&|r| r.feed_m_s),
+            centre_mm: campaign.kinematics.and_then(|_| middle_mm(campaign)),
         },
         kinematics: campaign.kinematics,
         effects: effects
@@ -485,4 +486,12 @@ pub fn extended_model(
             .collect(),
         delay_s,
     }
+}
+
+/// Middle of the centres of all circles, mm to the micrometre, if all are known.
+fn middle_mm(campaign: &Campaign) -> Option<[f64; 3]> {
+    let centres: Option<Vec<[f64; 3]>> = campaign.runs.iter().map(|run| run.centre_m).collect();
+    let centres = centres.filter(|centres| !centres.is_empty())?;
+    let mean = |k: usize| centres.iter().map(|c| c[k]).sum::<f64>() / centres.len() as f64;
+    Some([0, 1, 2].map(|k| (mean(k) * 1e6).round() / 1e3))
 }

@@ -99,7 +99,10 @@ fn the_hand_points_where_it_is_told_to() {
             unreachable!()
         };
         let q = Kinematics::Opw(arm).angles([0.55, 0.35, 0.6]).unwrap();
-        let matrix = rotation::of_quaternion(arm.orientation);
+        // As nalgebra has it.
+        let [w, x, y, z] = arm.orientation;
+        let turned = nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::new(w, x, y, z));
+        let matrix: [[f64; 3]; 3] = turned.to_rotation_matrix().into_inner().transpose().into();
         for axis in 0..3 {
             let mut longer = arm;
             longer.tool_m[axis] += 0.1;

@@ -21,6 +21,7 @@ pub fn model() -> ModelFile {
         valid: Valid {
             radius_mm: [0.01, 1000.0],
             feed_mm_s: [0.1, 5000.0],
+            centre_mm: None,
         },
         kinematics: None,
         effects: Vec::new(),

@@ -3,6 +3,7 @@
     clippy::needless_range_loop,
     reason = "a joint is a number into several arrays at once"
 )]
+mod arm;
 mod circles;
 mod contours;
 mod lead;

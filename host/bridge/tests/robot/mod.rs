@@ -49,6 +49,7 @@ pub fn table_with([slew_m_s, offset_m]: [f64; 2]) -> Vec<u8> {
             offset_m: offset_m as f32,
             slew_m_s: slew_m_s as f32,
         },
+        arm: None,
     };
     let mut bytes = vec![0; MAX_IMAGE_BYTES];
     let length = table::encode(&table, &mut bytes).unwrap();

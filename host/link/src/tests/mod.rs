@@ -24,6 +24,7 @@ fn image(scale: f64) -> Vec<u8> {
         valid: Valid {
             radius_mm: [50.0, 300.0],
             feed_mm_s: [20.0, 700.0],
+            centre_mm: None,
         },
         kinematics: None,
         effects: Vec::new(),
