@@ -43,6 +43,11 @@ const TWO: [[f64; 3]; 4] = [
 /// Draws an arm and its laboratory under `seed`, hides the effects, measures. `None` if an effect has no such name
 /// or an arm does not reach.
 pub fn hidden(setting: &Setting, seed: u64) -> Option<Hidden> {
+    hidden_arm(setting, seed).map(|(hidden, _)| hidden)
+}
+
+/// As [`hidden`], with the arm that was measured: what its circles become is to be tried on it.
+pub fn hidden_arm(setting: &Setting, seed: u64) -> Option<(Hidden, Arm)> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x6a6f_696e);
     let kinematics = if setting.six {
         Kinematics::irb1600()
@@ -99,7 +104,7 @@ pub fn hidden(setting: &Setting, seed: u64) -> Option<Hidden> {
         ..Instrument::perfect()
     };
     let clean = measured(&silent, &arm, &plan, measured_with)?;
-    Some(Hidden {
+    let hidden = Hidden {
         name: name(setting),
         seed,
         strength: setting.strength,
@@ -111,7 +116,8 @@ pub fn hidden(setting: &Setting, seed: u64) -> Option<Hidden> {
         model: None,
         kinematics: setting.given.then(|| sound.believed.block()),
         spoilt: None,
-    })
+    };
+    Some((hidden, arm))
 }
 
 /// Its name in a list.

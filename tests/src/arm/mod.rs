@@ -9,9 +9,9 @@ pub mod kinematics;
 pub mod run;
 
 pub use effects::{ARM_EFFECTS, arm_effect};
-pub use hidden::{Setting, hidden};
+pub use hidden::{Setting, hidden, hidden_arm};
 pub use kinematics::Kinematics;
-pub use run::simulate;
+pub use run::{follow, simulate};
 
 use crate::machine::AxisChain;
 

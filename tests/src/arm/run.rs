@@ -76,3 +76,41 @@ pub fn simulate(arm: &Arm, test: &Test) -> Option<Lap> {
         angle_rad: None,
     })
 }
+
+/// Drives `arm` by set-points, m, evenly spaced in time: where the tool is at each of them. `None` where one is out of its reach.
+/// Between two set-points the joints' commands run straight.
+pub fn follow(arm: &Arm, set_points: &[[f64; 3]], tick_s: f64) -> Option<Vec<[f64; 3]>> {
+    let mut path: Vec<[f64; 6]> = Vec::with_capacity(set_points.len());
+    for place in set_points {
+        let mut q = arm.believed.inverse(*place)?;
+        if let Some(last) = path.last() {
+            for (q, last) in q.iter_mut().zip(last) {
+                *q = last + short_way(*last, *q);
+            }
+        }
+        path.push(q);
+    }
+    let last = path.len().checked_sub(1)?;
+    let at = |joint: usize, tick: f64| {
+        let tick = tick.max(0.0);
+        let k = (tick as usize).min(last);
+        let next = (k + 1).min(last);
+        path[k][joint] + (tick - k as f64) * (path[next][joint] - path[k][joint])
+    };
+    let mut chains: [Chain; 6] =
+        std::array::from_fn(|k| Chain::new(&arm.joints[k].chain, tick_s, path[0][k]));
+    let places = (0..path.len()).map(|tick| {
+        let mut q = [0.0; 6];
+        for (joint, q) in q.iter_mut().enumerate() {
+            let of = &arm.joints[joint];
+            let command = at(joint, tick as f64 - of.chain.dead_time_s / tick_s);
+            *q = chains[joint].step(command, tick_s);
+            *q += of.zero_rad
+                + of.gear.map_or(0.0, |g| {
+                    g.amplitude_rad * (g.waves * *q + g.phase_rad).sin()
+                });
+        }
+        arm.real.forward(&q)
+    });
+    Some(places.collect())
+}
