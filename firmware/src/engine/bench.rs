@@ -118,15 +118,18 @@ pub const OF_JOINTS: [Term<f32>; 8] = [
     Term::JointBacklash {
         actuator: Actuator::Joint1,
         play_rad: 2e-5,
+        loop_s: 0.007,
     },
     Term::JointReversal {
         actuator: Actuator::Joint1,
         peak_rad: 1e-5,
         decay_s: 0.05,
+        loop_s: 0.007,
     },
     Term::JointBacklash {
         actuator: Actuator::Joint3,
         play_rad: 2e-5,
+        loop_s: 0.007,
     },
     gear(Actuator::Joint1),
     gear(Actuator::Joint2),

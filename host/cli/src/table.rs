@@ -273,13 +273,16 @@ fn of_joint(term: &Term<f32>) -> Option<String> {
             n(delta_tau_s, 1e6),
             n(delta_kappa2_s2, 1e6)
         ),
-        Term::JointBacklash { actuator, play_rad } => {
+        Term::JointBacklash {
+            actuator, play_rad, ..
+        } => {
             format!("play in the gear of {actuator} {} mrad", n(play_rad, 1e3))
         }
         Term::JointReversal {
             actuator,
             peak_rad,
             decay_s,
+            ..
         } => format!(
             "reversal spike of {actuator} {} mrad, dying away in {} ms",
             n(peak_rad, 1e3),

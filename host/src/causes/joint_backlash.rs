@@ -38,6 +38,8 @@ const SIZE: Parameter = Parameter::needed("value", [-20.0, 20.0], "mrad: more is
 const SMALLEST_PLAY_RAD: f64 = 1e-6;
 /// Time constants of a loop that smooths a step, s.
 const SMOOTHED: [f64; 2] = [1e-4, 0.1];
+/// Play whose step is smoothed by less than this lies behind the loop, s.
+const BEHIND_S: f64 = 2e-3;
 /// How the joint's loop smooths the step.
 const SMOOTHED_S: Parameter = Parameter::optional(
     "smoothed_s",
@@ -157,13 +159,19 @@ impl CauseModel for JointBacklash {
         }
     }
 
-    fn joint_term(&self, effect: &Effect, _arm: &ArmChain) -> Option<Term<f64>> {
+    fn joint_term(&self, effect: &Effect, arm: &ArmChain) -> Option<Term<f64>> {
         let Site::One(actuator) = effect.site() else {
             return None;
         };
         Some(Term::JointBacklash {
             actuator,
             play_rad: effect.value() * 1e-3,
+            // Play that the loop smooths lies before it.
+            loop_s: if effect.get(&SMOOTHED_S) < BEHIND_S {
+                arm.lag_s
+            } else {
+                0.0
+            },
         })
     }
 }

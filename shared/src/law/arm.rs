@@ -40,6 +40,8 @@ pub struct JointErrors<T> {
     pub peak_rad: T,
     /// Time constant of its decay, s.
     pub decay_s: T,
+    /// Time constant of the loop that what takes up play and friction goes through, s; 0: none.
+    pub loop_s: T,
     /// Periodic errors.
     pub gear: [Gear<T>; MAX_GEAR],
 }
@@ -66,6 +68,9 @@ pub struct JointSide<T> {
     /// Friction pulse, rad, and how much the turn under way adds to it.
     pulse_rad: T,
     rise_rad: T,
+    /// Changes of both in the last tick.
+    turned: T,
+    pulsed_rad: T,
 }
 
 /// Rate below which a joint's sense of travel is not known, rad/s: 10 µm/s at 1 m.
@@ -106,10 +111,14 @@ impl<T: Float> JointSide<T> {
             };
             rise = smooth(self.done);
         }
-        self.pulse_rad = self.pulse_rad * fade + self.rise_rad * rise;
+        let pulse_rad = self.pulse_rad * fade + self.rise_rad * rise;
+        self.pulsed_rad = pulse_rad - self.pulse_rad;
+        self.pulse_rad = pulse_rad;
+        let last = self.sense;
         if self.heading != T::zero() {
             self.sense = self.from + (self.heading - self.from) * smooth(self.done);
         }
+        self.turned = self.sense - last;
     }
 }
 
@@ -166,6 +175,7 @@ pub struct ArmLaw<T> {
     /// What of a friction pulse a tick leaves, by joint.
     fade: [T; 6],
     turn_ticks: T,
+    ticks_per_s: T,
     lead_s: T,
     /// Offset of zeros and lengths where they are counted from, m.
     still_m: [T; 3],
@@ -207,6 +217,7 @@ impl<T: Real> ArmLaw<T> {
             common,
             errors,
             fade,
+            ticks_per_s: pace.tick_s.recip(),
             turn_ticks: (pace.turn_s / pace.tick_s).max(T::one()),
             // A reversal is noticed half a tick late on average, and the turn begins in that tick.
             lead_s: half * pace.turn_s,
@@ -269,12 +280,16 @@ impl<T: Real> ArmLaw<T> {
             let along = q.derivatives();
             let [angle, rate, second, ..] = along;
             if errors.play_rad != T::zero() || errors.peak_rad != T::zero() {
-                side.tick(rate + self.lead_s * second, errors, fade, self.turn_ticks);
+                // The loop makes up for its own delay, and the joint turns that much later.
+                let ahead_s = self.lead_s - errors.loop_s;
+                side.tick(rate + ahead_s * second, errors, fade, self.turn_ticks);
             }
+            // Through the lag of a loop a change has to come as itself and its rate.
+            let ticks = errors.loop_s * self.ticks_per_s;
             let mut wanted = self.common.offset(along) + errors.lag_s * rate
                 - errors.second_s2 * second
-                + half * errors.play_rad * side.sense
-                + side.pulse_rad;
+                + half * errors.play_rad * (side.sense + ticks * side.turned)
+                + (side.pulse_rad + ticks * side.pulsed_rad);
             for gear in &errors.gear {
                 if gear.amplitude_rad != T::zero() {
                     let (sine, _) = (gear.waves * angle + gear.phase_rad).sine_cosine();

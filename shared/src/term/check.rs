@@ -20,6 +20,7 @@ pub enum Number {
     Curvature,
     Angle,
     Waves,
+    Loop,
 }
 
 impl Number {
@@ -37,6 +38,7 @@ impl Number {
             Self::Curvature => "guide curvature (1/m)",
             Self::Angle => "angle of a joint (rad)",
             Self::Waves => "waves in a turn of a joint",
+            Self::Loop => "time constant of a joint's loop (s)",
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Friction pulse of a joint after it has turned back: error `−peak·sgn(q̇)·exp(−t/decay)` of its angle.
 use super::check::{Number, joint, magnitude, within};
-use super::reach::{number, rise};
-use super::{Extent, Kind, LEVER_M, Reach, Term};
+use super::reach::{number, rise, through_loop};
+use super::{Extent, Kind, LEVER_M, LOOP_S, Reach, Term};
 use crate::Actuator;
 use crate::law::{Profile, Unmergeable, finite, joint_errors, positive};
 use num_traits::Float;
@@ -16,6 +16,7 @@ pub(super) struct JointReversal<T> {
     pub(super) actuator: Actuator,
     pub(super) peak_rad: T,
     pub(super) decay_s: T,
+    pub(super) loop_s: T,
 }
 
 impl<T: Float> Kind<T> for JointReversal<T> {
@@ -24,28 +25,32 @@ impl<T: Float> Kind<T> for JointReversal<T> {
             actuator: self.actuator,
             peak_rad: f(self.peak_rad),
             decay_s: f(self.decay_s),
+            loop_s: f(self.loop_s),
         }
     }
 
     fn validate(self) -> Result<(), super::Unfit> {
         joint(self.actuator)?;
         magnitude(Number::Angle, self.peak_rad, PEAK_MAX_RAD)?;
-        within(Number::Decay, self.decay_s, DECAY_S)
+        within(Number::Decay, self.decay_s, DECAY_S)?;
+        within(Number::Loop, self.loop_s, LOOP_S)
     }
 
     fn reach(self, _extent: &Extent<T>) -> Reach<T> {
         let peak_m = self.peak_rad * number(LEVER_M);
-        Reach::of(peak_m, rise(peak_m + peak_m))
+        through_loop(Reach::of(peak_m, rise(peak_m + peak_m)), self.loop_s)
     }
 
     fn add(self, profile: &mut Profile<T>) -> Result<(), Unmergeable> {
         let (peak, decay) = (finite(self.peak_rad)?, positive(self.decay_s)?);
+        let loop_s = finite(self.loop_s)?;
         let errors = joint_errors(profile, self.actuator)?;
         if errors.peak_rad != T::zero() && errors.decay_s != decay {
             return Err(Unmergeable::TooMany);
         }
         errors.peak_rad = errors.peak_rad + peak;
         errors.decay_s = decay;
+        errors.loop_s = errors.loop_s.max(loop_s);
         Ok(())
     }
 }

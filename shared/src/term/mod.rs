@@ -145,6 +145,8 @@ pub enum Term<T> {
         actuator: Actuator,
         /// From one side to the other, rad.
         play_rad: T,
+        /// Time constant of the loop before it, which what takes it up goes through, s; 0: none.
+        loop_s: T,
     },
     /// Friction pulse after a joint has turned back, behind the motion.
     JointReversal {
@@ -154,6 +156,8 @@ pub enum Term<T> {
         peak_rad: T,
         /// Time constant of the decay, s.
         decay_s: T,
+        /// Time constant of the loop before it, s; 0: none.
+        loop_s: T,
     },
     /// Periodic error of a joint's gear: `amplitude·sin(waves·q + phase)`.
     JointCyclic {
@@ -184,6 +188,8 @@ pub enum Term<T> {
 
 /// Longest lever of a joint that is reckoned with where limits are made, m.
 const LEVER_M: f64 = 2.0;
+/// Time constants of a joint's loop, s.
+const LOOP_S: [f32; 2] = [0.0, 0.2];
 
 /// What the file of a term provides.
 trait Kind<T: Float>: Copy {
@@ -217,8 +223,8 @@ macro_rules! with_kind {
             Cyclic cyclic { actuator, amplitude_m, pitch_m, phase_rad },
             Straightness straightness { actuator, across, curvature_per_m },
             JointLag joint_lag { actuator, delta_tau_s, delta_kappa2_s2 },
-            JointBacklash joint_backlash { actuator, play_rad },
-            JointReversal joint_reversal { actuator, peak_rad, decay_s },
+            JointBacklash joint_backlash { actuator, play_rad, loop_s },
+            JointReversal joint_reversal { actuator, peak_rad, decay_s, loop_s },
             JointCyclic joint_cyclic { actuator, amplitude_rad, waves, phase_rad },
             JointZero joint_zero { actuator, offset_rad },
             LinkLength link_length { actuator, longer_m },

@@ -5,6 +5,8 @@ pub const TAKE_UP_S: f64 = 0.008;
 
 /// Steepest slope of the take-up, of its mean: a smoothstep of degree 5.
 const STEEPEST: f64 = 1.875;
+/// Largest second derivative of the same.
+const SHARPEST: f64 = 5.774;
 
 /// The circles that a zone holds for, by their largest: SI.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,6 +40,16 @@ impl<T: num_traits::Float> Reach<T> {
     /// From one side to the other at each reversal, by so much.
     pub(super) fn of_step(step_m: T) -> Self {
         Self::of(number::<T>(0.5) * step_m, rise(step_m))
+    }
+}
+
+/// What a change becomes that is to come through the lag of a loop: as itself and its rate.
+pub(super) fn through_loop<T: num_traits::Float>(change: Reach<T>, loop_s: T) -> Reach<T> {
+    // The rate of the rate: 5.77 of the mean square over the take-up, of the smoothstep.
+    let turns = loop_s / number(TAKE_UP_S);
+    Reach {
+        offset_m: change.offset_m + loop_s * change.slew_m_s,
+        slew_m_s: change.slew_m_s * (T::one() + number::<T>(SHARPEST / STEEPEST) * turns),
     }
 }
 

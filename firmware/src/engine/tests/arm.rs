@@ -235,6 +235,7 @@ fn laws_are_exchanged_without_a_step() {
     let play = Term::JointBacklash {
         actuator: Actuator::Joint1,
         play_rad: 5e-5,
+        loop_s: 0.0,
     };
     let tables = [
         Some(arm_table(&[play])),
