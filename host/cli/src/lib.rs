@@ -25,6 +25,7 @@ mod history;
 mod import;
 mod interrupt;
 mod key;
+mod kinematics;
 mod log;
 mod man;
 mod monitor;
@@ -99,6 +100,8 @@ enum Command {
     Report(report::Args),
     /// Rewrite the arcs of an NC program with the inverse correction.
     Compensate(compensate::Args),
+    /// The lengths of an arm, as a campaign wants them, from its URDF.
+    Kinematics(kinematics::Args),
     /// Model to controller table, and back to words.
     Table(table::Args),
     /// Write a table to a controller: inactive slot, read back, commit, confirm.
@@ -155,6 +158,7 @@ fn dispatch(command: Command, out: Output) -> Result<(), Failure> {
         Command::History(args) => history::run(args, out),
         Command::Report(args) => report::run(args, out),
         Command::Compensate(args) => compensate::run(args, out),
+        Command::Kinematics(args) => kinematics::run(args, out),
         Command::Table(args) => table::run(args, out),
         Command::Flash(args) => flash::run(args, out),
         Command::Key(args) => key::run(args, out),

@@ -218,6 +218,8 @@ impl CauseModel for JointReversal {
             peak_rad: effect.value() * 1e-6 / (effect.get(&ARM_MM) * 1e-3),
             decay_s: effect.get(&DECAY_S),
             loop_s: arm.lag_s,
+            rise_s: effect.get(&RISE_S),
+            presliding_rad: effect.get(&PRESLIDING_MRAD) * 1e-3,
         })
     }
 }

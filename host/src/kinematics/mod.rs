@@ -5,6 +5,7 @@
 //! | `robots` | lengths of known robots, with their source |
 //! | `written` | the block `[kinematics]` of campaigns and models |
 //! | `orbit` | a circle as the joints see it |
+//! | `urdf` | lengths from the description that ROS uses |
 //!
 //! The closed forms themselves are in [`giotto_shared::kinematics`], since a controller needs them as well; here in double precision.
 //! `rs-opw-kinematics` is the oracle of the tests.
@@ -12,6 +13,7 @@ mod orbit;
 mod robots;
 #[cfg(test)]
 mod tests;
+pub mod urdf;
 mod written;
 
 pub use giotto_shared::kinematics::{Branch, Elbow, ReachError};

@@ -40,10 +40,25 @@ pub struct JointErrors<T> {
     pub peak_rad: T,
     /// Time constant of its decay, s.
     pub decay_s: T,
+    /// How long it takes to rise, s.
+    pub rise_s: T,
+    /// Travel over which the friction changes over, rad.
+    pub presliding_rad: T,
     /// Time constant of the loop that what takes up play and friction goes through, s; 0: none.
     pub loop_s: T,
     /// Periodic errors.
     pub gear: [Gear<T>; MAX_GEAR],
+}
+
+impl<T: Float> JointErrors<T> {
+    /// How long after the reversal the friction pulse is half up, s, where the joint turns round with an acceleration: the
+    /// bristles bend over a travel, x = ½q̈t², and half of them have changed over after ln 2 of it.
+    fn changes_over_s(&self, second: T) -> T {
+        let twice_ln2 = number::<T>(2.0 * core::f64::consts::LN_2);
+        let least = number::<T>(LEAST_SECOND);
+        let bent_s = (twice_ln2 * self.presliding_rad / second.abs().max(least)).sqrt();
+        bent_s.min(number(LONGEST_BEND_S)) + self.rise_s
+    }
 }
 
 /// What is wrong with an arm.
@@ -55,26 +70,37 @@ pub struct ArmErrors<T> {
     pub longer_m: [T; 6],
 }
 
-/// One joint's turning back: which side of its play it stands on, and its friction pulse.
+/// A change of side, made smoothly.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct JointSide<T> {
+struct Turn<T> {
     /// −1 to 1; 0 before the joint has moved.
-    sense: T,
+    now: T,
     /// Where the turn under way began, and where it leads.
     from: T,
     heading: T,
     /// Share of the turn under way that is over.
     done: T,
-    /// Friction pulse, rad, and how much the turn under way adds to it.
+    /// Changes in the last tick: of `now`, and of the share.
+    changed: T,
+    step: T,
+}
+
+/// One joint's turning back: which side of its play it stands on, and its friction pulse.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct JointSide<T> {
+    play: Turn<T>,
+    friction: Turn<T>,
+    /// Friction pulse, rad, how much the turn under way adds to it, and its change in the last tick.
     pulse_rad: T,
     rise_rad: T,
-    /// Changes of both in the last tick.
-    turned: T,
     pulsed_rad: T,
 }
 
 /// Rate below which a joint's sense of travel is not known, rad/s: 10 µm/s at 1 m.
 const LEAST_RATE: f64 = 1e-5;
+/// Acceleration below which a joint does not turn round, rad/s², and longest time that its friction takes to change over, s.
+const LEAST_SECOND: f64 = 1e-4;
+const LONGEST_BEND_S: f64 = 0.1;
 
 fn number<T: Float>(value: f64) -> T {
     T::from(value).unwrap_or_else(T::nan)
@@ -85,40 +111,50 @@ fn smooth<T: Float>(x: T) -> T {
     x * x * x * (x * (x * number(6.0) - number(15.0)) + number(10.0))
 }
 
-impl<T: Float> JointSide<T> {
-    /// One tick: `ahead` is the rate that the joint will have in the middle of a turn that would begin now.
-    fn tick(&mut self, ahead: T, errors: &JointErrors<T>, fade: T, turn_ticks: T) {
-        let before = if self.heading == T::zero() {
-            T::zero()
-        } else {
-            smooth(self.done)
-        };
-        let under_way = self.heading != T::zero() && self.done < T::one();
-        let turns = ahead.abs() > number(LEAST_RATE) && ahead.signum() != self.heading;
-        let mut rise = T::zero();
-        if under_way {
-            self.done = (self.done + turn_ticks.recip()).min(T::one());
-            rise = smooth(self.done) - before;
-        } else if turns {
-            // The pulse comes with a turn back, not with the first motion.
-            let reverses = self.heading != T::zero();
-            (self.from, self.heading) = (self.sense, ahead.signum());
-            self.done = turn_ticks.recip().min(T::one());
-            self.rise_rad = if reverses {
-                errors.peak_rad * self.heading - self.pulse_rad
-            } else {
-                T::zero()
-            };
-            rise = smooth(self.done);
+impl<T: Float> Turn<T> {
+    /// One tick, `ahead` the rate that the joint will have in the middle of a turn that would begin now. Whether it turns back: with
+    /// the first motion it only takes a side.
+    fn tick(&mut self, ahead: T, turn_ticks: T) -> bool {
+        let begun = self.heading != T::zero();
+        let before = if begun { smooth(self.done) } else { T::zero() };
+        let share = turn_ticks.recip();
+        let mut reverses = false;
+        self.step = T::zero();
+        if begun && self.done < T::one() {
+            self.done = (self.done + share).min(T::one());
+            self.step = smooth(self.done) - before;
+        } else if ahead.abs() > number(LEAST_RATE) && ahead.signum() != self.heading {
+            reverses = begun;
+            (self.from, self.heading) = (self.now, ahead.signum());
+            self.done = share.min(T::one());
+            self.step = smooth(self.done);
         }
-        let pulse_rad = self.pulse_rad * fade + self.rise_rad * rise;
+        let last = self.now;
+        if self.heading != T::zero() {
+            self.now = self.from + (self.heading - self.from) * smooth(self.done);
+        }
+        self.changed = self.now - last;
+        reverses
+    }
+}
+
+impl<T: Float> JointSide<T> {
+    /// One tick with the rates that the joint will have in the middle of a turn, for play and for friction.
+    fn tick(&mut self, ahead: [T; 2], errors: &JointErrors<T>, fade: T, turn_ticks: T) {
+        let [play, friction] = ahead;
+        if errors.play_rad != T::zero() {
+            self.play.tick(play, turn_ticks);
+        }
+        if errors.peak_rad == T::zero() {
+            return;
+        }
+        let reverses = self.friction.tick(friction, turn_ticks);
+        if reverses {
+            self.rise_rad = errors.peak_rad * self.friction.heading - self.pulse_rad;
+        }
+        let pulse_rad = self.pulse_rad * fade + self.rise_rad * self.friction.step;
         self.pulsed_rad = pulse_rad - self.pulse_rad;
         self.pulse_rad = pulse_rad;
-        let last = self.sense;
-        if self.heading != T::zero() {
-            self.sense = self.from + (self.heading - self.from) * smooth(self.done);
-        }
-        self.turned = self.sense - last;
     }
 }
 
@@ -280,15 +316,17 @@ impl<T: Real> ArmLaw<T> {
             let along = q.derivatives();
             let [angle, rate, second, ..] = along;
             if errors.play_rad != T::zero() || errors.peak_rad != T::zero() {
-                // The loop makes up for its own delay, and the joint turns that much later.
-                let ahead_s = self.lead_s - errors.loop_s;
-                side.tick(rate + ahead_s * second, errors, fade, self.turn_ticks);
+                // The loop makes up for its own delay, and the joint turns that much later; friction changes over after that.
+                let play_s = self.lead_s - errors.loop_s;
+                let friction_s = play_s - errors.changes_over_s(second);
+                let ahead = [play_s, friction_s].map(|ahead_s| rate + ahead_s * second);
+                side.tick(ahead, errors, fade, self.turn_ticks);
             }
             // Through the lag of a loop a change has to come as itself and its rate.
             let ticks = errors.loop_s * self.ticks_per_s;
             let mut wanted = self.common.offset(along) + errors.lag_s * rate
                 - errors.second_s2 * second
-                + half * errors.play_rad * (side.sense + ticks * side.turned)
+                + half * errors.play_rad * (side.play.now + ticks * side.play.changed)
                 + (side.pulse_rad + ticks * side.pulsed_rad);
             for gear in &errors.gear {
                 if gear.amplitude_rad != T::zero() {

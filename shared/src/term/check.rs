@@ -21,6 +21,7 @@ pub enum Number {
     Angle,
     Waves,
     Loop,
+    Rise,
 }
 
 impl Number {
@@ -38,6 +39,7 @@ impl Number {
             Self::Curvature => "guide curvature (1/m)",
             Self::Angle => "angle of a joint (rad)",
             Self::Waves => "waves in a turn of a joint",
+            Self::Rise => "rise of a reversal pulse (s)",
             Self::Loop => "time constant of a joint's loop (s)",
         }
     }

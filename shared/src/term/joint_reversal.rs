@@ -1,4 +1,5 @@
-//! Friction pulse of a joint after it has turned back: error `−peak·sgn(q̇)·exp(−t/decay)` of its angle.
+//! Friction pulse of a joint after it has turned back: error `−peak·sgn(q̇)·exp(−t/decay)` of its angle, half up when the friction has
+//! changed over (a travel of the joint) and the loop has answered (a rise).
 use super::check::{Number, joint, magnitude, within};
 use super::reach::{number, rise, through_loop};
 use super::{Extent, Kind, LEVER_M, LOOP_S, Reach, Term};
@@ -17,6 +18,8 @@ pub(super) struct JointReversal<T> {
     pub(super) peak_rad: T,
     pub(super) decay_s: T,
     pub(super) loop_s: T,
+    pub(super) rise_s: T,
+    pub(super) presliding_rad: T,
 }
 
 impl<T: Float> Kind<T> for JointReversal<T> {
@@ -26,6 +29,8 @@ impl<T: Float> Kind<T> for JointReversal<T> {
             peak_rad: f(self.peak_rad),
             decay_s: f(self.decay_s),
             loop_s: f(self.loop_s),
+            rise_s: f(self.rise_s),
+            presliding_rad: f(self.presliding_rad),
         }
     }
 
@@ -33,7 +38,9 @@ impl<T: Float> Kind<T> for JointReversal<T> {
         joint(self.actuator)?;
         magnitude(Number::Angle, self.peak_rad, PEAK_MAX_RAD)?;
         within(Number::Decay, self.decay_s, DECAY_S)?;
-        within(Number::Loop, self.loop_s, LOOP_S)
+        within(Number::Loop, self.loop_s, LOOP_S)?;
+        within(Number::Rise, self.rise_s, LOOP_S)?;
+        within(Number::Angle, self.presliding_rad, [0.0, PEAK_MAX_RAD])
     }
 
     fn reach(self, _extent: &Extent<T>) -> Reach<T> {
@@ -44,12 +51,14 @@ impl<T: Float> Kind<T> for JointReversal<T> {
     fn add(self, profile: &mut Profile<T>) -> Result<(), Unmergeable> {
         let (peak, decay) = (finite(self.peak_rad)?, positive(self.decay_s)?);
         let loop_s = finite(self.loop_s)?;
+        let (rise, presliding) = (finite(self.rise_s)?, finite(self.presliding_rad)?);
         let errors = joint_errors(profile, self.actuator)?;
         if errors.peak_rad != T::zero() && errors.decay_s != decay {
             return Err(Unmergeable::TooMany);
         }
         errors.peak_rad = errors.peak_rad + peak;
         errors.decay_s = decay;
+        (errors.rise_s, errors.presliding_rad) = (rise, presliding);
         errors.loop_s = errors.loop_s.max(loop_s);
         Ok(())
     }

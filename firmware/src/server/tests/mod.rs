@@ -14,7 +14,7 @@ use std::boxed::Box;
 use std::string::{String, ToString};
 use std::vec::Vec;
 
-const SLOT: usize = 2048;
+const SLOT: usize = 4096;
 const ERASE: usize = 512;
 const CELLS: usize = 2 * SLOT + ERASE;
 const LAYOUT: Layout = Layout::new([0, SLOT as u32], SLOT as u32).with_key(2 * SLOT as u32);
