@@ -110,7 +110,7 @@ fn document(config: &MachineConfig) -> Map<String, Value> {
     all.insert(CLOCK.to_owned(), json!(config.internal_clock));
     all.insert(RATE.to_owned(), json!(config.tick_hz));
     for (name, [nm, steps]) in STEPS.into_iter().zip(config.step) {
-        all.insert(name.to_owned(), json!([f64::from(nm) * 1e-6, steps]));
+        all.insert(name.to_owned(), json!([f64::from(nm) / 1e6, steps]));
     }
     all
 }
