@@ -199,6 +199,8 @@ fn run_ticks(as_json: bool, check: bool) -> Result<ExitCode, ControllerError> {
             "stream": range(&counts, "stream"),
             "naive_libm": range(&counts, "naive_libm"),
             "interrupt": range(&counts, "interrupt"),
+            "interrupt_stop": range(&counts, "interrupt_stop"),
+            "interrupt_stopping": range(&counts, "interrupt_stopping"),
             "naive_nalgebra": range(&counts, "naive_nalgebra"),
             "naive_idsp": range(&counts, "naive_idsp"),
             "image": { "text_bytes": image.text, "ram_bytes": image.ram, "stack_bytes": image.stack },

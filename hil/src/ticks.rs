@@ -32,14 +32,18 @@ pub struct ImageSize {
     pub stack: u32,
 }
 
-/// Most instructions that a kind of tick may take: β model, eight profile terms, stream, and all that the timer interrupt does,
-/// whatever it meets; an arm corrected by its joints a fifth of a millisecond of the F405's 168 MHz.
-const BARS: [(&str, u32); 5] = [
+/// Most instructions that a kind of tick may take: β model, eight profile terms, stream, and all that the timer interrupt does in a
+/// run; in the one tick of a run in which a stop begins, and on its way to rest after that, no more than there are between two ticks
+/// at the most that the emulated board bears, 8 kHz on 25 MHz; an arm corrected by its joints a fifth of a millisecond of the F405's
+/// 168 MHz.
+const BARS: [(&str, u32); 7] = [
     ("arc_beta", 300),
     ("arc_extended", 450),
     ("stream", 250),
     ("interrupt", 1000),
     ("arm", 33_600),
+    ("interrupt_stop", 3125),
+    ("interrupt_stopping", 3125),
 ];
 
 /// The bar of a kind of tick, if it has one.

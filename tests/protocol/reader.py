@@ -195,8 +195,9 @@ def main():
     assert hello.u() == 1
     board, build, protocol, _, _, longest, tick_hz, signed = (
         hello.text(), hello.text(), hello.u(), hello.u(), hello.u(), hello.u(), hello.u(), hello.byte())
+    machine = bytes(hello.byte() for _ in range(12))
     hello.end()
-    assert protocol == 4 and longest > 500 and signed == 0 and board and build
+    assert protocol == 5 and longest > 500 and signed == 0 and board and build and len(machine) == 12
     before = c.status()
     assert before["motion"] == 0 and before["position"] in (1, 2)
 
@@ -235,9 +236,13 @@ def main():
         pass
     limits = c.ask(26)
     assert limits.u() == 6
-    numbers = [limits.f32() for _ in range(7)]
+    numbers = [limits.f32() for _ in range(9)]
     soft = [(limits.i(), limits.i()) for _ in range(3)]
-    limits.byte(), limits.byte()
+    limits.byte()
+    assert limits.u() == tick_hz
+    steps = [(limits.u(), limits.u()) for _ in range(3)]
+    assert all(nm > 0 and of > 0 for nm, of in steps), steps
+    limits.byte()
     limits.end()
     assert all(n > 0 for n in numbers) and all(least < most for least, most in soft)
     log = c.ask(29, varint(0))

@@ -1,9 +1,9 @@
 //! What the engine is told about the machine, and the bounds that no table can widen.
 use giotto_shared::path::{MAX_POSITION_M, MotionLimits};
-use giotto_shared::wire::{ConfigField, MachineConfig};
+use giotto_shared::wire::{ConfigField, MachineConfig, STEP_MOST, TICK_HZ};
 
 /// Slowest and fastest tick the engine is built for, Hz.
-pub const RATE_HZ: [u32; 2] = [250, 20_000];
+pub const RATE_HZ: [u32; 2] = TICK_HZ;
 /// Shortest feed ramp, ticks: below it the phase of a ramp is no longer exact (see `ramp`).
 pub const MIN_RAMP_TICKS: u32 = 32;
 /// Longest feed ramp or blend, ticks.
@@ -20,8 +20,8 @@ pub struct Config {
     pub positioning_m_s: f64,
     /// Largest offset of the correction on one axis, whatever the table says, m.
     pub offset_m: f64,
-    /// Largest rate of change of that offset, whatever the table says, m/s.
-    pub slew_m_s: f64,
+    /// Largest rate of change of that offset by axis, whatever the table says, m/s.
+    pub slew_m_s: [f64; 3],
     /// Time over which a correction is engaged or disengaged, s.
     pub engage_s: f64,
     /// Time in which the play of an axis is taken up at its reversal, s.
@@ -54,7 +54,7 @@ impl Config {
             },
             positioning_m_s: 0.5,
             offset_m: 0.02,
-            slew_m_s: 0.2,
+            slew_m_s: [0.2; 3],
             engage_s: 0.25,
             take_up_s: 0.008,
             stream_window_s: 0.015,
@@ -85,7 +85,9 @@ impl Config {
             (jerk_m_s3, most(ConfigField::Jerk), "motion.jerk_m_s3"),
             (self.positioning_m_s, feed_m_s, "positioning_m_s"),
             (self.offset_m, most(ConfigField::Offset), "offset_m"),
-            (self.slew_m_s, most(ConfigField::Slew), "slew_m_s"),
+            (self.slew_m_s[0], most(ConfigField::Slew), "slew_m_s"),
+            (self.slew_m_s[1], most(ConfigField::Slew), "slew_m_s"),
+            (self.slew_m_s[2], most(ConfigField::Slew), "slew_m_s"),
             (self.engage_s, 10.0, "engage_s"),
             (self.take_up_s, 1.0, "take_up_s"),
             (
@@ -103,7 +105,7 @@ impl Config {
         Ok(self)
     }
 
-    /// As it is said on the wire.
+    /// As it is said on the wire. Steps are the board's business: one is a nanometre here.
     pub const fn said(&self) -> MachineConfig {
         MachineConfig {
             feed_m_s: self.motion.feed_m_s as f32,
@@ -111,14 +113,20 @@ impl Config {
             jerk_m_s3: self.motion.jerk_m_s3 as f32,
             positioning_m_s: self.positioning_m_s as f32,
             offset_m: self.offset_m as f32,
-            slew_m_s: self.slew_m_s as f32,
+            slew_m_s: {
+                let [x, y, z] = self.slew_m_s;
+                [x as f32, y as f32, z as f32]
+            },
             stream_window_s: self.stream_window_s as f32,
             soft_nm: self.soft_nm,
             internal_clock: self.internal_clock,
+            tick_hz: self.rate_hz,
+            step: [[1, 1]; 3],
         }
     }
 
-    /// With the numbers of the wire, if each of them is usable; otherwise the first that is not.
+    /// With the numbers of the wire, if each of them is usable; otherwise the first that is not. Ticks and steps hold from the next
+    /// start on: they are only looked at.
     pub fn with(self, said: &MachineConfig) -> Result<Self, ConfigField> {
         let config = Self {
             motion: MotionLimits {
@@ -128,7 +136,7 @@ impl Config {
             },
             positioning_m_s: f64::from(said.positioning_m_s),
             offset_m: f64::from(said.offset_m),
-            slew_m_s: f64::from(said.slew_m_s),
+            slew_m_s: said.slew_m_s.map(f64::from),
             stream_window_s: f64::from(said.stream_window_s),
             soft_nm: said.soft_nm,
             internal_clock: said.internal_clock,
@@ -140,6 +148,13 @@ impl Config {
             .all(|[least, most]| least < most && *least >= WHOLE_NM[0] && *most <= WHOLE_NM[1]);
         if !ordered {
             return Err(ConfigField::Soft);
+        }
+        if !(RATE_HZ[0]..=RATE_HZ[1]).contains(&said.tick_hz) {
+            return Err(ConfigField::Rate);
+        }
+        let mut units = said.step.iter().flatten();
+        if !units.all(|number| (1..=STEP_MOST).contains(number)) {
+            return Err(ConfigField::Step);
         }
         config.checked().map_err(|ConfigError(name)| match name {
             "motion.feed_m_s" => ConfigField::Feed,

@@ -8,7 +8,7 @@ pub(crate) struct Guard {
     easy_offset_nm: u32,
     easy_slew_nm: u32,
     offset_nm: i32,
-    slew_nm: i32,
+    slew_nm: [i32; 3],
 }
 
 /// The largest power of two not above a bound; 0 for 0.
@@ -30,9 +30,12 @@ pub(crate) struct Verdict {
 }
 
 impl Guard {
-    /// Bounds in nm and nm per tick.
-    pub(crate) const fn new(offset_nm: i32, slew_nm: i32) -> Self {
-        let (easy_offset_nm, easy_slew_nm) = (easy(offset_nm), easy(slew_nm));
+    /// Bounds in nm, and by axis in nm per tick.
+    pub(crate) const fn new(offset_nm: i32, slew_nm: [i32; 3]) -> Self {
+        let [x, y, z] = slew_nm;
+        let tighter = if x < y { x } else { y };
+        let tightest = if tighter < z { tighter } else { z };
+        let (easy_offset_nm, easy_slew_nm) = (easy(offset_nm), easy(tightest));
         Self {
             last_nm: [0; 3],
             easy_offset_nm,
@@ -43,7 +46,7 @@ impl Guard {
     }
 
     /// New bounds; the offset stays where it is.
-    pub(crate) fn set(&mut self, offset_nm: i32, slew_nm: i32) {
+    pub(crate) fn set(&mut self, offset_nm: i32, slew_nm: [i32; 3]) {
         *self = Self {
             last_nm: self.last_nm,
             ..Self::new(offset_nm, slew_nm)
@@ -110,9 +113,9 @@ impl Guard {
 
     /// The offset that may go out, axis by axis.
     pub(crate) fn pass(&mut self, wanted: [i32; 3]) -> ([i32; 3], Verdict) {
-        let (most, fastest) = (self.offset_nm, self.slew_nm);
+        let (most, [fx, fy, fz]) = (self.offset_nm, self.slew_nm);
         let (mut offset_cut, mut slew_cut) = (0, 0);
-        let mut axis = |want: i32, last: i32| {
+        let mut axis = |want: i32, last: i32, fastest: i32| {
             let bounded = want.max(most.wrapping_neg()).min(most);
             let change = bounded.saturating_sub(last);
             let slewed = change.max(fastest.wrapping_neg()).min(fastest);
@@ -121,7 +124,7 @@ impl Guard {
             last.wrapping_add(slewed)
         };
         let ([x, y, z], [lx, ly, lz]) = (wanted, self.last_nm);
-        let passed = [axis(x, lx), axis(y, ly), axis(z, lz)];
+        let passed = [axis(x, lx, fx), axis(y, ly, fy), axis(z, lz, fz)];
         let verdict = Verdict {
             offset_cut: offset_cut != 0,
             slew_cut: slew_cut != 0,
@@ -138,7 +141,7 @@ mod tests {
     #[test]
     fn what_passes_easily_is_within_the_bounds() {
         for v in [0, 511, -512, 512, -513, 1000, -1000, i32::MAX, i32::MIN] {
-            let mut guard = Guard::new(1000, i32::MAX);
+            let mut guard = Guard::new(1000, [i32::MAX; 3]);
             let weights = [0, v, 0]
                 .into_iter()
                 .fold((0, 0), |w, v| Guard::weigh(v, 0, w));
@@ -148,12 +151,12 @@ mod tests {
             assert_eq!(easy, (-512..512).contains(&v), "{v}");
             assert_eq!(guard.last_nm()[1], if easy { v } else { 0 });
         }
-        assert!(!Guard::new(0, 0).pass_easily([0; 3]));
+        assert!(!Guard::new(0, [0; 3]).pass_easily([0; 3]));
     }
 
     #[test]
     fn nothing_passes_beyond_its_bounds_and_everything_within_passes_unchanged() {
-        let mut guard = Guard::new(1000, 100);
+        let mut guard = Guard::new(1000, [100; 3]);
         assert_eq!(
             guard.pass([100, -100, 0]),
             ([100, -100, 0], Verdict::default())
@@ -173,5 +176,22 @@ mod tests {
         assert_eq!(guard.last_nm(), [1000, -1000, 50]);
         assert_eq!(guard.pass([1000, -1000, 51]).1, Verdict::default());
         assert!(guard.pass([1001, -1000, 51]).1.offset_cut);
+    }
+
+    /// Each axis has its own rate, and the tightest one says what passes easily.
+    #[test]
+    fn an_axis_is_as_slow_as_it_has_to_be() {
+        for slow in 0..3 {
+            let mut slew_nm = [1000; 3];
+            slew_nm[slow] = 100;
+            let mut guard = Guard::new(10_000, slew_nm);
+            let (out, verdict) = guard.pass([700; 3]);
+            let mut expected = [700; 3];
+            expected[slow] = 100;
+            assert_eq!(out, expected);
+            assert!(verdict.slew_cut);
+            assert!(!guard.pass_easily([764; 3]));
+            assert!(guard.pass_easily(core::array::from_fn(|k| expected[k] + 63)));
+        }
     }
 }

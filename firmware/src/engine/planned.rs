@@ -183,9 +183,9 @@ pub struct Planned {
     pub(crate) epoch: u8,
     /// Helix: nm per turn.
     pub(crate) rise_nm: [i32; 3],
-    /// Bounds on offset (nm) and its change (nm per tick).
+    /// Bounds on offset (nm) and its change by axis (nm per tick).
     pub(crate) offset_nm: i32,
-    pub(crate) slew_nm: i32,
+    pub(crate) slew_nm: [i32; 3],
     /// Clock step of the ramp that moves the offset from what it is to what this segment starts with.
     pub(crate) settle_step: u64,
     pub(crate) start_nm: [i32; 3],

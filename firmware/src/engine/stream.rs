@@ -142,7 +142,7 @@ impl<const N: usize> Stream<N> {
             came_nm: None,
             join: None,
             brake: Brake::default(),
-            guard: Guard::new(0, 0),
+            guard: Guard::new(0, [0; 3]),
             engage: Engage::new(1, false),
             arm: Arm::new(),
             counters: StreamCounters::default(),

@@ -1,7 +1,7 @@
 //! Steps and nanometres.
 
 /// Most steps in a [`Scale`], and most nanometres: places times either stay far within 64 bits.
-const MOST: u32 = 1 << 20;
+const MOST: u32 = giotto_shared::wire::STEP_MOST;
 
 /// So many steps are so many nanometres.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,18 +32,22 @@ impl Scale {
     /// The place after so many steps, nm, to the nearest; saturates.
     pub fn place_nm(&self, steps: i64) -> i32 {
         let twice = steps.saturating_mul(self.nm).saturating_mul(2);
+        // Never by 0: a scale has at least a step.
         let nm = twice
             .saturating_add(self.steps)
-            .div_euclid(self.steps.saturating_mul(2));
+            .checked_div_euclid(self.steps.saturating_mul(2))
+            .unwrap_or(0);
         nm.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32
     }
 
     /// The step nearest to a place.
     pub fn nearest(&self, place_nm: i32) -> i64 {
         let twice = i64::from(place_nm).wrapping_mul(self.steps).wrapping_mul(2);
+        // Never by 0, as above.
         twice
             .wrapping_add(self.nm)
-            .div_euclid(self.nm.wrapping_mul(2))
+            .checked_div_euclid(self.nm.wrapping_mul(2))
+            .unwrap_or(0)
     }
 
     /// A place in eighths of a step, times the nanometres of [`Self::eighth`].

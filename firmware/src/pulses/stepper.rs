@@ -36,7 +36,11 @@ impl Widths {
 
     /// Most steps of an axis in a tick.
     pub const fn most_per_tick(&self) -> u32 {
-        SLOTS as u32 / self.apart() as u32
+        match (SLOTS as u32).checked_div(self.apart() as u32) {
+            Some(steps) => steps,
+            // Widths of none at all.
+            None => 0,
+        }
     }
 }
 

@@ -29,12 +29,13 @@ use crate::store::{ImageBuffer, Layout, Store, StoredKey};
 use core::ops::DerefMut;
 use embedded_storage::nor_flash::NorFlash;
 use events::Events;
+use giotto_shared::table::image::MachineId;
 use giotto_shared::table::{FORMAT_VERSION, MAX_IMAGE_BYTES, SCHEMA_HASH};
 use giotto_shared::wire::{
-    self, Accumulator, CHUNK, Chunk, ClockSource, Command, Counters, Event, ExactCircle,
-    ExactSegment, FromController, Identity, MAX_FRAME, MachineConfig, MotionRefusal, MotionState,
-    PROTOCOL_VERSION, Probation, Refusal, Reply, ResetCause, SET_POINTS, SUPERVISE_MS, SetPoints,
-    Status, What,
+    self, Accumulator, CHUNK, Chunk, ClockSource, Command, ConfigField, Counters, Event,
+    ExactCircle, ExactSegment, FromController, Identity, MAX_FRAME, MachineConfig, MotionRefusal,
+    MotionState, PROTOCOL_VERSION, Probation, Refusal, Reply, ResetCause, SET_POINTS, SUPERVISE_MS,
+    SetPoints, Status, What,
 };
 use session::{Session, Turn};
 use supervision::Supervision;
@@ -53,8 +54,22 @@ pub struct Board {
     pub clock: ClockSource,
     /// Why it started.
     pub reset: ResetCause,
-    /// Fastest that its outputs let an axis be, m/s: feed, and rate of the offset; infinite where they do not mind.
-    pub fastest_m_s: f32,
+    /// Whom tables are bound to: no two boards have the same.
+    pub machine: MachineId,
+    /// Units of a step of its outputs, where nothing else is stored: so many nm in so many steps.
+    pub step: [[u32; 2]; 3],
+    /// Whether its timer and its outputs bear these limits; the first that they do not.
+    pub bears: fn(&MachineConfig) -> Result<(), ConfigField>,
+}
+
+impl Board {
+    /// Its own limits, where none are stored.
+    pub const fn limits(&self) -> MachineConfig {
+        MachineConfig {
+            step: self.step,
+            ..Config::robot(self.tick_hz).said()
+        }
+    }
 }
 
 /// Memory of a server that is too large for a stack: a board keeps it in a static, the host on the heap.
@@ -124,14 +139,20 @@ pub struct Server<F, M, B> {
 
 impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     /// Boots: the newest confirmed table that this image reads goes to the engine; if there is none, bypass.
+    pub fn boot(board: Board, flash: F, layout: Layout, motion: M, buffers: B) -> Self {
+        let mut server = Self::new(board, flash, layout, motion, buffers);
+        server.wake();
+        server
+    }
+
+    /// Before it [wakes](Self::wake): where a stack is short this frame is not to lie under what checks a signature.
     #[inline(never)]
-    pub fn boot(board: Board, flash: F, layout: Layout, motion: M, mut buffers: B) -> Self {
+    pub fn new(board: Board, flash: F, layout: Layout, motion: M, mut buffers: B) -> Self {
         let mut store = Store::open(flash, layout, &mut buffers.image);
-        let key = store.boot_key();
-        let mut server = Self {
+        Self {
+            key: store.boot_key(),
             board,
             store,
-            key,
             motion,
             buffers,
             session: Session::new(),
@@ -145,7 +166,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             held: None,
             supervision: Supervision::new(board.tick_hz),
             events: Events::new(),
-            config: Config::robot(board.tick_hz).said(),
+            config: board.limits(),
             config_stored: false,
             lost_bytes: 0,
             stack_bytes: 0,
@@ -153,12 +174,17 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             worst_tick_permille: None,
             idle_permille: None,
             reset: false,
-        };
-        server.load_config();
-        server.install_last_good();
-        let slot = server.active;
-        server.events.booted(board.reset, slot);
-        server
+        }
+    }
+
+    /// Takes limits and table from the store; once, before anything else.
+    #[inline(never)]
+    pub fn wake(&mut self) {
+        self.load_config();
+        self.install_last_good();
+        // What power has kept from being said is said now; a flash that fails says so at the next confirmation.
+        let _ = self.keep_serial();
+        self.events.booted(self.board.reset, self.active);
     }
 
     /// The engine.
@@ -388,7 +414,9 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             Command::SaveConfig => self.save_config()?,
             Command::Events { from } => return Ok(self.events(*from)),
             Command::Supervise { after_ms } => self.supervision.set(*after_ms),
-            Command::Provision { key } => self.provision(*key)?,
+            Command::Provision { key } => self.provision(key)?,
+            Command::Key => return Ok(Reply::Key(self.key_info())),
+            Command::ReplaceKey { key, signature } => self.replace_key(key, signature)?,
         }
         Ok(Reply::Done)
     }
@@ -534,6 +562,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             max_image_bytes: MAX_IMAGE_BYTES as u16,
             tick_hz: self.board.tick_hz,
             signed_only: self.signed_only(),
+            machine: self.board.machine,
         }
     }
 

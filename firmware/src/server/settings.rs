@@ -3,12 +3,12 @@ use super::{Buffers, Motion, Server};
 use crate::engine::Config;
 use core::ops::DerefMut;
 use embedded_storage::nor_flash::NorFlash;
-use giotto_shared::wire::{ClockSource, ConfigField, MachineConfig, Refusal, Reply, What};
+use giotto_shared::wire::{ClockSource, MachineConfig, Refusal, Reply, What};
 
 impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
     /// At boot: what is stored, if it is usable; the image's own limits otherwise.
     pub(super) fn load_config(&mut self) {
-        if let Some(stored) = self.store.config()
+        if let Some(stored) = self.store.config(&self.board.limits())
             && self.use_config(&stored).is_ok()
         {
             self.config_stored = true;
@@ -20,9 +20,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             .with(said)
             .map_err(Refusal::Config)?;
         // Refused here, so that no path is ever too fast for the outputs.
-        if said.feed_m_s + said.slew_m_s > self.board.fastest_m_s {
-            return Err(Refusal::Config(ConfigField::Feed));
-        }
+        (self.board.bears)(said).map_err(Refusal::Config)?;
         self.motion.configure(&config).map_err(Refusal::Motion)?;
         self.config = *said;
         Ok(())

@@ -66,7 +66,7 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             .get(..length)
             .ok_or(Refusal::UploadIncomplete)?;
         table::check(image).map_err(Refusal::Table)?;
-        self.authorised(length)?;
+        self.admitted(length)?;
         let slot = match self.last_good() {
             Some(0) => 1,
             _ => 0,
@@ -106,10 +106,13 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
         };
         let slot = slot.ok_or(Refusal::NothingToConfirm)?;
         self.upload.abort();
+        let owned = self.signed_only();
         self.store
-            .confirm(slot, &mut self.buffers.image)
+            .confirm(slot, owned, &mut self.buffers.image)
             .map_err(Refusal::Flash)?;
         self.probation = Probation::None;
+        // Behind the confirmation: a table whose serial is spent and that does not boot would be lost to its owner.
+        self.keep_serial()?;
         Ok(slot)
     }
 
@@ -135,7 +138,9 @@ impl<F: NorFlash, M: Motion, B: DerefMut<Target = Buffers>> Server<F, M, B> {
             self.install_last_good();
             return Err(refusal);
         }
-        if let Err(fault) = self.store.confirm(other, &mut self.buffers.image) {
+        let owned = self.signed_only();
+        let confirmed = self.store.confirm(other, owned, &mut self.buffers.image);
+        if let Err(fault) = confirmed {
             self.install_last_good();
             return Err(Refusal::Flash(fault));
         }

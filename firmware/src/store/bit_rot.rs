@@ -79,7 +79,7 @@ fn sound(store: &mut Store<Cells>, buffer: &mut ImageBuffer, tables: &[u8], conf
         let known = tables.iter().any(|number| image(*number) == loaded);
         assert!(known, "slot {slot} boots what was never stored");
     }
-    if let Some(found) = store.config() {
+    if let Some(found) = store.config(&Config::robot(1000).said()) {
         let known = configs.iter().any(|number| config(*number) == found);
         assert!(known, "{found:?} was never stored");
     }
@@ -105,14 +105,14 @@ proptest! {
                     let written = matches!(store.state(slot), SlotState::Table(_));
                     prop_assert!(written);
                     if confirmed {
-                        store.confirm(slot, &mut buffer).unwrap();
+                        store.confirm(slot, false, &mut buffer).unwrap();
                         prop_assert_eq!(store.confirmed()[0], Some(slot));
                     }
                 }
                 Act::RollBack => {
                     if let [_, Some(other)] = store.confirmed() {
                         // Refused once sixteen confirmations are full, or where a cell is spoilt.
-                        let _ = store.confirm(other, &mut buffer);
+                        let _ = store.confirm(other, false, &mut buffer);
                     }
                 }
                 Act::Configure(number) => {
@@ -120,7 +120,7 @@ proptest! {
                     configs.push(number);
                     if !rotten {
                         kept.unwrap();
-                        prop_assert_eq!(store.config(), Some(config(number)));
+                        prop_assert_eq!(store.config(&Config::robot(1000).said()), Some(config(number)));
                     }
                 }
                 Act::Rot(cell, bit) => {

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! config = two erase units, if the board has them (see `config`)
-//! key  = one erase unit, if the board has one for it: up to 4 places of 40 bytes (see `key`)
+//! key  = one erase unit, if the board has one for it: the owner's key and serial (see `key`)
 //! slot = one or more erase units
 //!   0                the image of the table, padded with FF to the write size
 //!   size - 128       16 confirmations of 8 bytes: generation u32, check u32 (little endian)
@@ -10,7 +10,7 @@
 //!
 //! A *confirmation* is what makes a table the one that boots: the slot with the highest generation among
 //! whole tables wins. Its check is the CRC-32 of generation and the table's own CRC, so that a torn one, or one
-//! left over from another table, does not count. Three rules follow, and with them any cut of power leaves the
+//! left over from another table, does not count; behind them `owned` where a key allowed it, so that a key that is gone is missed. Three rules follow, and with them any cut of power leaves the
 //! old or the new table whole:
 //!
 //! - The slot in use is never erased. The other one has a lower generation, so whatever an interrupted
@@ -36,10 +36,21 @@ use config::CONFIG_BYTES;
 use embedded_storage::nor_flash::NorFlash;
 use giotto_shared::table::{Header, MAX_IMAGE_BYTES, reads};
 use giotto_shared::wire::{FlashFault, SlotState, TableInfo};
-use key::{KEY_BYTES, KEY_COPIES, KEYS};
 use record::{RECORD_BYTES, Record};
 
-pub use key::{PublicKey, StoredKey};
+pub use config::stored_config;
+pub use key::{Owner, PublicKey};
+
+/// What is known of the owner's key.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StoredKey {
+    /// None was provisioned.
+    None,
+    /// This one.
+    Key(Owner),
+    /// One was, and the flash does not say which: no table can be trusted.
+    Lost,
+}
 
 /// Places for confirmations in a slot.
 pub const RECORDS: usize = 16;
@@ -113,6 +124,8 @@ struct Slot {
     state: SlotState,
     /// First place for a confirmation that is blank, and so are all after it.
     next_record: usize,
+    /// One of its confirmations was made under a key.
+    owned: bool,
 }
 
 /// The two slots.
@@ -126,7 +139,6 @@ pub struct Store<F> {
 impl<F: NorFlash> Store<F> {
     const FITS: () = assert!(
         RECORD_BYTES.is_multiple_of(F::WRITE_SIZE)
-            && KEY_BYTES.is_multiple_of(F::WRITE_SIZE)
             && CONFIG_BYTES.is_multiple_of(F::WRITE_SIZE)
             && PIECE.is_multiple_of(F::WRITE_SIZE)
             && F::READ_SIZE == 1,
@@ -139,6 +151,7 @@ impl<F: NorFlash> Store<F> {
         let unknown = Slot {
             state: SlotState::Invalid,
             next_record: RECORDS,
+            owned: false,
         };
         let mut store = Self {
             flash,
@@ -196,74 +209,6 @@ impl<F: NorFlash> Store<F> {
         self.base(slot) + self.layout.size - RECORDS_BYTES + (index * RECORD_BYTES) as u32
     }
 
-    /// The key that tables have to be signed with. One that cannot be read is not one that is not there, and one that is lost is
-    /// looked for beside the configuration.
-    pub fn key(&mut self) -> StoredKey {
-        let Some(base) = self.layout.key else {
-            return StoredKey::None;
-        };
-        for place in 0..KEYS {
-            let mut bytes = [0; KEY_BYTES];
-            if self
-                .flash
-                .read(base + (place * KEY_BYTES) as u32, &mut bytes)
-                .is_err()
-            {
-                return StoredKey::Unreadable;
-            }
-            if let Some(key) = key::read(&bytes) {
-                return StoredKey::Key(key);
-            }
-        }
-        match self.copied_key() {
-            Ok(Some(key)) => StoredKey::Key(key),
-            Ok(None) => StoredKey::None,
-            Err(_) => StoredKey::Unreadable,
-        }
-    }
-
-    /// The key at boot: its copy is made again if a cut of power has left none.
-    pub fn boot_key(&mut self) -> StoredKey {
-        let key = self.key();
-        if let StoredKey::Key(key) = key {
-            // Without a copy the key still is where it was.
-            let _ = self.copy_key(&key);
-        }
-        key
-    }
-
-    /// Keeps a key for good: twice, since a bit that rots in one must not open the controller, and beside the configuration, if there
-    /// is a place for one. A place that a cut of power has spoilt is left behind.
-    ///
-    /// # Errors
-    /// [`FlashFault::Full`] if there is no blank place, [`FlashFault::Read`], [`FlashFault::Program`],
-    /// [`FlashFault::ReadBack`].
-    pub fn keep_key(&mut self, key: &PublicKey) -> Result<(), FlashFault> {
-        let base = self.layout.key.ok_or(FlashFault::Full)?;
-        let mut kept = 0;
-        for place in 0..KEYS {
-            let at = base + (place * KEY_BYTES) as u32;
-            let mut bytes = [0; KEY_BYTES];
-            self.flash
-                .read(at, &mut bytes)
-                .map_err(|_| FlashFault::Read)?;
-            if bytes != [0xff; KEY_BYTES] || kept == KEY_COPIES {
-                continue;
-            }
-            self.flash
-                .write(at, &key::write(key))
-                .map_err(|_| FlashFault::Program)?;
-            match self.key() {
-                StoredKey::Key(found) if found == *key => kept += 1,
-                _ => return Err(FlashFault::ReadBack { offset: at }),
-            }
-        }
-        if kept == 0 {
-            return Err(FlashFault::Full);
-        }
-        self.copy_key(key)
-    }
-
     /// Bytes of a slot.
     ///
     /// # Errors
@@ -296,6 +241,7 @@ impl<F: NorFlash> Store<F> {
         let found = self.look(slot, buffer).unwrap_or(Slot {
             state: SlotState::Invalid,
             next_record: RECORDS,
+            owned: false,
         });
         if let Some(known) = self.slots.get_mut(usize::from(slot)) {
             *known = found;
@@ -307,7 +253,7 @@ impl<F: NorFlash> Store<F> {
         let header = Header::check(buffer);
         let blank = buffer.iter().all(|&byte| byte == 0xff);
         let mut generation = None;
-        let mut next_record = 0;
+        let (mut next_record, mut owned) = (0, false);
         for index in 0..RECORDS {
             let mut bytes = [0; RECORD_BYTES];
             let at = self.record_at(slot, index);
@@ -319,7 +265,10 @@ impl<F: NorFlash> Store<F> {
             }
             next_record = index + 1;
             let crc = header.map_or(0, |header| header.crc);
-            generation = generation.max(Record::read(bytes, crc));
+            if let Some(found) = Record::read(bytes, crc) {
+                generation = generation.max(Some(found.generation));
+                owned |= found.owned;
+            }
         }
         let state = match header {
             Err(_) if blank => SlotState::Empty,
@@ -333,7 +282,11 @@ impl<F: NorFlash> Store<F> {
                 generation,
             }),
         };
-        Ok(Slot { state, next_record })
+        Ok(Slot {
+            state,
+            next_record,
+            owned,
+        })
     }
 
     /// Puts the image in the first `length` bytes of `buffer` into a slot and compares what reads back. The
@@ -396,12 +349,25 @@ impl<F: NorFlash> Store<F> {
         Ok(())
     }
 
-    /// Makes the table in `slot` the one that boots; returns its new generation.
+    /// Whether a table in this slot was confirmed while a key was there.
+    pub fn owned(&self, slot: u8) -> bool {
+        self.slots
+            .get(usize::from(slot))
+            .is_some_and(|slot| slot.owned)
+    }
+
+    /// Makes the table in `slot` the one that boots; returns its new generation. `owned`: it was allowed to by a key, which is
+    /// missed if it is lost.
     ///
     /// # Errors
     /// [`FlashFault::Read`] if the slot holds no table, [`FlashFault::Full`] after [`RECORDS`] confirmations,
     /// [`FlashFault::Program`], [`FlashFault::ReadBack`].
-    pub fn confirm(&mut self, slot: u8, buffer: &mut ImageBuffer) -> Result<u32, FlashFault> {
+    pub fn confirm(
+        &mut self,
+        slot: u8,
+        owned: bool,
+        buffer: &mut ImageBuffer,
+    ) -> Result<u32, FlashFault> {
         let info = self.table(slot).ok_or(FlashFault::Read)?;
         let known = self.slots.get(usize::from(slot)).ok_or(FlashFault::Read)?;
         let index = known.next_record;
@@ -409,7 +375,7 @@ impl<F: NorFlash> Store<F> {
             return Err(FlashFault::Full);
         }
         let generation = self.newest_generation().wrapping_add(1);
-        let bytes = Record { generation }.write(info.crc);
+        let bytes = Record { generation, owned }.write(info.crc);
         let at = self.record_at(slot, index);
         let programmed = self
             .flash

@@ -3,7 +3,7 @@ use super::port::PortArgs;
 use super::{Failure, Output};
 use giotto_link::{Controller, ControllerError};
 use giotto_shared::path::MAX_POSITION_M;
-use giotto_shared::wire::{Command, ConfigField, MachineConfig, Refusal};
+use giotto_shared::wire::{Command, ConfigField, MachineConfig, Refusal, STEP_MOST, TICK_HZ};
 use serde_json::{Map, Value, json};
 
 /// Arguments of `giotto config`.
@@ -44,7 +44,7 @@ type Number = (
     ConfigField,
 );
 
-const NUMBERS: [Number; 7] = [
+const NUMBERS: [Number; 9] = [
     ("feed_mm_s", 1e-3, |c| &mut c.feed_m_s, ConfigField::Feed),
     (
         "acceleration_mm_s2",
@@ -61,9 +61,21 @@ const NUMBERS: [Number; 7] = [
     ),
     ("offset_mm", 1e-3, |c| &mut c.offset_m, ConfigField::Offset),
     (
-        "offset_rate_mm_s",
+        "offset_rate_x_mm_s",
         1e-3,
-        |c| &mut c.slew_m_s,
+        |c| &mut c.slew_m_s[0],
+        ConfigField::Slew,
+    ),
+    (
+        "offset_rate_y_mm_s",
+        1e-3,
+        |c| &mut c.slew_m_s[1],
+        ConfigField::Slew,
+    ),
+    (
+        "offset_rate_z_mm_s",
+        1e-3,
+        |c| &mut c.slew_m_s[2],
         ConfigField::Slew,
     ),
     (
@@ -75,6 +87,10 @@ const NUMBERS: [Number; 7] = [
 ];
 const SOFT: [&str; 3] = ["soft_x_mm", "soft_y_mm", "soft_z_mm"];
 const CLOCK: &str = "internal_clock";
+const RATE: &str = "tick_hz";
+const STEPS: [&str; 3] = ["step_x_mm", "step_y_mm", "step_z_mm"];
+/// All rates of the offset at once.
+const RATES: &str = "offset_rate_mm_s";
 
 fn document(config: &MachineConfig) -> Map<String, Value> {
     let mut copy = *config;
@@ -92,13 +108,18 @@ fn document(config: &MachineConfig) -> Map<String, Value> {
         );
     }
     all.insert(CLOCK.to_owned(), json!(config.internal_clock));
+    all.insert(RATE.to_owned(), json!(config.tick_hz));
+    for (name, [nm, steps]) in STEPS.into_iter().zip(config.step) {
+        all.insert(name.to_owned(), json!([f64::from(nm) / 1e6, steps]));
+    }
     all
 }
 
 fn change(config: &mut MachineConfig, text: &str) -> Result<(), Failure> {
     let names = || {
         let numbers = NUMBERS.iter().map(|(name, ..)| *name);
-        let all: Vec<&str> = numbers.chain(SOFT).chain([CLOCK]).collect();
+        let others = SOFT.into_iter().chain([CLOCK, RATE]).chain(STEPS);
+        let all: Vec<&str> = numbers.chain(others).chain([RATES]).collect();
         all.join(", ")
     };
     let wrong = |what: &str| Failure::usage(format_args!("\"{text}\": {what}"));
@@ -123,10 +144,35 @@ fn change(config: &mut MachineConfig, text: &str) -> Result<(), Failure> {
         config.soft_nm[axis] = [number(least)?, number(most)?].map(|mm| (mm * 1e6).round() as i32);
     } else if name == CLOCK {
         config.internal_clock = value.parse().map_err(|_| wrong("expected true or false"))?;
+    } else if name == RATES {
+        config.slew_m_s = [(number(value)? * 1e-3) as f32; 3];
+    } else if name == RATE {
+        config.tick_hz = value
+            .trim()
+            .parse()
+            .map_err(|_| wrong("expected a whole number"))?;
+    } else if let Some(axis) = STEPS.iter().position(|known| *known == name) {
+        config.step[axis] = step(value)
+            .ok_or_else(|| wrong("expected MM,STEPS: so many mm (whole nm) in so many steps"))?;
     } else {
         return Err(wrong("no such limit").help(format_args!("names: {}", names())));
     }
     Ok(())
+}
+
+/// "MM,STEPS" as nanometres and steps without a common divisor.
+fn step(text: &str) -> Option<[u32; 2]> {
+    let (mm, steps) = text.split_once(',')?;
+    let nm = mm.trim().parse::<f64>().ok()? * 1e6;
+    let (whole, steps) = (nm.round(), steps.trim().parse::<u32>().ok()?);
+    if !((nm - whole).abs() < 1e-3 && whole >= 1.0 && whole < f64::from(u32::MAX)) || steps == 0 {
+        return None;
+    }
+    let (mut a, mut b) = (whole as u32, steps);
+    while b > 0 {
+        (a, b) = (b, a % b);
+    }
+    Some([whole as u32 / a, steps / a])
 }
 
 /// What a controller takes, in the user's units.
@@ -139,6 +185,15 @@ fn possible(field: ConfigField) -> String {
         (Some((name, unit, ..)), Some(most)) => {
             format!("{name} may be above 0 and up to {}", most / unit)
         }
+        _ if field == ConfigField::Rate => format!(
+            "{RATE} may be {} to {}, as far as the board bears it: up to 8000 on the mps2_an386; on the stm32f405 up to 4000, \
+             and 1,400,000 a multiple of it",
+            TICK_HZ[0], TICK_HZ[1]
+        ),
+        _ if field == ConfigField::Step => format!(
+            "steps are MM,STEPS: without a common divisor at most {:.6} mm and {STEP_MOST} steps",
+            f64::from(STEP_MOST) * 1e-6
+        ),
         _ => {
             let most = MAX_POSITION_M * 1e3;
             format!("soft limits are LEAST,MOST within -{most} to {most} mm, the smaller one first")
@@ -178,10 +233,12 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
                 jerk_m_s3: 0.0,
                 positioning_m_s: 0.0,
                 offset_m: 0.0,
-                slew_m_s: 0.0,
+                slew_m_s: [0.0; 3],
                 stream_window_s: 0.0,
                 soft_nm: [[0; 2]; 3],
                 internal_clock: false,
+                tick_hz: 0,
+                step: [[0; 2]; 3],
             };
             values
                 .iter()
@@ -204,7 +261,12 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
         Verb::Save { port } => {
             let mut controller = port.open(out)?;
             controller.command(Command::SaveConfig)?;
-            show(&mut controller, out)
+            show(&mut controller, out)?;
+            let (config, _) = controller.config()?;
+            if config.tick_hz != controller.identity().tick_hz {
+                out.say("ticks and steps hold from the next start on: giotto reset --restart");
+            }
+            Ok(())
         }
     }
 }

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 pub struct Args {
     /// Model (MODEL.toml) or table (TABLE.bin).
     file: PathBuf,
-    /// Secret key to sign the table with, for a controller that takes signed ones only (`giotto key`).
+    /// Secret key to sign the table with, for this controller and above all serials it has confirmed (`giotto key`).
     #[arg(long, value_name = "FILE")]
     key: Option<PathBuf>,
     #[command(flatten)]
@@ -21,12 +21,13 @@ pub struct Args {
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let mut file = table_file::read(&args.file, out)?;
-    if let Some(key) = &args.key {
-        let signed = key::load(key)?.sign(&file.image);
-        file.image = signed
+    let key = args.key.as_deref().map(key::load).transpose()?;
+    let mut controller = args.port.open(out)?;
+    if let Some(key) = &key {
+        file.image = key
+            .sign(&file.image, &key::next(&mut controller)?)
             .map_err(|error| Failure::input(format_args!("{}: {error}", args.file.display())))?;
     }
-    let mut controller = args.port.open(out)?;
     let bar = if out.draws() {
         ProgressBar::new(file.image.len() as u64)
     } else {

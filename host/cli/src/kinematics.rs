@@ -43,9 +43,8 @@ fn place(option: &str, mm: &[f64]) -> Result<[f64; 3], Failure> {
 /// Runs the command.
 pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let tool_m = place("tool", &args.tool)?;
-    let named = |error: &dyn std::fmt::Display| {
-        Failure::input(format!("{}: {error}", args.urdf.display()))
-    };
+    let named =
+        |error: &dyn std::fmt::Display| Failure::input(format!("{}: {error}", args.urdf.display()));
     let text = std::fs::read_to_string(&args.urdf).map_err(|error| named(&error))?;
     let mut arm = urdf::read(&text).map_err(|error| named(&error))?;
     arm.tool_m = tool_m;
@@ -69,8 +68,14 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     match reach {
         None => {}
         Some(Ok(q)) => {
-            let degrees: Vec<String> = q.iter().map(|q| format!("{:.1}°", q.to_degrees())).collect();
-            out.note(&format!("it reaches that place with the joints at {}", degrees.join(", ")));
+            let degrees: Vec<String> = q
+                .iter()
+                .map(|q| format!("{:.1}°", q.to_degrees()))
+                .collect();
+            out.note(&format!(
+                "it reaches that place with the joints at {}",
+                degrees.join(", ")
+            ));
         }
         Some(Err(error)) => return Err(Failure::check(format!("{error}"))),
     }

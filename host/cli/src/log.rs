@@ -31,7 +31,7 @@ pub struct Args {
 }
 
 /// Requests by their numbers in the protocol.
-const REQUESTS: [&str; 30] = [
+const REQUESTS: [&str; 32] = [
     "Hello",
     "Status",
     "WriteBegin",
@@ -62,6 +62,8 @@ const REQUESTS: [&str; 30] = [
     "Configure",
     "SaveConfig",
     "Events",
+    "Key",
+    "ReplaceKey",
 ];
 
 fn words(what: &What) -> String {

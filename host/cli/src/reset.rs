@@ -16,6 +16,9 @@ pub struct Args {
         allow_hyphen_values = true
     )]
     at: Option<Vec<f64>>,
+    /// Restart the controller first: stored limits hold from then on, ticks and steps among them. Its place is kept.
+    #[arg(long)]
+    restart: bool,
     #[command(flatten)]
     port: PortArgs,
 }
@@ -40,6 +43,9 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
     let place_nm = args.at.as_deref().map(place).transpose()?;
     let mut controller = args.port.open(out)?;
     let before = controller.status()?.fault;
+    if args.restart {
+        controller.reset()?;
+    }
     controller.command(Command::ClearFault)?;
     if let Some(place_nm) = place_nm {
         controller.command(Command::Declare { place_nm })?;

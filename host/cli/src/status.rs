@@ -3,6 +3,7 @@ use super::port::PortArgs;
 use super::{Failure, Output};
 use comfy_table::{Table, presets};
 use giotto_link::Controller;
+use giotto_link::signing::hex;
 use giotto_shared::wire::{ClockSource, Identity, PositionState, Probation, SlotState, Status};
 use serde_json::{Value, json};
 
@@ -48,6 +49,7 @@ fn document(controller: &Controller, status: &Status) -> Value {
         max_image_bytes,
         tick_hz,
         signed_only,
+        machine,
     } = controller.identity();
     let probation = match status.probation {
         Probation::None => "none",
@@ -64,6 +66,7 @@ fn document(controller: &Controller, status: &Status) -> Value {
         "max_table_bytes": max_image_bytes,
         "tick_hz": tick_hz,
         "signed_only": signed_only,
+        "machine": hex(machine),
         "motion": format!("{:?}", status.motion).to_lowercase(),
         "fault": status.fault.map(|cause| format!("{cause:?}").to_lowercase()),
         "stop_input": status.stop_input,
@@ -157,7 +160,8 @@ fn identity_rows(controller: &Controller) -> Vec<Row> {
             }
         ),
     );
-    vec![named, protocol]
+    let machine = row("machine", hex(&identity.machine));
+    vec![named, machine, protocol]
 }
 
 /// What it does, with which correction.

@@ -3,6 +3,7 @@ use super::destination::{Destination, Kind};
 use super::table_file::{self, TableFile};
 use super::{Failure, Output};
 use giotto::units::number;
+use giotto_link::signing::hex;
 use giotto_shared::model::Cumulants;
 use giotto_shared::table::{Header, SCHEMA_HASH, Table, Travel, image};
 use giotto_shared::term::Term;
@@ -61,6 +62,16 @@ fn show(file: &TableFile, out: Output) -> Result<(), Failure> {
     let TableFile { table, image } = file;
     let header = Header::read(image).map_err(Failure::input)?;
     let signed = header.flags & image::FLAG_SIGNED != 0;
+    let bound = image::binding(image);
+    let signature = match bound {
+        Some(bound) => format!(
+            "signed for machine {}, serial {}",
+            hex(&bound.machine),
+            bound.serial
+        ),
+        None if signed => "signed, for no machine in particular".to_owned(),
+        None => "not signed".to_owned(),
+    };
     if out.json {
         return out.document(&json!({
             "format": header.version,
@@ -68,6 +79,8 @@ fn show(file: &TableFile, out: Output) -> Result<(), Failure> {
             "crc": format!("{:08x}", header.crc),
             "bytes": image.len(),
             "signed": signed,
+            "machine": bound.map(|bound| hex(&bound.machine)),
+            "serial": bound.map(|bound| bound.serial),
             "table": table,
         }));
     }
@@ -77,7 +90,7 @@ fn show(file: &TableFile, out: Output) -> Result<(), Failure> {
         table.machine,
         header.version,
         header.crc,
-        if signed { "signed" } else { "not signed" },
+        signature,
     ));
     words(table, out);
     Ok(())

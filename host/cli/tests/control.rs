@@ -307,3 +307,126 @@ fn a_correction_that_is_required_is_missed() {
     let (code, words) = served.said(&[&run[..], &["--require-correction"]].concat());
     assert!(code == 5 && words.contains("no table"), "{code}: {words}");
 }
+
+/// From an open controller to one that knows its owner, and on to the next owner; what is refused says what to do.
+#[test]
+fn a_controller_takes_its_owner_s_tables_in_order() {
+    let served = Served::start();
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let model = "format = 2\ncampaign = \"lab\"\nmachine = \"mill\"\n[servo]\nkind = \"lag\"\nkv_per_s = 50.0\n\
+                 [valid]\nradius_mm = [50.0, 150.0]\nfeed_mm_s = [20.0, 300.0]\n";
+    std::fs::write(at("model.toml"), model).unwrap();
+    let alone = |words: &[&str]| said(&giotto().args(words).output().unwrap());
+    for key in ["owner", "heir"] {
+        assert_eq!(alone(&["key", "new", &at(key)]).0, 0);
+    }
+    let refused = |words: &[&str], why: &str, help: &str| {
+        let (code, text) = served.said(words);
+        assert_eq!(code, 4, "{text}");
+        assert!(text.contains(why) && text.contains(help), "{text}");
+    };
+    let (model, owner, heir) = (at("model.toml"), at("owner"), at("heir"));
+    assert_eq!(served.json(&["key", "show"])["key"], "none");
+    refused(
+        &["key", "replace", &owner, &heir],
+        "no key that",
+        "giotto key provision",
+    );
+    assert_eq!(served.said(&["key", "provision", &owner]).0, 0);
+    refused(&["flash", &model], "not signed", "--key FILE");
+    refused(
+        &["key", "provision", &heir],
+        "already",
+        "giotto key replace",
+    );
+    assert_eq!(served.said(&["flash", &model, "--key", &owner]).0, 0);
+    let shown = served.json(&["key", "show"]);
+    assert_eq!(
+        (&shown["key"], &shown["serial"], &shown["number"]),
+        (&"kept".into(), &1.into(), &1.into())
+    );
+    // Signed elsewhere, for this machine, and for another one.
+    let machine = shown["machine"].as_str().unwrap();
+    let signed = |machine: &str, serial: &str, file: &str| {
+        let words = ["key", "sign", &model, "--key", &owner, "--machine", machine];
+        let output = giotto()
+            .args(words)
+            .args(["--serial", serial, "-o", file])
+            .output();
+        assert_eq!(said(&output.unwrap()).0, 0);
+    };
+    let (second, third, theirs) = (at("second.bin"), at("third.bin"), at("theirs.bin"));
+    signed(machine, "2", &second);
+    signed(machine, "3", &third);
+    signed("0102030405060708090a0b0c", "9", &theirs);
+    refused(&["flash", &theirs], "another machine", "giotto key show");
+    assert_eq!(served.said(&["flash", &third]).0, 0);
+    refused(&["flash", &second], "serial 2", "sign it again");
+    refused(&["flash", &third], "already confirmed serial 3", "rollback");
+    assert!(alone(&["table", "show", &third]).1.contains("serial 3"));
+    // Handed on.
+    refused(
+        &["key", "replace", &heir, &heir],
+        "not by the owner",
+        "giotto key show",
+    );
+    assert_eq!(
+        served.json(&["key", "replace", &owner, &heir])["corrects"],
+        false
+    );
+    refused(
+        &["flash", &model, "--key", &owner],
+        "does not fit",
+        "--key FILE",
+    );
+    assert_eq!(served.said(&["flash", &model, "--key", &heir]).0, 0);
+    let shown = served.json(&["key", "show"]);
+    assert_eq!((&shown["serial"], &shown["number"]), (&4.into(), &2.into()));
+}
+
+/// Limits of each axis and the rate outlive a restart; what the controller does not take says its range.
+#[test]
+fn limits_by_axis_and_the_rate_are_stored() {
+    let served = Served::start();
+    let set = [
+        "config",
+        "set",
+        "offset_rate_mm_s=150",
+        "offset_rate_z_mm_s=20",
+    ];
+    let steps = ["tick_hz=500", "step_x_mm=5,3200", "step_z_mm=0.01,1"];
+    assert_eq!(served.said(&[&set[..], &steps].concat()).0, 0);
+    assert!(
+        served
+            .said(&["config", "save"])
+            .1
+            .contains("giotto reset --restart")
+    );
+    assert_eq!(served.json(&["status"])["tick_hz"], 1000);
+    assert_eq!(served.said(&["reset", "--restart"]).0, 0);
+    assert_eq!(served.json(&["status"])["tick_hz"], 500);
+    let shown = served.json(&["config", "get"]);
+    let config = &shown["config"];
+    assert_eq!(shown["stored"], true);
+    assert_eq!(config["offset_rate_x_mm_s"], 150.0);
+    assert_eq!(config["offset_rate_z_mm_s"], 20.0);
+    assert_eq!(config["step_x_mm"], serde_json::json!([0.003125, 2]));
+    for (value, range) in [
+        ("tick_hz=100", "250"),
+        ("tick_hz=30000", "20000"),
+        ("offset_rate_y_mm_s=1100", "up to 1000"),
+        ("step_y_mm=2,1", "1048576"),
+    ] {
+        let (code, text) = served.said(&["config", "set", value]);
+        assert!(code == 4 && text.contains(range), "{text}");
+    }
+    for value in [
+        "step_y_mm=5",
+        "step_y_mm=0.0000001,1",
+        "tick_hz=1.5",
+        "step_y_mm=1,0",
+    ] {
+        assert_eq!(served.said(&["config", "set", value]).0, 2, "{value}");
+    }
+}

@@ -35,6 +35,9 @@ const SPEAKERS: &[&str] = &[
     "table show table.bin",
     "flash table.bin --port sim",
     "key new new.key",
+    "key sign model.toml --key owner.key --machine 000102030405060708090a0b --serial 7 -o new.bin",
+    "key show --port sim",
+    "key provision owner.key --port sim",
     "status --port sim",
     "bypass on --port sim",
     "stop --port sim",
@@ -64,6 +67,10 @@ const WRITERS: &[(&str, &str)] = &[
     ("compensate part.nc --model model.toml -o {}", "new.nc"),
     ("table model.toml -o {}", "new.bin"),
     ("key new {}", "new.key"),
+    (
+        "key sign table.bin --key owner.key --machine 000102030405060708090a0b -o {}",
+        "new.bin",
+    ),
     ("demo --svg {}", "new.svg"),
     (
         "run circle --radius 50 --feed 100 --direction ccw --port sim -o {}",
@@ -108,6 +115,8 @@ const SWALLOWERS: &[&str] = &[
     "plan campaign --gcode campaign/run000.csv",
     "plan campaign --rapid campaign/campaign.toml",
     "table model.toml -o model.toml",
+    "key sign table.bin --key owner.key --machine 000102030405060708090a0b -o table.bin",
+    "key sign table.bin --key owner.key --machine 000102030405060708090a0b -o owner.key",
     "table model.toml -o link.toml",
     "compare campaign campaign --html campaign/campaign.toml",
     "compensate part.nc --model model.toml -o part.nc",
@@ -130,6 +139,8 @@ fn lay_out(folder: &Path) {
     let at = |name: &str| folder.join(name);
     fs::write(at("plan.toml"), PLAN).unwrap();
     fs::write(at("model.toml"), MODEL).unwrap();
+    let key = format!("giotto-key-1 {}\n", "5a".repeat(32));
+    fs::write(at("owner.key"), key).unwrap();
     std::os::unix::fs::symlink(at("model.toml"), at("link.toml")).unwrap();
     fs::write(at("part.nc"), "G0 X20 Y0\nG3 I-20 F1500\n").unwrap();
     let mut ball = String::from("time_s,deviation_um\n");

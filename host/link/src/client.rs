@@ -4,8 +4,8 @@ use super::error::ControllerError;
 use super::link::Link;
 use giotto_shared::table::SCHEMA_HASH;
 use giotto_shared::wire::{
-    self, Accumulator, Command, FromController, Identity, MAX_FRAME, PROTOCOL_VERSION, Refusal,
-    Reply, Request, SUPERVISE_MS, SetPoints, Status,
+    self, Accumulator, Command, FromController, Identity, KeyInfo, MAX_FRAME, PROTOCOL_VERSION,
+    Refusal, Reply, Request, SUPERVISE_MS, SetPoints, Status,
 };
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -70,6 +70,7 @@ impl Controller {
             max_image_bytes: 0,
             tick_hz: 0,
             signed_only: false,
+            machine: [0; 12],
         };
         let mut controller = Self {
             link,
@@ -171,6 +172,17 @@ impl Controller {
     pub fn status(&mut self) -> Result<Status, ControllerError> {
         match self.ask(Command::Status)? {
             Reply::Status(status) => Ok(status),
+            _ => Err(ControllerError::WrongReply),
+        }
+    }
+
+    /// Whose tables it takes.
+    ///
+    /// # Errors
+    /// [`ControllerError::NoAnswer`], [`ControllerError::Lost`].
+    pub fn key_info(&mut self) -> Result<KeyInfo, ControllerError> {
+        match self.ask(Command::Key)? {
+            Reply::Key(info) => Ok(info),
             _ => Err(ControllerError::WrongReply),
         }
     }

@@ -4,7 +4,7 @@ use super::image::{self, Board, SerialPort};
 use super::link::Link;
 use super::serial::SerialLink;
 use super::stepped::SteppedLink;
-use std::io::{self, BufRead, BufReader};
+use std::io::{self, BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -43,6 +43,20 @@ pub struct Emulator {
     folder: TempDir,
 }
 
+/// In which circumstances an emulator starts.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Setup<'a> {
+    /// Bytes in its memory, each block from an address on: they are there again after each reset.
+    pub memory: &'a [(u32, &'a [u8])],
+    /// It waits for [`Emulator::go`]: who listens at its ports before that misses nothing.
+    pub held: bool,
+}
+
+/// The socket through which a held one is let go.
+fn qmp(folder: &TempDir) -> PathBuf {
+    folder.path().join("qmp")
+}
+
 /// The emulator to run.
 pub fn program() -> String {
     std::env::var("GIOTTO_QEMU").unwrap_or_else(|_| PROGRAM.to_owned())
@@ -66,6 +80,20 @@ impl Emulator {
     /// # Errors
     /// As there.
     pub fn start_board(
+        board: Board,
+        image: Option<&Path>,
+        pace: Pace,
+        note: &mut dyn FnMut(&str),
+    ) -> Result<Self, ControllerError> {
+        Self::start_with(&Setup::default(), board, image, pace, note)
+    }
+
+    /// The same, in circumstances.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn start_with(
+        setup: &Setup<'_>,
         board: Board,
         image: Option<&Path>,
         pace: Pace,
@@ -107,6 +135,12 @@ impl Emulator {
                 "-kernel",
             ])
             .arg(&image);
+        for (address, bytes) in setup.memory {
+            let file = folder.path().join(format!("{address:08x}"));
+            std::fs::write(&file, bytes).map_err(|e| failed(&e))?;
+            let block = format!("loader,file={},addr={address},force-raw=on", file.display());
+            command.args(["-device", &block]);
+        }
         for port in board.serial_ports() {
             match port {
                 SerialPort::Link => command.args(["-serial", "pty"]),
@@ -120,6 +154,10 @@ impl Emulator {
                     command.args(["-chardev", &socket, "-serial", &format!("chardev:{name}")])
                 }
             };
+        }
+        if setup.held {
+            let socket = format!("unix:{},server=on,wait=off", qmp(&folder).display());
+            command.args(["-S", "-qmp", &socket]);
         }
         // Time counts instructions, so that a busy host delays the controller but never makes a tick late.
         let shift = board.instruction_shift();
@@ -143,6 +181,33 @@ impl Emulator {
                 Err(error)
             }
         }
+    }
+
+    /// Lets an emulator that is [held](Setup::held) run.
+    ///
+    /// # Errors
+    /// Those of the socket through which it is asked to; [`io::ErrorKind::UnexpectedEof`] if it does not answer.
+    pub fn go(&self) -> io::Result<()> {
+        let mut ask = UnixStream::connect(qmp(&self.folder))?;
+        let mut answers = BufReader::new(ask.try_clone()?);
+        let mut line = String::new();
+        // A greeting, and an answer to each of two requests; events may come between.
+        for request in ["", "qmp_capabilities", "cont"] {
+            if !request.is_empty() {
+                writeln!(ask, "{{\"execute\":\"{request}\"}}")?;
+            }
+            let wanted = if request.is_empty() { "QMP" } else { "return" };
+            loop {
+                line.clear();
+                if answers.read_line(&mut line)? == 0 {
+                    return Err(io::ErrorKind::UnexpectedEof.into());
+                }
+                if line.contains(wanted) {
+                    break;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Path of the pty that is the link.

@@ -191,10 +191,23 @@ fn refusal_help(refusal: &Refusal) -> Option<&'static str> {
             "choose a radius and feed inside the bounds"
         }
         Refusal::Flash(_) => "the table in use is untouched; flash again, and replace worn flash",
-        Refusal::Table(TableError::Unsigned | TableError::BadSignature) => {
+        Refusal::Table(TableError::Unsigned | TableError::Unbound | TableError::BadSignature) => {
             "sign it with the key of this controller: `giotto flash TABLE --key FILE`"
         }
-        Refusal::KeyProvisioned => "a controller keeps its first key; sign with that one",
+        Refusal::Table(TableError::OtherMachine) => {
+            "sign it for this one: `giotto flash TABLE --key FILE`, or `giotto key sign` with the machine that `giotto key show` says"
+        }
+        Refusal::Table(TableError::OldSerial { .. }) => {
+            "sign it again, which gives it a higher serial: `giotto flash TABLE --key FILE`; `giotto rollback` returns to the table in the other slot"
+        }
+        Refusal::KeyProvisioned => "its owner hands it on: `giotto key replace OLD NEW`",
+        Refusal::KeyLost => {
+            "give it its key again: `giotto key provision FILE`, with the key that a table on it is signed with"
+        }
+        Refusal::NoKey => "give it its first one: `giotto key provision FILE`",
+        Refusal::NotTheOwner => {
+            "use the key that the controller has; `giotto key show` says its public half, or that it is lost"
+        }
         Refusal::NoSignatures => "build the firmware with its feature `signed`",
         Refusal::Motion(MotionRefusal::NoPosition) => {
             "`giotto reset --at X,Y,Z` says where it stands, mm; a stream begins where its first set-point is"

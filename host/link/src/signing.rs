@@ -1,7 +1,9 @@
 //! Keys that tables are signed with (Ed25519, RFC 8032), and their files: one line, `giotto-key-1 ` and the 64 hex digits of
 //! the secret seed.
 use ed25519_compact::{KeyPair, Seed};
+use giotto_shared::table::image::{Binding, MachineId};
 use giotto_shared::table::{Header, TableError, image};
+use giotto_shared::wire::{Command, replacement};
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -35,8 +37,21 @@ pub enum KeyError {
     NotAKey,
 }
 
-fn hex(bytes: &[u8]) -> String {
+/// Bytes as hex digits.
+pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// A machine by its hex digits.
+pub fn machine_id(text: &str) -> Option<MachineId> {
+    let mut machine = [0; 12];
+    if text.len() != 24 || !text.is_ascii() {
+        return None;
+    }
+    for (index, byte) in machine.iter_mut().enumerate() {
+        *byte = u8::from_str_radix(&text[2 * index..2 * index + 2], 16).ok()?;
+    }
+    Some(machine)
 }
 
 fn seed(text: &str) -> Option<[u8; 32]> {
@@ -96,20 +111,30 @@ impl SigningKey {
         hex(&self.public())
     }
 
-    /// The image with this key's signature, in place of one it may have.
+    /// The image bound to one machine and one serial and signed with this key, in place of a signature it may have.
     ///
     /// # Errors
     /// Those of [`Header::check`]; [`TableError::TooLong`] if there is no room.
-    pub fn sign(&self, table: &[u8]) -> Result<Vec<u8>, TableError> {
-        let header = Header::check(table)?;
-        let signed = header.flags & image::FLAG_SIGNED != 0;
-        let length = header.length - if signed { image::SIGNATURE_BYTES } else { 0 };
-        let mut out = table.get(..length).unwrap_or(table).to_vec();
-        out.resize(length + image::SIGNATURE_BYTES, 0);
+    pub fn sign(&self, table: &[u8], binding: &Binding) -> Result<Vec<u8>, TableError> {
+        Header::check(table)?;
+        let mut out = table.to_vec();
+        out.resize(
+            table.len() + image::BINDING_BYTES + image::SIGNATURE_BYTES,
+            0,
+        );
         let sign = |head: &[u8], body: &[u8]| *self.0.sk.sign([head, body].concat(), None);
-        let length = image::attach_signature(&mut out, length, sign)?;
+        let length = image::attach_signature(&mut out, binding, sign)?;
         out.truncate(length);
         Ok(out)
+    }
+
+    /// The word that hands a controller, of whose key this is number `epoch`, to another key.
+    pub fn hand_over(&self, machine: &MachineId, epoch: u32, to: &[u8; 32]) -> Command {
+        let word = self.0.sk.sign(replacement(machine, epoch, to), None);
+        Command::ReplaceKey {
+            key: *to,
+            signature: word.iter().copied().collect(),
+        }
     }
 }
 

@@ -5,16 +5,17 @@
 use super::link::Link;
 use super::wires::Wires;
 use giotto_firmware::control::{Desk, Job, Receiver, SEGMENTS, SET_POINTS, Sender, Shared, Tick};
-use giotto_firmware::engine::{Config, Executor, Planner};
+use giotto_firmware::engine::{Config, Executor, Planner, RATE_HZ};
 use giotto_firmware::server::{Board, Buffers, Motion, Server, TimedSetPoint};
-use giotto_firmware::store::{Layout, ram::RamFlash};
+use giotto_firmware::store::{Layout, ram::RamFlash, stored_config};
+use giotto_shared::table::image::MachineId;
 use giotto_shared::wire::{ClockSource, Pose, PositionState, ResetCause};
 use std::collections::VecDeque;
 use std::io;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// Ticks a second.
+/// Ticks a second, unless others are stored.
 pub const TICK_HZ: u32 = 1000;
 /// Bytes of a slot.
 pub(crate) const SLOT: usize = 4096;
@@ -28,8 +29,13 @@ const BOARD: Board = Board {
     tick_hz: TICK_HZ,
     clock: ClockSource::Crystal,
     reset: ResetCause::Power,
-    fastest_m_s: f32::INFINITY,
+    machine: MACHINE,
+    step: [[1, 1]; 3],
+    // It has no outputs, and all the time in the world.
+    bears: |_| Ok(()),
 };
+/// Whom tables are bound to.
+pub const MACHINE: MachineId = *b"virtual\0\0\0\0\0";
 
 /// Flash of a virtual controller.
 pub type Flash = RamFlash<{ 5 * SLOT }, SLOT>;
@@ -104,7 +110,9 @@ pub struct VirtualController {
     tick: VirtualTick,
     shared: Arc<Shared>,
     wires: Wires,
-    ticks: u64,
+    tick_hz: u32,
+    /// Since it was made, over resets.
+    age: Duration,
 }
 
 impl Default for VirtualController {
@@ -121,7 +129,13 @@ impl VirtualController {
 
     /// The same, its machine standing somewhere.
     pub fn boot_at(flash: Flash, place_nm: Pose, known: PositionState) -> Self {
-        let config = Config::robot(TICK_HZ);
+        let own = BOARD.limits();
+        let (flash, stored) = stored_config(flash, LAYOUT, &own);
+        let tick_hz = stored
+            .map(|stored| stored.tick_hz)
+            .filter(|hz| (RATE_HZ[0]..=RATE_HZ[1]).contains(hz))
+            .unwrap_or(TICK_HZ);
+        let config = Config::robot(tick_hz);
         let shared = Arc::new(Shared::new());
         let (segments_in, segments_out) = Queue::new(SEGMENTS);
         let (points_in, points_out) = Queue::new(SET_POINTS);
@@ -134,7 +148,11 @@ impl VirtualController {
         } else {
             BOARD.reset
         };
-        let board = Board { reset, ..BOARD };
+        let board = Board {
+            reset,
+            tick_hz,
+            ..BOARD
+        };
         let server = Server::boot(board, flash, LAYOUT, desk, Box::default());
         let tick = Tick::new(executor, Arc::clone(&shared), segments_out, points_in);
         Self {
@@ -142,7 +160,8 @@ impl VirtualController {
             tick,
             shared,
             wires: Wires::default(),
-            ticks: 0,
+            tick_hz,
+            age: Duration::ZERO,
         }
     }
 
@@ -163,7 +182,7 @@ impl VirtualController {
             self.reset();
         }
         self.tick.tick(false);
-        self.ticks += 1;
+        self.age += Duration::from_secs(1) / self.tick_hz;
     }
 
     /// Bytes for the host.
@@ -176,10 +195,10 @@ impl VirtualController {
         let place_nm = self.server.motion_mut().snapshot().corrected_nm;
         let flash = self.server.store_mut().flash_mut().clone();
         let wires = std::mem::take(&mut self.wires);
-        let ticks = self.ticks;
+        let age = self.age;
         *self = Self {
             wires,
-            ticks,
+            age,
             ..Self::boot_at(flash, place_nm, PositionState::Kept)
         };
     }
@@ -215,6 +234,6 @@ impl Link for VirtualLink {
     }
 
     fn now(&self) -> Duration {
-        Duration::from_millis(self.controller.ticks * 1000 / u64::from(TICK_HZ))
+        self.controller.age
     }
 }

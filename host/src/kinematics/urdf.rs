@@ -243,7 +243,10 @@ fn nearest(a: &Axis, b: &Axis) -> (Point3<f64>, f64) {
         return (a.at + along * a.along, (way - along * a.along).norm());
     }
     let along = way.cross(&b.along).dot(&across) / square;
-    (a.at + along * a.along, (way.dot(&across) / square.sqrt()).abs())
+    (
+        a.at + along * a.along,
+        (way.dot(&across) / square.sqrt()).abs(),
+    )
 }
 
 fn lengths(axes: &[Axis; 6], flange: Point3<f64>) -> Result<Opw, UrdfError> {

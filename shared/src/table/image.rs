@@ -4,13 +4,17 @@
 //! offset  size  what
 //!      0     4  magic 47 49 4F 54 ("GIOT")          ┐
 //!      4     2  format version, 3                   │ fixed for all versions, so that a newer table
-//!      6     2  flags: bit 0 = signed               │ is told from a broken one
+//!      6     2  flags: 1 = signed, 2 = bound       │ is told from a broken one
 //!      8     4  length n of the whole image, bytes  │
 //!     12     4  CRC-32 of bytes 0..12 and 16..n     ┘
 //!     16     4  schema hash: CRC-32 of `schema.txt`
 //!     20     b  body, postcard of `Table` (`schema.txt` names every field and discriminant)
-//!   20+b    64  Ed25519 signature of bytes 4..8 and 16..20+b, if bit 0 of the flags is set
+//!   20+b    16  machine [u8; 12], serial u32, if the flag "bound" is set
+//!   n-64    64  Ed25519 signature of bytes 4..8 and 16..n-64, if the flag "signed" is set
 //! ```
+//!
+//! What binds a table to one machine and one serial stands behind the body and in front of the signature, which covers it. Tables
+//! that were signed before tables were bound are read, and no controller with a key takes them.
 //!
 //! The CRC is ISO-HDLC (the one of Ethernet and zip). The order of checks is magic, length, CRC, version,
 //! flags, schema, body, numbers: a flipped bit is called a flipped bit, not a newer version.
@@ -28,6 +32,10 @@ pub const FORMAT_VERSION: u16 = 3;
 const WITHOUT_ARM: (u16, u32) = (2, 0xd668_0447);
 /// Flag bit 0: a signature follows the body.
 pub const FLAG_SIGNED: u16 = 1;
+/// Flag bit 1: machine and serial stand in front of the signature.
+pub const FLAG_BOUND: u16 = 2;
+/// Length of machine and serial.
+pub const BINDING_BYTES: usize = 16;
 /// Length of the header.
 pub const HEADER_BYTES: usize = 20;
 /// Length of a signature.
@@ -43,7 +51,30 @@ const MAX_BODY_BYTES: usize = {
     (1 + 32) + (1 + MAX_ZONES * zone) + 8 + arm
 };
 /// Longest image.
-pub const MAX_IMAGE_BYTES: usize = HEADER_BYTES + MAX_BODY_BYTES + SIGNATURE_BYTES;
+pub const MAX_IMAGE_BYTES: usize = HEADER_BYTES + MAX_BODY_BYTES + BINDING_BYTES + SIGNATURE_BYTES;
+
+/// Bytes behind the body by the flags; `None` for flags that do not exist. What is bound is signed.
+const fn trailer(flags: u16) -> Option<usize> {
+    const BOTH: u16 = FLAG_SIGNED | FLAG_BOUND;
+    match flags {
+        0 => Some(0),
+        FLAG_SIGNED => Some(SIGNATURE_BYTES),
+        BOTH => Some(BINDING_BYTES + SIGNATURE_BYTES),
+        _ => None,
+    }
+}
+
+/// Who a machine's controller is: no two have the same.
+pub type MachineId = [u8; 12];
+
+/// The one machine that a signed table is for, and where it stands among those that its owner has signed for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Binding {
+    /// The machine.
+    pub machine: MachineId,
+    /// Rises from table to table.
+    pub serial: u32,
+}
 
 /// The header of an image whose length and CRC hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -199,22 +230,15 @@ fn body(bytes: &[u8]) -> Result<(&[u8], bool), TableError> {
             });
         }
     }
-    if header.flags & !FLAG_SIGNED != 0 {
-        return Err(TableError::UnknownFlags {
-            flags: header.flags,
-        });
-    }
+    let trailer = trailer(header.flags).ok_or(TableError::UnknownFlags {
+        flags: header.flags,
+    })?;
     let found = word(bytes, 16).map_or(0, u32::from_le_bytes);
     let with_arm = header.version == FORMAT_VERSION;
     let expected = if with_arm { SCHEMA_HASH } else { WITHOUT_ARM.1 };
     if found != expected {
         return Err(TableError::SchemaMismatch { found, expected });
     }
-    let trailer = if header.flags & FLAG_SIGNED == 0 {
-        0
-    } else {
-        SIGNATURE_BYTES
-    };
     let end = header.length.checked_sub(trailer);
     end.and_then(|end| bytes.get(HEADER_BYTES..end))
         .map(|body| (body, with_arm))
@@ -351,28 +375,58 @@ pub fn signed_parts(image: &[u8]) -> Option<Signed<'_>> {
     })
 }
 
-/// Turns the unsigned image at the start of `out` (`length` bytes) into a signed one: `sign` is given head
-/// and body as in [`Signed`] and returns the signature. The new length is returned.
+/// Machine and serial of a signed image, `None` if it has none.
+pub fn binding(image: &[u8]) -> Option<Binding> {
+    let header = Header::read(image).ok()?;
+    if header.flags & FLAG_BOUND == 0 {
+        return None;
+    }
+    let end = header.length.checked_sub(SIGNATURE_BYTES)?;
+    let bytes = image.get(end.checked_sub(BINDING_BYTES)?..end)?;
+    let (machine, serial) = bytes.split_first_chunk()?;
+    Some(Binding {
+        machine: *machine,
+        serial: u32::from_le_bytes(*serial.first_chunk()?),
+    })
+}
+
+/// The image without binding and signature: its header says neither, its CRC is not set.
+fn bare(image: &[u8]) -> Result<usize, TableError> {
+    let header = Header::read(image)?;
+    let flags = header.flags;
+    let trailer = trailer(flags).ok_or(TableError::UnknownFlags { flags })?;
+    header
+        .length
+        .checked_sub(trailer)
+        .ok_or(TableError::Malformed)
+}
+
+/// Binds and signs the image at the start of `out`, in place of a signature it may have: `sign` is given head and body as in
+/// [`Signed`] and returns the signature. The new length is returned.
 ///
 /// # Errors
-/// [`TableError::TooLong`] if `out` has no room for the signature; those of [`Header::read`].
+/// [`TableError::TooLong`] if `out` has no room for binding and signature; those of [`Header::read`];
+/// [`TableError::UnknownFlags`].
 pub fn attach_signature(
     out: &mut [u8],
-    length: usize,
+    binding: &Binding,
     sign: impl FnOnce(&[u8], &[u8]) -> [u8; SIGNATURE_BYTES],
 ) -> Result<usize, TableError> {
-    Header::read(out)?;
-    let max = out.len() as u32;
-    let signed = length + SIGNATURE_BYTES;
+    let (length, max) = (bare(out)?, out.len() as u32);
+    let signed = length + BINDING_BYTES + SIGNATURE_BYTES;
     let image = out.get_mut(..signed).ok_or(TableError::TooLong {
         length: signed as u32,
         max,
     })?;
-    write_header(image, FLAG_SIGNED);
-    let (rest, signature) = image.split_at_mut(length);
+    write_header(image, FLAG_SIGNED | FLAG_BOUND);
+    let (rest, signature) = image.split_at_mut(length + BINDING_BYTES);
+    if let Some(place) = rest.get_mut(length..) {
+        place[..12].copy_from_slice(&binding.machine);
+        place[12..].copy_from_slice(&binding.serial.to_le_bytes());
+    }
     *signature.first_chunk_mut().ok_or(TableError::Malformed)? =
         sign(rest.get(4..8).unwrap_or(&[]), rest.get(16..).unwrap_or(&[]));
-    write_header(image, FLAG_SIGNED);
+    write_header(image, FLAG_SIGNED | FLAG_BOUND);
     Ok(signed)
 }
 

@@ -212,6 +212,20 @@ pub enum TableError {
         /// Which zone.
         at: Where,
     },
+    /// Signed, but for no machine in particular.
+    #[error("table is signed but bound to no machine and serial")]
+    Unbound,
+    /// Signed for another controller.
+    #[error("table is signed for another machine")]
+    OtherMachine,
+    /// A newer one has been confirmed before.
+    #[error("table has serial {serial}, and this controller has already confirmed serial {last}")]
+    OldSerial {
+        /// Of the table.
+        serial: u32,
+        /// The highest one confirmed.
+        last: u32,
+    },
 }
 
 /// Checks of the numbers in one place of the table.

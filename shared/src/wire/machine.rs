@@ -15,14 +15,18 @@ pub struct MachineConfig {
     pub positioning_m_s: f32,
     /// Largest offset of the correction on an axis, m.
     pub offset_m: f32,
-    /// Its largest rate of change, m/s.
-    pub slew_m_s: f32,
+    /// Its largest rate of change by axis, m/s.
+    pub slew_m_s: [f32; 3],
     /// Distance of the set-points that streams are differentiated with, s.
     pub stream_window_s: f32,
     /// Soft limits by axis, least and most, nm.
     pub soft_nm: [[i32; 2]; 3],
     /// Correct although the ticks are not counted by a crystal.
     pub internal_clock: bool,
+    /// Ticks a second, from the next start on.
+    pub tick_hz: u32,
+    /// Units of a step by axis, from the next start on: so many nm in so many steps.
+    pub step: [[u32; 2]; 3],
 }
 
 /// A number of the configuration by its name.
@@ -49,10 +53,19 @@ pub enum ConfigField {
     Window,
     #[error("soft limits")]
     Soft,
+    #[error("ticks a second")]
+    Rate,
+    #[error("units of a step")]
+    Step,
 }
 
+/// Slowest and fastest tick of any controller, Hz; a board may bear less.
+pub const TICK_HZ: [u32; 2] = [250, 20_000];
+/// Most nanometres, and most steps, in the units of a step; each is at least 1.
+pub const STEP_MOST: u32 = 1 << 20;
+
 impl ConfigField {
-    /// Most that any controller takes, SI (m/s, m/s², m/s³, m, s); each is above 0. Nothing for the soft limits, and the
+    /// Most that any controller takes, SI (m/s, m/s², m/s³, m, s); each is above 0. Nothing for soft limits, ticks and steps, and the
     /// positioning feed is bounded by the feed beside it.
     pub const fn most(self) -> Option<f64> {
         match self {
@@ -61,7 +74,7 @@ impl ConfigField {
             Self::Jerk => Some(1e6),
             Self::Offset => Some(0.05),
             Self::Slew | Self::Window => Some(1.0),
-            Self::Soft => None,
+            Self::Soft | Self::Rate | Self::Step => None,
         }
     }
 }

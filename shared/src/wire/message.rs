@@ -1,11 +1,12 @@
 //! The messages. A change here is a change of [`PROTOCOL_VERSION`].
-use super::{ClockSource, EVENTS, Event, MachineConfig, Refusal, ResetCause};
+use super::{ClockSource, EVENTS, Event, KeyInfo, MachineConfig, Refusal, ResetCause};
 use crate::path::{ExactCircle, ExactSegment};
+use crate::table::image::MachineId;
 use serde::de::{Error, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// Version of the messages of this build; both sides must have the same.
-pub const PROTOCOL_VERSION: u16 = 4;
+pub const PROTOCOL_VERSION: u16 = 5;
 
 /// Most bytes of a table in one message.
 pub const CHUNK: usize = 128;
@@ -95,7 +96,8 @@ pub enum Command {
     },
     /// Warm reset, when idle. Where the machine stands is kept.
     Reset,
-    /// Provision the public key: from now on only tables signed with it are accepted. Once.
+    /// Provision the public key: from now on only tables signed with it are accepted. Once; where a key was lost, the one
+    /// that a confirmed table there is signed with.
     Provision {
         /// Ed25519 public key.
         #[serde(deserialize_with = "array")]
@@ -162,6 +164,16 @@ pub enum Command {
     Events {
         /// Number of the first one wanted; they count from 0 at boot.
         from: u32,
+    },
+    /// Whose tables are taken → [`Reply::Key`].
+    Key,
+    /// At rest: another key from now on, by word of the owner of the one before.
+    ReplaceKey {
+        /// The new one.
+        #[serde(deserialize_with = "array")]
+        key: [u8; 32],
+        /// Signature of the [`replacement`](super::replacement) by the present one: 64 bytes.
+        signature: Chunk,
     },
 }
 
@@ -243,6 +255,8 @@ pub enum Reply {
         /// In order; none: there are no more.
         events: heapless::Vec<Event, EVENTS>,
     },
+    /// To [`Command::Key`].
+    Key(KeyInfo),
 }
 
 /// Who the controller is.
@@ -264,6 +278,8 @@ pub struct Identity {
     pub tick_hz: u32,
     /// Whether a key is provisioned: only signed tables are accepted.
     pub signed_only: bool,
+    /// Whom signed tables have to be bound to.
+    pub machine: MachineId,
 }
 
 /// A whole table in a slot.

@@ -20,6 +20,7 @@
 //! |---|---|
 //! | [`message`] | what is said |
 //! | [`machine`] | its limits, as they are stored |
+//! | [`owner`] | whose tables it takes |
 //! | [`event`] | what it has done and seen |
 //! | [`frame`] | how it is put into bytes, and found again among any bytes |
 //! | `steps` | set-points of a stream in few bytes |
@@ -28,6 +29,7 @@ pub mod event;
 pub mod frame;
 pub mod machine;
 pub mod message;
+pub mod owner;
 pub mod refusal;
 mod steps;
 
@@ -36,11 +38,12 @@ pub use crate::encoding::{Crc32, crc32, put, take};
 pub use crate::path::{ExactArc, ExactCircle, ExactSegment, Quantity};
 pub use event::{ClockSource, EVENTS, Event, ResetCause, What};
 pub use frame::{Accumulator, FrameCounts, MAX_FRAME, MAX_PAYLOAD, encode};
-pub use machine::{ConfigField, MachineConfig};
+pub use machine::{ConfigField, MachineConfig, STEP_MOST, TICK_HZ};
 pub use message::{
     CHUNK, Chunk, Command, Counters, FaultCause, FromController, IN_FLIGHT, Identity, MotionState,
     OVERRIDE_PERCENT, POINTS, PROTOCOL_VERSION, Pose, PositionState, Probation, Reply, Request,
     SET_POINTS, SUPERVISE_MS, SetPoint, SetPoints, SlotState, Status, TableInfo,
 };
+pub use owner::{KeyInfo, KeyState, replacement};
 pub use refusal::{FlashFault, MotionRefusal, Refusal};
 pub use steps::Steps;

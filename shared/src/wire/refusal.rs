@@ -77,6 +77,15 @@ pub enum Refusal {
     /// This image has no signatures built in.
     #[error("this image cannot check signatures")]
     NoSignatures,
+    /// A key was there and cannot be read.
+    #[error("the key of this controller is lost: it takes no table")]
+    KeyLost,
+    /// Another key without one before it.
+    #[error("this controller has no key that could be replaced")]
+    NoKey,
+    /// The key given is not the one, or the signature is not its owner's.
+    #[error("this is not by the owner of the controller's key")]
+    NotTheOwner,
 }
 
 /// How a flash failed.

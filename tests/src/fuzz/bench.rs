@@ -30,7 +30,9 @@ const BOARD: Board = Board {
     tick_hz: TICK_HZ,
     clock: ClockSource::Crystal,
     reset: ResetCause::Power,
-    fastest_m_s: f32::INFINITY,
+    machine: [0; 12],
+    step: [[1, 1]; 3],
+    bears: |_| Ok(()),
 };
 
 /// Its flash.

@@ -39,11 +39,11 @@ use embedded_storage::nor_flash::NorFlash;
 use giotto_firmware::control::{self, Alive, Desk, Job, Shared, Tick};
 use giotto_firmware::engine::{Config, Executor, Planner};
 use giotto_firmware::server::{Board, Buffers, Server, TimedSetPoint};
-use giotto_firmware::store::Layout;
-use giotto_shared::wire::{IN_FLIGHT, MAX_FRAME, PositionState};
+use giotto_firmware::store::{Layout, stored_config};
+use giotto_shared::wire::{IN_FLIGHT, MAX_FRAME, MachineConfig, PositionState};
 use heapless_spsc::spsc::{Consumer, Producer, Queue};
 
-/// Ticks a second; the `fast` images show how many there can be.
+/// Ticks a second unless others are stored; the `fast` images show how many there can be.
 pub const TICK_HZ: u32 = if cfg!(feature = "fast") { 8000 } else { 1000 };
 /// Priority of the link's receive interrupt; the tick has 0.
 pub const LINK_PRIORITY: u8 = 0x40;
@@ -76,8 +76,14 @@ static ALIVE: Alive = Alive::new();
 /// Where the tick is made; the interrupt keeps a reference to it.
 static TICK: Mutex<Cell<Option<&'static mut BoardTick>>> = Mutex::new(Cell::new(None));
 
-// Ticks since boot, those included in which the core stood still.
-defmt::timestamp!("{=u32:ms}", SHARED.now() / (TICK_HZ / 1000));
+/// Ticks a second, once they have begun.
+static RATE_HZ: AtomicU32 = AtomicU32::new(TICK_HZ);
+
+// Time since boot by ticks, those included in which the core stood still.
+defmt::timestamp!("{=u32:ms}", {
+    let ms = u64::from(SHARED.now()) * 1000 / u64::from(RATE_HZ.load(Relaxed).max(1));
+    ms as u32
+});
 
 /// The tick's owner once it has begun. See the table above for its contract; the late flag is the next tick's
 /// own request, already pending.
@@ -129,6 +135,15 @@ fn worst_tick_permille() -> u16 {
     (WORST_TICK.load(Relaxed) / between).min(1000) as u16
 }
 
+/// The limits that a board starts with: those stored, if it bears them, or its own.
+#[inline(never)]
+pub fn limits<F: NorFlash>(board: &Board, flash: F, layout: Layout) -> (F, MachineConfig) {
+    let own = board.limits();
+    let (flash, stored) = stored_config(flash, layout, &own);
+    let bears = |limits: &MachineConfig| (board.bears)(limits).is_ok();
+    (flash, stored.filter(bears).unwrap_or(own))
+}
+
 /// The server's memory. `None` if asked for twice.
 pub fn buffers() -> Option<&'static mut Buffers> {
     singleton!(: Buffers = Buffers::new())
@@ -140,10 +155,11 @@ pub fn buffers() -> Option<&'static mut Buffers> {
 pub fn start(
     syst: &mut SYST,
     scb: &mut SCB,
-    clock_hz: u32,
+    (clock_hz, tick_hz): (u32, u32),
     at_first: PositionState,
 ) -> Option<BoardDesk> {
-    let config = Config::robot(TICK_HZ);
+    RATE_HZ.store(tick_hz, Relaxed);
+    let config = Config::robot(tick_hz);
     let segments = singleton!(: Queue<Job, SEGMENTS> = Queue::new())?;
     let set_points = singleton!(: Queue<TimedSetPoint, SET_POINTS> = Queue::new())?;
     // The seal of memory that was never written does not fit.
@@ -165,7 +181,7 @@ pub fn start(
         scb.set_priority(SystemHandler::SysTick, 0);
     }
     syst.set_clock_source(SystClkSource::Core);
-    syst.set_reload(clock_hz / TICK_HZ - 1);
+    syst.set_reload(clock_hz.checked_div(tick_hz)?.saturating_sub(1));
     syst.clear_current();
     syst.enable_interrupt();
     syst.enable_counter();
@@ -203,7 +219,8 @@ where
     S: Write,
     G: Write,
 {
-    let mut server = Server::boot(board, flash, layout, desk, buffers);
+    let mut server = Server::new(board, flash, layout, desk, buffers);
+    server.wake();
     defmt::info!(
         "{=str} {=str}, {=u32} ticks a second",
         board.name,
@@ -212,7 +229,9 @@ where
     );
     let mut record = record::Record::new();
     if ports.stream.is_some() {
-        server.subscribe(1, false);
+        // The line carries a thousand a second.
+        let every = board.tick_hz.div_ceil(1000).min(u32::from(u16::MAX));
+        server.subscribe(every as u16, false);
     }
     let mut rounds: u8 = 0;
     let mut idle = idle::Idle::new();

@@ -18,6 +18,14 @@ pub const LAYOUT: Layout = Layout::new([0, UNIT], UNIT)
     .with_key(2 * UNIT)
     .with_config([3 * UNIT, 4 * UNIT]);
 
+/// Twelve bytes behind the window: whom tables are bound to. A chip has them from its maker; here they are zeros, or what the emulator is
+/// told to put there.
+#[allow(unsafe_code, reason = "memory that no Rust object owns")]
+pub fn machine() -> [u8; 12] {
+    // SAFETY: memory of SSRAM1 behind the window, which nothing writes.
+    core::array::from_fn(|at| unsafe { ptr::read_volatile((BASE + SIZE + at) as *const u8) })
+}
+
 /// The window. There is one; nothing else of the image uses this memory.
 pub struct Window(());
 

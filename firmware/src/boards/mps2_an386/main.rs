@@ -39,7 +39,7 @@ mod image {
     use embedded_io::{Read, Write};
     use giotto_firmware::server::Board;
     use giotto_firmware::server::link::write_whole;
-    use giotto_shared::wire::{ClockSource, PositionState, ResetCause};
+    use giotto_shared::wire::{ClockSource, ConfigField, MachineConfig, PositionState, ResetCause};
 
     /// Clock of core and peripherals (DAI0386 2.5).
     const CLOCK_HZ: u32 = 25_000_000;
@@ -50,8 +50,19 @@ mod image {
         clock: ClockSource::Crystal,
         // The emulator does not say.
         reset: ResetCause::Unknown,
-        fastest_m_s: f32::INFINITY,
+        machine: [0; 12],
+        step: [[1, 1]; 3],
+        bears,
     };
+
+    /// Ticks that leave the background half of its time (`giotto-hil rate`).
+    fn bears(limits: &MachineConfig) -> Result<(), ConfigField> {
+        if limits.tick_hz <= 8000 {
+            Ok(())
+        } else {
+            Err(ConfigField::Rate)
+        }
+    }
 
     /// Sends back what comes, byte for byte: what the line itself carries (feature `echo`, for `giotto-hil link`).
     fn echo(mut link: impl Read + Write) -> ! {
@@ -68,13 +79,22 @@ mod image {
 
     #[entry]
     fn main() -> ! {
+        let board = Board {
+            machine: flash::machine(),
+            ..BOARD
+        };
+        let (flash, limits) = common::limits(&board, flash::Window::new(), flash::LAYOUT);
+        let board = Board {
+            tick_hz: limits.tick_hz,
+            ..board
+        };
         let started = cortex_m::Peripherals::take().and_then(|mut core| {
             let link = uart::Uart::link()?;
             common::interrupt::enable::<{ vectors::LINK }>(&mut core.NVIC);
             let desk = common::start(
                 &mut core.SYST,
                 &mut core.SCB,
-                CLOCK_HZ,
+                (CLOCK_HZ, board.tick_hz),
                 PositionState::Known,
             )?;
             Some((link, desk, common::buffers()?, core.SYST))
@@ -95,12 +115,6 @@ mod image {
             still: watchdog::stop,
             lost: common::port::lost,
         };
-        common::background(
-            BOARD,
-            flash::Window::new(),
-            flash::LAYOUT,
-            (desk, buffers, syst),
-            ports,
-        )
+        common::background(board, flash, flash::LAYOUT, (desk, buffers, syst), ports)
     }
 }

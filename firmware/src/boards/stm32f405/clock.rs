@@ -29,7 +29,8 @@ const HSI_HZ: u32 = 16_000_000;
 const PLL_M: u32 = HSE_HZ / 1_000_000;
 const PLL_N: u32 = 336;
 const PLL_Q: u32 = 7;
-const CORE_HZ: u32 = HSE_HZ / PLL_M * PLL_N / 2;
+/// The core with a crystal.
+pub const CORE_HZ: u32 = HSE_HZ / PLL_M * PLL_N / 2;
 /// APB1 a quarter (at most 42 MHz), APB2 half (at most 84 MHz).
 const DIVIDERS: u32 = 0b101 << 10 | 0b100 << 13;
 /// Wait states of the flash at 168 MHz and 3.3 V (RM0090 table 10).

@@ -52,14 +52,16 @@ mod image {
     use giotto_firmware::server::Board;
     use giotto_shared::wire::{ClockSource, PositionState, ResetCause};
 
-    const fn board(clock: ClockSource, reset: ResetCause, fastest_m_s: f32) -> Board {
+    fn board(clock: ClockSource, reset: ResetCause) -> Board {
         Board {
             name: "stm32f405",
             build: env!("GIOTTO_BUILD"),
             tick_hz: common::TICK_HZ,
             clock,
             reset,
-            fastest_m_s,
+            machine: flash::machine(),
+            step: [pulses::STEP; 3],
+            bears: pulses::bears,
         }
     }
 
@@ -73,12 +75,13 @@ mod image {
             ClockSource::Crystal
         };
         stop::prepare();
-        let pulses = pulses::Pulses::new(clock.core_hz, common::TICK_HZ, common::kept_place_nm());
-        let fastest_m_s = if pulses.is_some() {
-            pulses::fastest_m_s(common::TICK_HZ)
-        } else {
-            f32::INFINITY
+        let board = board(source, reset);
+        let (flash, limits) = common::limits(&board, flash::Flash::new(), flash::LAYOUT);
+        let board = Board {
+            tick_hz: limits.tick_hz,
+            ..board
         };
+        let pulses = pulses::Pulses::new(clock.core_hz, &limits, common::kept_place_nm());
         outputs::prepare(pulses);
         let started = cortex_m::Peripherals::take().and_then(|mut core| {
             core.DCB.enable_trace();
@@ -88,7 +91,7 @@ mod image {
             let desk = common::start(
                 &mut core.SYST,
                 &mut core.SCB,
-                clock.core_hz,
+                (clock.core_hz, board.tick_hz),
                 PositionState::Unknown,
             )?;
             Some((link, desk, common::buffers()?, core.SYST))
@@ -110,12 +113,6 @@ mod image {
             still: || {},
             lost: common::port::lost,
         };
-        common::background(
-            board(source, reset, fastest_m_s),
-            flash::Flash::new(),
-            flash::LAYOUT,
-            (desk, buffers, syst),
-            ports,
-        )
+        common::background(board, flash, flash::LAYOUT, (desk, buffers, syst), ports)
     }
 }

@@ -15,10 +15,11 @@
 use super::register::Register;
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use giotto_firmware::pulses::{Pattern, SLOTS, Scale, Stepper, TooFast, Widths};
+use giotto_shared::wire::{ConfigField, MachineConfig};
 
-/// A step is so many nanometres, on each axis: that of the machine, to be set here. This one is a belt of 40 mm a turn and 1600
-/// steps, which is good for 1.475 m/s.
-const STEP_NM: u32 = 25_000;
+/// A step is so many nanometres, on each axis, unless others are stored: a belt of 40 mm a turn and 1600 steps, which is good for
+/// 1.475 m/s.
+pub const STEP: [u32; 2] = [25_000, 1];
 /// What the drives ask of the lines, in slots of 8.3 µs.
 const WIDTHS: Widths = Widths::SHORTEST;
 /// Pins of step and direction, in the order of the bits of a [`Pattern`].
@@ -73,10 +74,28 @@ const WORDS: [u32; 64] = {
     words
 };
 
-/// Fastest that an axis may be, m/s: a step less in each tick than there is room for.
-pub const fn fastest_m_s(tick_hz: u32) -> f32 {
-    let steps = WIDTHS.most_per_tick() - 1;
-    (steps * STEP_NM) as f32 * 1e-9 * tick_hz as f32
+/// Fastest tick with pulses: some 5000 instructions each, a tenth of the core's time.
+const FASTEST_HZ: u32 = 4000;
+
+/// Whether pulses can follow these limits: slots are whole cycles of the crystal's 168 MHz, and in no tick an axis needs more steps
+/// than there is room for, less one.
+pub fn bears(limits: &MachineConfig) -> Result<(), ConfigField> {
+    let hz = limits.tick_hz;
+    let slots_hz = hz.saturating_mul(SLOTS as u32);
+    if hz == 0 || hz > FASTEST_HZ || !super::clock::CORE_HZ.is_multiple_of(slots_hz) {
+        return Err(ConfigField::Rate);
+    }
+    let steps = (WIDTHS.most_per_tick() - 1) as f32 * hz as f32;
+    for ([nm, of], slew_m_s) in limits.step.into_iter().zip(limits.slew_m_s) {
+        Scale::new(nm, of).map_err(|_| ConfigField::Step)?;
+        let fastest_m_s = steps * nm as f32 * 1e-9 / of as f32;
+        let fits = limits.feed_m_s + slew_m_s <= fastest_m_s;
+        // Not a number does not.
+        if !fits {
+            return Err(ConfigField::Feed);
+        }
+    }
+    Ok(())
 }
 
 fn fill(buffer: &[AtomicU32; SLOTS], pattern: &Pattern) {
@@ -96,12 +115,14 @@ pub struct Pulses {
 
 impl Pulses {
     /// At rest at a place; `None` if slots are no whole number of cycles.
-    pub fn new(core_hz: u32, tick_hz: u32, place_nm: [i32; 3]) -> Option<Self> {
+    pub fn new(core_hz: u32, limits: &MachineConfig, place_nm: [i32; 3]) -> Option<Self> {
+        let tick_hz = limits.tick_hz;
         let slots_hz = tick_hz.checked_mul(SLOTS as u32)?;
         if !core_hz.is_multiple_of(slots_hz) {
             return None;
         }
-        let scales = [Scale::new(STEP_NM, 1).ok()?; 3];
+        let [x, y, z] = limits.step.map(|[nm, steps]| Scale::new(nm, steps).ok());
+        let scales = [x?, y?, z?];
         let stepper = Stepper::new(scales, WIDTHS, place_nm);
         for pin in PINS {
             SPEED.change(0b11 << (2 * pin), 0b01 << (2 * pin));

@@ -145,25 +145,76 @@ mod image {
         arc.sound().then_some(ranges)
     }
 
-    /// From rest to rest, each set-point recorded. All ticks, and those under way.
-    fn interrupt(floor: u32) -> Option<[Range; 2]> {
-        let shared = cortex_m::singleton!(: Shared = Shared::new())?;
-        let segments = cortex_m::singleton!(: bench::Segments = bench::Segments::new())?;
-        let points = cortex_m::singleton!(: bench::Points = bench::Points::new())?;
-        let mut interrupt = Interrupt::new(HELIX_M, shared, segments, points)?;
-        let mut ranges = [Range::NONE, Range::NONE];
-        loop {
-            let before = SYST::get_current();
-            let output = black_box(interrupt.run(black_box(false), black_box(false)));
-            let count = between(before, SYST::get_current()).saturating_sub(floor);
-            ranges[0].add(count);
-            if output.flags & flag::MOVING != 0 {
-                ranges[1].add(count);
-            }
-            if !interrupt.drain() {
-                return Some(ranges);
+    /// Of so many ticks in a ramp one has a run that is stopped in it.
+    const STOP_EVERY: u32 = 3;
+
+    /// Ticks of runs from rest to rest, each set-point recorded.
+    struct Interrupts {
+        /// All but those below.
+        all: Range,
+        /// Those of them under way.
+        moving: Range,
+        /// In which a stop begins in a ramp: one a run.
+        begins: Range,
+        /// After that, to rest.
+        stopping: Range,
+    }
+
+    impl Interrupts {
+        /// One run, stopped before the ramp tick of this number; whether there was one.
+        fn run(
+            &mut self,
+            floor: u32,
+            stop_at: u32,
+            segments: &mut bench::Segments,
+            points: &mut bench::Points,
+        ) -> Option<bool> {
+            let shared = Shared::new();
+            let mut interrupt = Interrupt::new(HELIX_M, &shared, segments, points)?;
+            let (mut ramps, mut stopped) = (0_u32, false);
+            loop {
+                let begins = !stopped && ramps == stop_at;
+                stopped |= begins;
+                let before = SYST::get_current();
+                let output = black_box(interrupt.run(black_box(stopped), black_box(false)));
+                let count = between(before, SYST::get_current()).saturating_sub(floor);
+                let moving = output.flags & flag::MOVING != 0;
+                if begins {
+                    self.begins.add(count);
+                } else if stopped {
+                    self.stopping.add(count);
+                } else {
+                    self.all.add(count);
+                    if moving {
+                        self.moving.add(count);
+                    }
+                }
+                let ramp = moving && output.flags & flag::CRUISE == 0;
+                ramps = ramps.wrapping_add(u32::from(ramp));
+                if !interrupt.drain() {
+                    return Some(stopped);
+                }
             }
         }
+    }
+
+    /// A run that nobody stops, and one for each so many ticks of its ramps.
+    fn interrupt(floor: u32) -> Option<Interrupts> {
+        let segments = cortex_m::singleton!(: bench::Segments = bench::Segments::new())?;
+        let points = cortex_m::singleton!(: bench::Points = bench::Points::new())?;
+        let mut counted = Interrupts {
+            all: Range::NONE,
+            moving: Range::NONE,
+            begins: Range::NONE,
+            stopping: Range::NONE,
+        };
+        counted.run(floor, u32::MAX, segments, points)?;
+        let mut stop_at = 1;
+        while counted.run(floor, stop_at, segments, points)? {
+            stop_at += STOP_EVERY;
+        }
+        // There were ramps to stop in.
+        (stop_at > 100 * STOP_EVERY).then_some(counted)
     }
 
     fn stream(floor: u32) -> Option<Range> {
@@ -247,9 +298,11 @@ mod image {
         let [all, steady] = run(Arc::of_arm(), floor)?;
         say("arm", &all);
         say("arm_steady", &steady);
-        let [all, moving] = interrupt(floor)?;
-        say("interrupt", &all);
-        say("interrupt_moving", &moving);
+        let counted = interrupt(floor)?;
+        say("interrupt", &counted.all);
+        say("interrupt_moving", &counted.moving);
+        say("interrupt_stop", &counted.begins);
+        say("interrupt_stopping", &counted.stopping);
         say("naive_libm", &plain::<Libm>(floor));
         say("naive_nalgebra", &plain::<Nalgebra>(floor));
         say("naive_idsp", &plain::<Idsp>(floor));

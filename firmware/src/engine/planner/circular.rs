@@ -38,6 +38,12 @@ pub(super) struct Round {
 }
 
 impl Round {
+    /// Axes that it leads along.
+    fn moved(&self) -> [bool; 3] {
+        let [[ux, uy, uz], [vx, vy, vz], [rx, ry, rz]] = [self.u, self.v, self.rise_nm];
+        [ux | vx | rx, uy | vy | ry, uz | vz | rz].map(|bits| bits != 0)
+    }
+
     /// The centre seen from where position errors of a zone are counted from.
     fn seen(&self, zone: &Built) -> [f32; 3] {
         let centre = to_m(self.centre_nm);
@@ -104,7 +110,7 @@ impl Planner {
             &endless,
             &worst::on_arc(law.as_ref(), &endless),
         );
-        let curable = steady.correction(&bounds) <= 1.0;
+        let curable = steady.correction(&bounds, round.moved()) <= 1.0;
         let mut stretch = 1.0;
         let (timing, motion, law) = loop {
             let timing = timing(stretch)?;
@@ -115,7 +121,7 @@ impl Planner {
             let numbers = law
                 .as_ref()
                 .map_or(0.0, |law| law.load().max(worst.gain / MAX_GAIN));
-            let correction = demand.correction(&bounds);
+            let correction = demand.correction(&bounds, round.moved());
             let over = if curable {
                 correction.max(numbers)
             } else {
@@ -165,7 +171,7 @@ impl Planner {
             };
             let worst = worst::on_stop(law, motion, [braking / speed, jerk / speed]);
             let demand = demand(round, zone, &as_ramp, &worst);
-            let correction = bounds.map_or(0.0, |bounds| demand.correction(bounds));
+            let correction = bounds.map_or(0.0, |bounds| demand.correction(bounds, round.moved()));
             // Nothing between the places of this sweep is more.
             let over = (demand.acceleration_m_s2 / (0.998 * limit_m_s2)).max(correction);
             if over <= 1.0 || braking <= least {

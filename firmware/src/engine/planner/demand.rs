@@ -4,7 +4,24 @@
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
     pub(super) offset_m: f32,
-    pub(super) slew_m_s: f32,
+    /// By axis.
+    pub(super) slew_m_s: [f32; 3],
+}
+
+impl Bounds {
+    /// Rate of change that the tightest of the axes allows which a path moves along; any of them, if it moves along none.
+    fn slew_of(&self, moved: [bool; 3]) -> f32 {
+        let all = moved == [false; 3];
+        let axes = self.slew_m_s.iter().zip(moved);
+        let least = |least: f32, (slew_m_s, moved): (&f32, bool)| {
+            if moved || all {
+                least.min(*slew_m_s)
+            } else {
+                least
+            }
+        };
+        axes.fold(f32::INFINITY, least)
+    }
 }
 
 /// The largest on a path, SI.
@@ -16,9 +33,9 @@ pub(super) struct Demand {
 }
 
 impl Demand {
-    /// Offset and slew of their bounds, with a tenth to spare: 1 is just within both.
-    pub(super) fn correction(&self, bounds: &Bounds) -> f32 {
-        1.1 * (self.offset_m / bounds.offset_m).max(self.slew_m_s / bounds.slew_m_s)
+    /// Offset and slew of their bounds on the axes that are moved, with a tenth to spare: 1 is just within both.
+    pub(super) fn correction(&self, bounds: &Bounds, moved: [bool; 3]) -> f32 {
+        1.1 * (self.offset_m / bounds.offset_m).max(self.slew_m_s / bounds.slew_of(moved))
     }
 
     /// Acceleration of its limit, with what a sweep over a ramp may miss to spare.

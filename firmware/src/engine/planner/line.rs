@@ -57,7 +57,7 @@ impl Planner {
                 acceleration_m_s2: worst.acceleration_per_s2,
             };
             let over = demand
-                .correction(&bounds)
+                .correction(&bounds, span_nm.map(|nm| nm != 0))
                 .max(demand.acceleration(self.machine.acceleration_m_s2));
             match longer(stretch, over) {
                 Some(longer) => stretch = longer,

@@ -1,4 +1,5 @@
 //! The configuration in the form that planning needs: single precision, worked out once.
+use super::demand::Bounds;
 use crate::engine::config::{Config, ticks, whole_above};
 use crate::engine::descent::Slowing;
 use giotto_shared::fixed::single_to_fixed;
@@ -14,7 +15,8 @@ pub(super) struct Machine {
     pub(super) jerk_m_s3: f32,
     pub(super) positioning_m_s: f32,
     pub(super) offset_m: f32,
-    pub(super) slew_m_s: f32,
+    /// By axis.
+    pub(super) slew_m_s: [f32; 3],
     pub(super) take_up_ticks: u32,
     pub(super) engage_ticks: u32,
     pub(super) stream_window_s: f32,
@@ -39,7 +41,7 @@ impl Machine {
             jerk_m_s3,
             positioning_m_s: config.positioning_m_s as f32,
             offset_m: config.offset_m as f32,
-            slew_m_s: config.slew_m_s as f32,
+            slew_m_s: config.slew_m_s.map(|slew_m_s| slew_m_s as f32),
             take_up_ticks: whole_above(config.take_up_s as f32 * rate_hz).clamp(3, 1 << 20),
             engage_ticks: config.engage_ticks(),
             stream_window_s: config.stream_window_s as f32,
@@ -80,11 +82,14 @@ impl Machine {
         }
     }
 
-    /// Bounds on an offset (nm) and on its change (nm per tick).
-    pub(super) fn bounds_nm(&self, offset_m: f32, slew_m_s: f32) -> [i32; 2] {
-        [
-            single_to_fixed(offset_m * 1e9, 0),
-            single_to_fixed(slew_m_s * self.tick_s * 1e9, 0),
-        ]
+    /// Bounds on an offset (nm) and on its change by axis (nm per tick).
+    pub(super) fn bounds_nm(&self, bounds: &Bounds) -> (i32, [i32; 3]) {
+        let per_tick = self.tick_s * 1e9;
+        (
+            single_to_fixed(bounds.offset_m * 1e9, 0),
+            bounds
+                .slew_m_s
+                .map(|slew_m_s| single_to_fixed(slew_m_s * per_tick, 0)),
+        )
     }
 }

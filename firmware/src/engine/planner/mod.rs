@@ -183,7 +183,7 @@ impl Planner {
             jerk_m_s3: self.machine.jerk_m_s3,
             hold_ticks: self.machine.stream_hold_ticks,
             engage_ticks: self.machine.engage_ticks,
-            bounds_nm: self.machine.bounds_nm(bounds.offset_m, bounds.slew_m_s),
+            bounds_nm: self.machine.bounds_nm(&bounds),
         };
         StreamPlan::build(&needs).ok_or(Refused::OutOfBounds(Quantity::Window))
     }
@@ -238,14 +238,13 @@ impl Planner {
         let limits = self.zones.limits();
         Bounds {
             offset_m: offset_m.min(limits.offset_m),
-            slew_m_s: slew_m_s.min(limits.slew_m_s),
+            slew_m_s: slew_m_s.map(|slew_m_s| slew_m_s.min(limits.slew_m_s)),
         }
     }
 
     /// A zone applies, with its bounds.
     fn bound(&self, segment: &mut Planned, bounds: &Bounds) {
-        let [offset_nm, slew_nm] = self.machine.bounds_nm(bounds.offset_m, bounds.slew_m_s);
-        (segment.offset_nm, segment.slew_nm) = (offset_nm, slew_nm);
+        (segment.offset_nm, segment.slew_nm) = self.machine.bounds_nm(bounds);
         segment.corrected = true;
     }
 

@@ -21,7 +21,7 @@ pub struct StreamPlan {
     pub(super) limits: Limits,
     pub(super) engage_ticks: u32,
     pub(super) offset_nm: i32,
-    pub(super) slew_nm: i32,
+    pub(super) slew_nm: [i32; 3],
     pub(super) corrected: bool,
     /// What the joints of an arm ask for.
     pub(super) arm: ArmPlan,
@@ -51,7 +51,7 @@ pub(crate) struct StreamNeeds {
     pub(crate) hold_ticks: u32,
     pub(crate) engage_ticks: u32,
     /// Of the offset, and of its change per tick.
-    pub(crate) bounds_nm: [i32; 2],
+    pub(crate) bounds_nm: (i32, [i32; 3]),
 }
 
 impl StreamPlan {
@@ -77,7 +77,7 @@ impl StreamPlan {
         let left_m_s2 = n.acceleration_m_s2 - added_m_s2.min(ADDED_SHARE * n.acceleration_m_s2);
         let acceleration = left_m_s2 * tick_s * tick_s * 1e9;
         let jerk = n.jerk_m_s3 * tick_s * tick_s * tick_s * 1e9;
-        let [offset_nm, slew_nm] = n.bounds_nm;
+        let (offset_nm, slew_nm) = n.bounds_nm;
         Some(Self {
             epoch: n.epoch,
             stride,

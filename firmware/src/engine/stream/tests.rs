@@ -31,7 +31,7 @@ pub(super) fn plan_with(operator: Operator<f32>) -> StreamPlan {
         jerk_m_s3: 100.0,
         hold_ticks: 5,
         engage_ticks: 100,
-        bounds_nm: [20_000_000, 200_000],
+        bounds_nm: (20_000_000, [200_000; 3]),
     })
     .unwrap()
 }

@@ -56,7 +56,7 @@ fn deviation_from_law(
     kappa: [f32; 2],
 ) -> (f64, f64, usize) {
     let mut config = Config::robot(1000);
-    (config.offset_m, config.slew_m_s) = (0.05, 1.0);
+    (config.offset_m, config.slew_m_s) = (0.05, [1.0; 3]);
     let mut engine = Engine::new(config).unwrap();
     engine.load(Some(&table(kappa[0], kappa[1]))).unwrap();
     let run = CircleRun {

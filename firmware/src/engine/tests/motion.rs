@@ -47,6 +47,47 @@ fn accelerations(out: &[Output]) -> (f64, f64) {
     (worst(&|o| o.nominal_nm), worst(&|o| o.corrected_nm))
 }
 
+/// The rate of the offset by axis: ramps are longer where the path leads along a slow one, and as quick as without where it does not; in
+/// no tick does an axis change by more than its own bound, and the others are what they were.
+#[test]
+fn each_axis_keeps_its_own_rate_of_the_offset() {
+    let run = |slew_m_s: [f64; 3]| {
+        let mut config = Config::robot(1000);
+        (config.offset_m, config.slew_m_s) = (0.05, slew_m_s);
+        let mut engine = Engine::new(config).unwrap();
+        engine.load(Some(&table(KAPPA[0], KAPPA[1]))).unwrap();
+        engine.run_circle(&circle(0.3)).unwrap();
+        let out = run_out(&mut engine);
+        let offset = |o: &Output, axis: usize| o.corrected_nm[axis] - o.nominal_nm[axis];
+        for pair in out.windows(2) {
+            for (axis, slew_m_s) in slew_m_s.iter().enumerate() {
+                let change = (offset(&pair[1], axis) - offset(&pair[0], axis)).abs();
+                assert!(f64::from(change) <= slew_m_s * 1e6 + 1.0, "{axis} {change}");
+            }
+        }
+        // The circle is what follows the last settling.
+        let settled = out.iter().rposition(|o| o.flags & flag::SETTLING != 0);
+        let circle = &out[settled.unwrap() + 1..];
+        let y: Vec<i32> = circle.iter().map(|o| offset(o, 1)).collect();
+        (circle.len(), engine.counters().slew_cuts, y)
+    };
+    let (quick, cuts, free) = run([1.0; 3]);
+    assert_eq!(cuts, 0);
+    // Not along Z: what it may does not matter.
+    let (ticks, cuts, _) = run([1.0, 1.0, 1e-6]);
+    assert_eq!((ticks, cuts), (quick, 0));
+    for axis in 0..2 {
+        let mut slew_m_s = [1.0; 3];
+        slew_m_s[axis] = 4.5e-3;
+        let (ticks, cuts, _) = run(slew_m_s);
+        assert!(ticks > quick && cuts == 0, "{axis}: {ticks} {cuts}");
+    }
+    // Less than the law asks for at constant rate (2.9 mm/s): cut on X, and on X alone.
+    let (ticks, cuts, y) = run([1e-3, 1.0, 1.0]);
+    assert!(ticks == quick && cuts > 100, "{ticks} {cuts}");
+    assert_eq!(y, free);
+}
+
 /// The table allows more than the law asks for at constant rate (0.48 mm, 2.9 mm/s), and less than it asks for in the quickest ramp.
 #[test]
 fn ramps_are_long_enough_for_the_bounds_of_the_table() {

@@ -1,4 +1,6 @@
 //! The server over a flash in memory and an engine that only remembers.
+#[cfg(feature = "signed")]
+mod owner;
 mod power;
 mod protocol;
 
@@ -16,15 +18,28 @@ use std::vec::Vec;
 
 const SLOT: usize = 4096;
 const ERASE: usize = 512;
-const CELLS: usize = 2 * SLOT + ERASE;
-const LAYOUT: Layout = Layout::new([0, SLOT as u32], SLOT as u32).with_key(2 * SLOT as u32);
+const CELLS: usize = 2 * SLOT + 3 * ERASE;
+const KEY: u32 = 2 * SLOT as u32;
+const LAYOUT: Layout = Layout::new([0, SLOT as u32], SLOT as u32)
+    .with_key(KEY)
+    .with_config([KEY + ERASE as u32, KEY + 2 * ERASE as u32]);
 const BOARD: Board = Board {
     name: "bench",
     build: "0",
     tick_hz: 1000,
     clock: ClockSource::Crystal,
     reset: ResetCause::Power,
-    fastest_m_s: 2.0,
+    machine: [1; 12],
+    step: [[1, 1]; 3],
+    bears: |limits| {
+        if limits.feed_m_s > 1.8 {
+            Err(ConfigField::Feed)
+        } else if limits.tick_hz > 4000 {
+            Err(ConfigField::Rate)
+        } else {
+            Ok(())
+        }
+    },
 };
 
 type Cells = RamFlash<CELLS, ERASE>;

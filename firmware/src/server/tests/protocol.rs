@@ -1,7 +1,7 @@
 //! Requests in and out of order, uploads good and bad, probation.
 use super::*;
 use giotto_shared::table::TableError;
-use giotto_shared::wire::{ConfigField, MachineConfig, MotionState, SlotState};
+use giotto_shared::wire::{ConfigField, MachineConfig, MotionState, STEP_MOST, SlotState};
 use proptest::prelude::*;
 
 fn fresh() -> Desk {
@@ -301,6 +301,46 @@ fn limits_beyond_the_outputs_are_refused() {
         refused(desk.ask(fast(1.85))),
         Refusal::Config(ConfigField::Feed)
     );
+}
+
+/// Each number of each axis, and what only the board can say no to: refused by its name, and nothing of it is used.
+#[test]
+fn limits_out_of_range_are_refused_by_name() {
+    let mut desk = fresh();
+    let Some(Reply::Config { config, .. }) = desk.ask(Command::Config) else {
+        panic!("no limits");
+    };
+    let mut wrong = Vec::new();
+    for axis in 0..3 {
+        for slew_m_s in [0.0, -0.1, f32::NAN, 1.1] {
+            let mut said = config;
+            said.slew_m_s[axis] = slew_m_s;
+            wrong.push((said, ConfigField::Slew));
+        }
+        for step in [[0, 1], [1, 0], [STEP_MOST + 1, 1], [1, STEP_MOST + 1]] {
+            let mut said = config;
+            said.step[axis] = step;
+            wrong.push((said, ConfigField::Step));
+        }
+    }
+    // The last one is the board's own bound.
+    for tick_hz in [0, 249, 20_001, u32::MAX, 4001] {
+        let said = MachineConfig { tick_hz, ..config };
+        wrong.push((said, ConfigField::Rate));
+    }
+    for (said, field) in wrong {
+        let why = refused(desk.ask(Command::Configure(said)));
+        assert_eq!(why, Refusal::Config(field), "{said:?}");
+        let found = desk.ask(Command::Config);
+        assert!(matches!(found, Some(Reply::Config { config: now, .. }) if now == config));
+    }
+    let mut said = config;
+    (said.slew_m_s, said.tick_hz) = ([0.1, 0.2, 0.3], 4000);
+    said.step = [[3125, 2], [25_000, 1], [1, STEP_MOST]];
+    assert!(desk.done(Command::Configure(said)) && desk.done(Command::SaveConfig));
+    let mut desk = desk.reboot();
+    let found = desk.ask(Command::Config);
+    assert!(matches!(found, Some(Reply::Config { config, stored: true }) if config == said));
 }
 
 #[test]

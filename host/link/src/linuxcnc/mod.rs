@@ -20,6 +20,7 @@ use super::link::Link;
 use super::virtual_controller::{Flash, LAYOUT};
 use super::wires::Wires;
 use giotto_firmware::server::{Board, Buffers, Server};
+use giotto_shared::table::image::MachineId;
 use giotto_shared::wire::{ClockSource, ResetCause};
 use motion::PageMotion;
 use page::Page;
@@ -36,6 +37,17 @@ pub struct LinuxCncLink {
     kept: Kept,
     wires: Wires,
     started: Instant,
+}
+
+/// Whom tables are bound to: the computer, by the first half of its machine-id; zeros where it has none.
+fn machine() -> MachineId {
+    let text = std::fs::read_to_string("/etc/machine-id").unwrap_or_default();
+    let digit = |at: usize| text.get(2 * at..2 * at + 2);
+    std::array::from_fn(|at| {
+        digit(at)
+            .and_then(|two| u8::from_str_radix(two, 16).ok())
+            .unwrap_or(0)
+    })
 }
 
 impl LinuxCncLink {
@@ -56,7 +68,9 @@ impl LinuxCncLink {
             clock: ClockSource::Crystal,
             reset: ResetCause::Power,
             // LinuxCNC's own joints keep their limits.
-            fastest_m_s: f32::INFINITY,
+            machine: machine(),
+            step: [[1, 1]; 3],
+            bears: |_| Ok(()),
         };
         let motion = PageMotion::new(page);
         let mut server = Box::new(Server::boot(board, flash, LAYOUT, motion, Box::default()));

@@ -117,7 +117,7 @@ fn confirm(flash: Flash, crc: u32, image: &[u8]) -> Flash {
         // In memory neither fails; if one did, the table would not be in the store, and go on being used.
         let _ = store
             .write(slot, image.len(), &mut buffer)
-            .and_then(|()| store.confirm(slot, &mut buffer));
+            .and_then(|()| store.confirm(slot, false, &mut buffer));
     }
     store.into_flash()
 }

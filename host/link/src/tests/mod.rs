@@ -188,66 +188,97 @@ fn table_refusal(result: Result<flash::Flashed, ControllerError>) -> table::Tabl
     }
 }
 
-/// Off until a key is provisioned; from then on, and after a reset, only what it has signed.
+/// Off until a key is provisioned; from then on, and after a reset, only what it has signed, for this machine, in order.
 #[test]
 fn only_signed_tables_once_a_key_is_provisioned() {
     use crate::signing::SigningKey;
+    use giotto_shared::wire::KeyState;
+    use table::image::Binding;
     let (key, other) = (SigningKey::generate(), SigningKey::generate());
+    let bound = |serial| Binding {
+        machine: crate::virtual_controller::MACHINE,
+        serial,
+    };
+    let signed = |value, serial| key.sign(&image(value), &bound(serial)).unwrap();
     let mut controller = sim();
     controller.flash(&image(1.0), &mut |_| {}).unwrap();
-    controller
-        .flash(&key.sign(&image(1.1)).unwrap(), &mut |_| {})
-        .unwrap();
+    controller.flash(&signed(1.1, 3), &mut |_| {}).unwrap();
     controller.flash(&image(1.2), &mut |_| {}).unwrap();
-    controller
-        .command(Command::Provision { key: key.public() })
-        .unwrap();
+    let provision = |key: &SigningKey| Command::Provision { key: key.public() };
+    controller.command(provision(&key)).unwrap();
     // The unsigned table in use is gone, the signed one before it is back.
-    assert_eq!(
-        controller.verify(&key.sign(&image(1.1)).unwrap()).unwrap(),
-        flash::Verdict::Same { slot: 1 }
-    );
+    let same = flash::Verdict::Same { slot: 1 };
+    assert_eq!(controller.verify(&signed(1.1, 3)).unwrap(), same);
     controller.reset().unwrap();
     assert!(controller.identity().signed_only);
-    let good = key.sign(&image(1.3)).unwrap();
-    assert_eq!(
-        table_refusal(controller.flash(&image(1.3), &mut |_| {})),
-        table::TableError::Unsigned
-    );
-    let strange = other.sign(&image(1.3)).unwrap();
-    assert_eq!(
-        table_refusal(controller.flash(&strange, &mut |_| {})),
-        table::TableError::BadSignature
-    );
+    let info = controller.key_info().unwrap();
+    assert_eq!((info.state, info.serial), (KeyState::Kept, 3));
+    let refused = |controller: &mut Controller, image: &[u8]| {
+        table_refusal(controller.flash(image, &mut |_| {}))
+    };
+    let good = signed(1.3, 4);
+    let strange = other.sign(&image(1.3), &bound(4)).unwrap();
+    let theirs = Binding {
+        machine: [7; 12],
+        serial: 4,
+    };
+    let theirs = key.sign(&image(1.3), &theirs).unwrap();
+    let old = table::TableError::OldSerial { serial: 3, last: 3 };
+    for (image, why) in [
+        (image(1.3), table::TableError::Unsigned),
+        (strange, table::TableError::BadSignature),
+        (theirs, table::TableError::OtherMachine),
+        (signed(1.1, 3), old),
+    ] {
+        assert_eq!(refused(&mut controller, &image), why);
+    }
     // Altered after it was signed, its CRC set right.
     let mut altered = image(1.4);
-    let signature = &good[good.len() - table::image::SIGNATURE_BYTES..];
-    altered.resize(altered.len() + signature.len(), 0);
-    let length = altered.len() - signature.len();
-    table::image::attach_signature(&mut altered, length, |_, _| signature.try_into().unwrap())
-        .unwrap();
-    assert_eq!(
-        table_refusal(controller.flash(&altered, &mut |_| {})),
-        table::TableError::BadSignature
-    );
-    assert_eq!(
-        controller.verify(&key.sign(&image(1.1)).unwrap()).unwrap(),
-        flash::Verdict::Same { slot: 1 }
-    );
-    // Once: the same key again changes nothing, another one is refused.
-    controller
-        .command(Command::Provision { key: key.public() })
-        .unwrap();
-    let again = controller.command(Command::Provision {
-        key: other.public(),
-    });
+    altered.resize(table::MAX_IMAGE_BYTES, 0);
+    let signature = good[good.len() - table::image::SIGNATURE_BYTES..].try_into();
+    let length =
+        table::image::attach_signature(&mut altered, &bound(4), |_, _| signature.unwrap()).unwrap();
+    let why = refused(&mut controller, &altered[..length]);
+    assert_eq!(why, table::TableError::BadSignature);
+    assert_eq!(controller.verify(&signed(1.1, 3)).unwrap(), same);
+    // The same key again changes nothing, another one is refused.
+    controller.command(provision(&key)).unwrap();
+    let again = controller.command(provision(&other));
     assert!(matches!(
         again,
         Err(ControllerError::Refused(Refusal::KeyProvisioned))
     ));
     controller.flash(&good, &mut |_| {}).unwrap();
-    assert_eq!(
-        controller.verify(&good).unwrap(),
-        flash::Verdict::Same { slot: 0 }
-    );
+    let same = flash::Verdict::Same { slot: 0 };
+    assert_eq!(controller.verify(&good).unwrap(), same);
+    // Handed on by its owner.
+    let machine = controller.identity().machine;
+    let word = other.hand_over(&machine, 1, &other.public());
+    assert!(controller.command(word).is_err());
+    let word = key.hand_over(&machine, 1, &other.public());
+    controller.command(word).unwrap();
+    assert_eq!(controller.status().unwrap().active, None);
+    let mine = other.sign(&image(1.3), &bound(5)).unwrap();
+    controller.flash(&mine, &mut |_| {}).unwrap();
+}
+
+/// A rate that is stored is the one of the next start; the machine goes as far in the same time.
+#[test]
+fn a_stored_rate_counts_from_the_next_start_on() {
+    let mut controller = sim();
+    let (mut config, _) = controller.config().unwrap();
+    assert_eq!(config.tick_hz, 1000);
+    config.tick_hz = 2500;
+    controller.command(Command::Configure(config)).unwrap();
+    controller.command(Command::SaveConfig).unwrap();
+    assert_eq!(controller.identity().tick_hz, 1000);
+    controller.reset().unwrap();
+    assert_eq!(controller.identity().tick_hz, 2500);
+    let recording = controller
+        .run_circle(&circle(0.1, 0.2, Direction::Ccw, 1), 1)
+        .unwrap();
+    assert_eq!(recording.dt_s, 0.0004);
+    let time_s = recording.points.last().unwrap().time_s;
+    // A turn takes π s; its ramps and the way to it the rest.
+    assert!((3.2..6.0).contains(&time_s), "{time_s}");
 }

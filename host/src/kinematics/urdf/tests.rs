@@ -57,7 +57,11 @@ fn robots_drawn_otherwise_have_theirs() {
         ("0.365 0 0", "0 0 0", "0 1 0"),
         ("0.08 0 0", "0 0 0", "-1 0 0"),
     ];
-    let arm = read(&robot(&kuka, "<origin xyz=\"0 0 0\" rpy=\"0 1.5707963267948966 0\"/>")).unwrap();
+    let arm = read(&robot(
+        &kuka,
+        "<origin xyz=\"0 0 0\" rpy=\"0 1.5707963267948966 0\"/>",
+    ))
+    .unwrap();
     assert_eq!(of(&arm), known("kuka-kr6-r700"));
     let staubli = [
         ("0 0 0.32", "0 0 0", "0 0 1"),

@@ -312,7 +312,8 @@ fn largest_table_fits_exactly() {
     table.zones.resize(MAX_ZONES, longest).unwrap();
     table.arm = Some(arm());
     let image = bytes(&table);
-    assert_eq!(image.len(), MAX_IMAGE_BYTES - SIGNATURE_BYTES);
+    let trailer = BINDING_BYTES + SIGNATURE_BYTES;
+    assert_eq!(image.len(), MAX_IMAGE_BYTES - trailer);
     assert_eq!(decode(&image), Ok(table.clone()));
     assert_eq!(check(&image), Ok(()));
     // Zone by zone is what postcard makes of the whole.
@@ -540,20 +541,49 @@ fn terms_of_joints_and_of_one_slide_twice_are_refused() {
 }
 
 #[test]
-fn signature_travels_outside_the_body() {
+fn binding_and_signature_travel_outside_the_body() {
     let mut out = [0; MAX_IMAGE_BYTES];
     let plain = encode(&table(), &mut out).unwrap();
     assert_eq!(signed_parts(&out[..plain]), None);
-    let signed = attach_signature(&mut out, plain, |head, body| {
-        assert_eq!(head, [3, 0, 1, 0]);
-        assert_eq!(body.len(), plain - 16);
+    assert_eq!(binding(&out[..plain]), None);
+    let bound = Binding {
+        machine: *b"twelve bytes",
+        serial: 0x0102_0304,
+    };
+    let signed = attach_signature(&mut out, &bound, |head, body| {
+        assert_eq!(head, [3, 0, 3, 0]);
+        assert_eq!(body.len(), plain - 16 + BINDING_BYTES);
+        assert!(body.ends_with(b"twelve bytes\x04\x03\x02\x01"));
         [7; SIGNATURE_BYTES]
     });
     let image = &out[..signed.unwrap()];
+    assert_eq!(image.len(), plain + BINDING_BYTES + SIGNATURE_BYTES);
     assert_eq!(decode(image), Ok(table()));
+    let signature = signed_parts(image).unwrap().signature;
+    assert_eq!(signature, &[7; SIGNATURE_BYTES]);
+    assert_eq!(binding(image), Some(bound));
+    // Another signature takes the place of the first.
+    let later = Binding { serial: 9, ..bound };
+    let again = attach_signature(&mut out, &later, |_, _| [8; SIGNATURE_BYTES]);
+    assert_eq!(again, Ok(plain + BINDING_BYTES + SIGNATURE_BYTES));
+    assert_eq!(binding(&out[..again.unwrap()]), Some(later));
+}
+
+/// Signed before tables were bound: read, and bound to nothing.
+#[test]
+fn a_signature_without_a_binding_is_read() {
+    let mut out = [0; MAX_IMAGE_BYTES];
+    let length = encode(&table(), &mut out).unwrap() + SIGNATURE_BYTES;
+    write_header(&mut out[..length], FLAG_SIGNED);
+    assert_eq!(decode(&out[..length]), Ok(table()));
+    assert!(signed_parts(&out[..length]).is_some());
+    assert_eq!(binding(&out[..length]), None);
+    // Nothing is bound that is not signed.
+    write_header(&mut out[..length], FLAG_BOUND);
+    let flags = FLAG_BOUND;
     assert_eq!(
-        signed_parts(image).unwrap().signature,
-        &[7; SIGNATURE_BYTES]
+        decode(&out[..length]),
+        Err(TableError::UnknownFlags { flags })
     );
 }
 

@@ -47,6 +47,14 @@ fn largest_messages_fit() {
         seq: u16::MAX,
         command: Command::Provision { key: [255; 32] },
     });
+    framed(&Request {
+        session: u16::MAX,
+        seq: u16::MAX,
+        command: Command::ReplaceKey {
+            key: [255; 32],
+            signature: Chunk::from_slice(&[255; 64]).unwrap(),
+        },
+    });
     let most_nm = [i32::MIN; 3];
     let arc = ExactArc {
         centre_nm: most_nm,
@@ -78,6 +86,12 @@ fn largest_messages_fit() {
         data,
     });
     let name: heapless::String<16> = "1234567890123456".try_into().unwrap();
+    reply(Reply::Key(KeyInfo {
+        state: KeyState::Lost,
+        key: [255; 32],
+        epoch: u32::MAX,
+        serial: u32::MAX,
+    }));
     reply(Reply::Identity(Identity {
         board: name.clone(),
         build: name,
@@ -87,6 +101,7 @@ fn largest_messages_fit() {
         max_image_bytes: u16::MAX,
         tick_hz: u32::MAX,
         signed_only: true,
+        machine: [255; 12],
     }));
     let most = u32::MAX;
     let slot = SlotState::Table(TableInfo {
@@ -140,10 +155,12 @@ fn largest_messages_fit() {
         jerk_m_s3: f32::MAX,
         positioning_m_s: f32::MAX,
         offset_m: f32::MAX,
-        slew_m_s: f32::MAX,
+        slew_m_s: [f32::MAX; 3],
         stream_window_s: f32::MAX,
         soft_nm: [[i32::MIN, i32::MAX]; 3],
         internal_clock: true,
+        tick_hz: u32::MAX,
+        step: [[u32::MAX; 2]; 3],
     };
     reply(Reply::Config {
         config,
