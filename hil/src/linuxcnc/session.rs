@@ -86,6 +86,7 @@ impl Session {
     pub(super) fn start(
         component: &Path,
         play: Play,
+        acceleration: f64,
         keep: Option<&Path>,
     ) -> Result<Self, LinuxCncError> {
         install(component)?;
@@ -105,7 +106,7 @@ impl Session {
                 .unwrap_or_default(),
         };
         let files = [
-            ("machine.ini", machine::ini()),
+            ("machine.ini", machine::ini(acceleration)),
             ("machine.hal", machine::hal(play)),
             ("driver.py", include_str!("driver.py").to_owned()),
         ];
