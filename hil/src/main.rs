@@ -91,6 +91,9 @@ enum Command {
         /// Exit code 5 unless every bar is met, and where there is no LinuxCNC.
         #[arg(long)]
         check: bool,
+        /// With --check: no failure where there is no LinuxCNC, which is said with its reason.
+        #[arg(long)]
+        may_skip: bool,
     },
     /// What an image takes in flash and RAM, its deepest stack, and whether its tick can panic.
     Size {
@@ -141,6 +144,7 @@ fn main() -> ExitCode {
             keep,
             json,
             check,
+            may_skip,
         } => {
             let setup = linuxcnc::Setup {
                 component: component.unwrap_or_else(|| beside("libgiotto_linuxcnc.so")),
@@ -154,7 +158,7 @@ fn main() -> ExitCode {
                 short,
                 keep,
             };
-            return run_linuxcnc(&setup, json, check);
+            return run_linuxcnc(&setup, json, check, may_skip);
         }
         Command::Rate { json, check } => run_rate(json, check),
         Command::Size {
@@ -303,13 +307,17 @@ fn beside(name: &str) -> PathBuf {
     path.join(name)
 }
 
-fn run_linuxcnc(setup: &linuxcnc::Setup, as_json: bool, check: bool) -> ExitCode {
+fn run_linuxcnc(setup: &linuxcnc::Setup, as_json: bool, check: bool, may_skip: bool) -> ExitCode {
     let report = match linuxcnc::run(setup, &mut |text: &str| eprintln!("{text}")) {
         Ok(report) => report,
         Err(error) => {
             eprintln!("{error}");
             let skipped = matches!(error, LinuxCncError::Skipped(_));
-            return ExitCode::from(if skipped && !check { 0 } else { 5 });
+            return ExitCode::from(if skipped && (may_skip || !check) {
+                0
+            } else {
+                5
+            });
         }
     };
     if as_json {

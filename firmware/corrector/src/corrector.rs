@@ -396,7 +396,7 @@ impl Corrector {
         let [offset_m, slew_m_s] = self.bounds;
         let verdict = self
             .guard
-            .pass(offset, offset_m, slew_m_s * self.history.tick_s());
+            .pass(offset, offset_m, slew_m_s, self.history.tick_s());
         let counters = &mut self.counters;
         counters.offset_cuts = counters
             .offset_cuts

@@ -81,6 +81,15 @@ fn install(component: &Path) -> Result<(), LinuxCncError> {
     Ok(())
 }
 
+fn driver() -> String {
+    let parts = [
+        "#!/usr/bin/env python3\n",
+        giotto_link::linuxcnc::drive::COMPLAINT,
+        include_str!("driver.py"),
+    ];
+    parts.concat()
+}
+
 impl Session {
     /// Starts the machine.
     pub(super) fn start(
@@ -108,7 +117,7 @@ impl Session {
         let files = [
             ("machine.ini", machine::ini(acceleration)),
             ("machine.hal", machine::hal(play)),
-            ("driver.py", include_str!("driver.py").to_owned()),
+            ("driver.py", driver()),
         ];
         let mut places: Vec<PathBuf> = vec![folder.clone()];
         for (name, text) in files {
