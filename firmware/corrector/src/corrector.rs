@@ -314,8 +314,8 @@ impl Corrector {
         let lag_s = self.laws.iter().map(Law::lag_s).fold(0.0, f64::max);
         // Not negative; a cast saturates.
         let late = (lag_s / self.history.tick_s()) as usize;
-        let five = self.history.latency().saturating_mul(2);
-        five.saturating_add(late.saturating_add(3))
+        let centre = self.history.latency().saturating_add(late);
+        centre.saturating_mul(2).saturating_add(3)
     }
 
     fn by_slide(&self, places: &[f64; JOINTS], motor_offset: &[f64; JOINTS]) -> [f64; 3] {
@@ -406,7 +406,7 @@ impl Corrector {
         let [offset_m, slew_m_s] = self.bounds;
         let verdict = self
             .guard
-            .pass(offset, offset_m, slew_m_s * self.history.tick_s());
+            .pass(offset, offset_m, slew_m_s, self.history.tick_s());
         let counters = &mut self.counters;
         counters.offset_cuts = counters
             .offset_cuts

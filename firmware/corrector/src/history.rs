@@ -1,6 +1,6 @@
 //! The last set-points of all joints, and the derivatives at a place two strides before the newest.
 //!
-//! What undoes the machine's chain is one filter over five of them a stride `h` apart ([`crate::stencil`]).
+//! What undoes the machine's chain is one filter over some of them ([`crate::stencil`]).
 use crate::settings::JOINTS;
 use crate::stencil::{Inverse, Stencil};
 
@@ -94,11 +94,11 @@ impl History {
     pub(crate) fn offset(&self, joint: usize, stencil: &Stencil) -> f64 {
         let at = |ticks: usize| self.back(ticks).get(joint).copied().unwrap_or(0.0);
         let base = at(self.latency());
-        let newest = stencil
-            .centre
-            .saturating_sub(stencil.stride.saturating_mul(2));
-        let places =
-            (0..5).map(|k: usize| at(newest.saturating_add(k.saturating_mul(stencil.stride))));
+        let places = (0..stencil.weights.len()).map(|k| {
+            at(stencil
+                .newest
+                .saturating_add(k.saturating_mul(stencil.spacing)))
+        });
         let weighted = stencil.weights.iter().zip(places);
         weighted
             .map(|(weight, place)| weight * (place - base))

@@ -38,6 +38,7 @@ mod law;
 pub mod marks;
 mod senses;
 mod settings;
+mod settle;
 mod stencil;
 mod voice;
 mod watch;

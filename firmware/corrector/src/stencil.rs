@@ -1,12 +1,16 @@
-//! The inverse of a machine's chain, as weights of five set-points.
+//! The inverse of a machine's chain, as weights of some set-points.
 //!
 //! Cumulants of even order say how a chain shrinks circles, and a circle at constant rate shows no others. Where the
 //! curvature changes, at each joint of a line and an arc, the odd ones count as well: the operator of κ2 and κ4 alone
 //! leaves a quarter of the error there, whatever its window. So a chain that can be one of a lag τ and a moving average (most
 //! are, or nearly) is undone as that: (1 + τ·d/dt) for the lag, the operator for what is symmetric in time.
 //!
-//! The lag's delay stays: it is the machine's own and the same on all slides. The five points therefore lie about a place τ
+//! The lag's delay stays: it is the machine's own and the same on all slides. The points therefore lie about a place τ
 //! before the one that goes out, and the offset has no part along the velocity.
+//!
+//! Five points are enough for circles. Nine leave the same of them, and where the acceleration jumps they are chosen for the
+//! least error and no harder a pull than need be ([`crate::settle`]).
+use crate::settle::{self, Bend, Chain, TAPS};
 use giotto_shared::law::Operator;
 use giotto_shared::model::Cumulants;
 
@@ -22,16 +26,20 @@ pub(crate) struct Inverse {
     rest: Operator<f64>,
     /// Undoes all, where the history is too short for the lag.
     whole: Operator<f64>,
+    /// What the chain may be.
+    chains: [Chain; 2],
 }
 
 impl Inverse {
     pub(crate) fn new(cumulants: &Cumulants<f64>) -> Self {
         let lag_s = libm::cbrt(0.5 * cumulants.third_of_lag_and_average());
         let square = lag_s * lag_s;
+        let rest_s2 = cumulants.kappa2_s2 - square;
         Self {
             lag_s,
+            chains: Chain::both(cumulants, lag_s),
             rest: Operator::new(&Cumulants {
-                kappa2_s2: cumulants.kappa2_s2 - square,
+                kappa2_s2: rest_s2,
                 kappa4_s4: cumulants.kappa4_s4 - 6.0 * square * square,
             }),
             whole: Operator::new(cumulants),
@@ -44,18 +52,20 @@ impl Inverse {
             lag_s: 0.0,
             rest: self.whole,
             whole: self.whole,
+            chains: self.chains,
         }
     }
 }
 
-/// Five set-points a stride apart, and what each counts.
+/// Set-points as far from each other, and what each counts.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Stencil {
-    /// Ticks from the newest set-point to the middle one.
-    pub(crate) centre: usize,
-    pub(crate) stride: usize,
+    /// Ticks from the newest set-point of all to the newest that counts.
+    pub(crate) newest: usize,
+    /// Ticks between two.
+    pub(crate) spacing: usize,
     /// Of the newest first.
-    pub(crate) weights: [f64; 5],
+    pub(crate) weights: [f64; TAPS],
 }
 
 impl Stencil {
@@ -65,23 +75,41 @@ impl Stencil {
         // Not negative; a cast saturates.
         let late = (inverse.lag_s / tick_s + 0.5) as usize;
         let centre = latency.saturating_add(late);
-        let fits = centre.saturating_add(latency) <= reach;
-        let (centre, series) = if fits {
-            // What rounding to ticks leaves of the delay.
-            let rest_s = inverse.lag_s - late as f64 * tick_s;
-            let lag = [1.0, inverse.lag_s, 0.0, 0.0, 0.0];
-            let undone = product(&lag, &even(&inverse.rest));
-            (centre, product(&undone, &delay(rest_s)))
-        } else {
-            (latency, even(&inverse.whole))
+        // What rounding to ticks leaves of the delay.
+        let rest_s = inverse.lag_s - late as f64 * tick_s;
+        let lag = [1.0, inverse.lag_s, 0.0, 0.0, 0.0];
+        let undone = product(&product(&lag, &even(&inverse.rest)), &delay(rest_s));
+        let five = |centre: usize, series: &Series| Self {
+            newest: centre.saturating_sub(latency),
+            spacing: stride,
+            weights: settle::spread(weights(series, stride as f64 * tick_s), 1),
         };
+        let spacing = (centre / SIDE).min(reach.saturating_sub(centre) / SIDE);
+        if late == 0 || spacing == 0 {
+            let whole = late == 0 && centre.saturating_add(latency) <= reach;
+            return if whole {
+                five(centre, &undone)
+            } else {
+                five(latency, &even(&inverse.whole))
+            };
+        }
+        let spacing_s = spacing as f64 * tick_s;
+        let bend = Bend {
+            chains: inverse.chains,
+            spacing_s,
+            before_s: SIDE as f64 * spacing_s - late as f64 * tick_s,
+        };
+        let wide = weights(&undone, 2.0 * spacing_s);
         Self {
-            centre,
-            stride,
-            weights: weights(&series, stride as f64 * tick_s),
+            newest: centre.saturating_sub(SIDE.saturating_mul(spacing)),
+            spacing,
+            weights: bend.settle(settle::spread(wide, 2)),
         }
     }
 }
+
+/// Points on either side of the middle one.
+const SIDE: usize = TAPS / 2;
 
 const fn even(operator: &Operator<f64>) -> Series {
     [1.0, 0.0, operator.second_s2, 0.0, operator.fourth_s4]
@@ -139,8 +167,7 @@ mod tests {
             .iter()
             .enumerate()
             .map(|(k, weight)| {
-                let ticks = (stencil.centre + (k * stencil.stride)) as f64
-                    - (2 * stencil.stride + latency) as f64;
+                let ticks = (stencil.newest + k * stencil.spacing) as f64 - latency as f64;
                 weight * at(-ticks * TICK_S)
             })
             .sum()
@@ -158,7 +185,7 @@ mod tests {
         let inverse = Inverse::new(&cumulants);
         assert!((inverse.lag_s - lag_s).abs() < 1e-9, "{}", inverse.lag_s);
         let stencil = Stencil::new(&inverse, 15, TICK_S, 1000);
-        assert_eq!(stencil.centre, 50);
+        assert_eq!((stencil.newest, stencil.spacing), (2, 12));
         assert!(applied(&stencil, 30, |t| t).abs() < 1e-15);
         // (1 + τs)e^{−τs} = 1 − τ²s²/2 + τ³s³/3 …; the average: 1 − T²s²/24.
         let square = lag_s * lag_s + window_s * window_s / 12.0;
@@ -178,7 +205,7 @@ mod tests {
             assert_eq!(inverse.lag_s, 0.0);
             let stencil = Stencil::new(&inverse, 15, TICK_S, 1000);
             let fourth = Operator::new(&cumulants).offset(0.0, 24.0);
-            assert_eq!(stencil.centre, 30);
+            assert_eq!((stencil.newest, stencil.spacing), (0, 15));
             assert!((applied(&stencil, 30, |t| t * t) + kappa2_s2).abs() < 1e-15);
             assert!((applied(&stencil, 30, |t| t.powi(4)) - fourth).abs() < 1e-12);
             assert!(applied(&stencil, 30, |t| t.powi(3)).abs() < 1e-15);
@@ -189,7 +216,7 @@ mod tests {
     fn a_lag_longer_than_the_history_is_left_to_the_operator() {
         let inverse = Inverse::new(&Element::Lag { kv_per_s: 2.0 }.cumulants());
         let stencil = Stencil::new(&inverse, 15, TICK_S, 500);
-        assert_eq!(stencil.centre, 30);
+        assert_eq!((stencil.newest, stencil.spacing), (0, 15));
         assert!((applied(&stencil, 30, |t| t * t) + 0.25).abs() < 1e-12);
     }
 }

@@ -1,7 +1,6 @@
-#!/usr/bin/env python3
 """LinuxCNC's "display" in the scenario: does what it is told over a socket, one JSON document a line, and ends with it.
 
-LinuxCNC's own interface is Python. Nothing is judged here.
+LinuxCNC's own interface is Python. Nothing is judged here. giotto_link's `complaint.py` goes before it.
 """
 import json
 import os
@@ -10,9 +9,7 @@ import socket
 import subprocess
 import time
 
-import linuxcnc
-
-command, stat, errors = linuxcnc.command(), linuxcnc.stat(), linuxcnc.error_channel()
+command, stat = linuxcnc.command(), linuxcnc.stat()
 
 
 def hal(*words):
@@ -20,17 +17,6 @@ def hal(*words):
     if done.returncode:
         raise RuntimeError(" ".join(words) + ": " + done.stderr.strip())
     return done.stdout.strip()
-
-
-def complaint():
-    """What LinuxCNC has said since the last call, unless it is only a message."""
-    while True:
-        said = errors.poll()
-        if not said:
-            return None
-        kind, text = said
-        if kind in (linuxcnc.NML_ERROR, linuxcnc.OPERATOR_ERROR) and "realtime delay" not in text:
-            return text
 
 
 def up():

@@ -20,9 +20,13 @@ const AVERAGE_TICKS: usize = 40;
 const PLAY_MM: f64 = 0.020;
 /// X is long by this share.
 const SCALE_X: f64 = 1.5e-4;
-/// Of each axis, mm/s and mm/s².
+/// Highest feed of each axis, mm/s.
 const FEED: f64 = 800.0;
-const ACCELERATION: f64 = 10_000.0;
+/// What each drive can do, mm/s².
+pub(super) const DRIVE: f64 = 10_000.0;
+/// What LinuxCNC may ask of each axis, mm/s². A correction pulls harder than the path where a line meets an arc, and harder
+/// still in a corner: the drive has to have that to give.
+pub(super) const ACCELERATION: f64 = 3000.0;
 /// Soft limits, mm.
 const LIMIT: f64 = 500.0;
 
@@ -36,8 +40,8 @@ pub enum Play {
     Behind,
 }
 
-/// LinuxCNC's configuration.
-pub(super) fn ini() -> String {
+/// LinuxCNC's configuration; `acceleration`: the planner's, mm/s².
+pub(super) fn ini(acceleration: f64) -> String {
     let mut out = format!(
         "[EMC]\nVERSION = 1.1\nMACHINE = giotto-scenario\nDEBUG = 0\n\
          [DISPLAY]\nDISPLAY = ./driver.py\n\
@@ -47,18 +51,18 @@ pub(super) fn ini() -> String {
          [HAL]\nHALFILE = machine.hal\nHALUI = halui\n\
          [EMCIO]\nEMCIO = io\nCYCLE_TIME = 0.1\n\
          [TRAJ]\nCOORDINATES = X Y Z\nLINEAR_UNITS = mm\nANGULAR_UNITS = degree\nDEFAULT_LINEAR_VELOCITY = 50\n\
-         MAX_LINEAR_VELOCITY = {FEED}\nMAX_LINEAR_ACCELERATION = {ACCELERATION}\nNO_FORCE_HOMING = 1\n\
+         MAX_LINEAR_VELOCITY = {FEED}\nMAX_LINEAR_ACCELERATION = {acceleration}\nNO_FORCE_HOMING = 1\n\
          [KINS]\nKINEMATICS = trivkins coordinates=XYZ\nJOINTS = {AXES}\n"
     );
     for (joint, axis) in ["X", "Y", "Z"].into_iter().enumerate() {
         let limits = format!(
-            "MIN_LIMIT = -{LIMIT}\nMAX_LIMIT = {LIMIT}\nMAX_VELOCITY = {FEED}\nMAX_ACCELERATION = {ACCELERATION}\n"
+            "MIN_LIMIT = -{LIMIT}\nMAX_LIMIT = {LIMIT}\nMAX_VELOCITY = {FEED}\nMAX_ACCELERATION = {acceleration}\n"
         );
         // Writing to a String does not fail.
         let _ = write!(
             out,
             "[AXIS_{axis}]\n{limits}[JOINT_{joint}]\nTYPE = LINEAR\nHOME = 0\n{limits}\
-             FERROR = 40\nMIN_FERROR = 40\nHOME_SEARCH_VEL = 0\nHOME_LATCH_VEL = 0\nHOME_SEQUENCE = 0\n"
+             STEPGEN_MAXACCEL = {DRIVE}\nFERROR = 40\nMIN_FERROR = 40\nHOME_SEARCH_VEL = 0\nHOME_LATCH_VEL = 0\nHOME_SEQUENCE = 0\n"
         );
     }
     out
@@ -180,7 +184,7 @@ impl Parts {
 }
 
 /// What is added is sampled times this, so that its last bit shows among the digits.
-const LOUD: f64 = 1e15;
+pub(super) const LOUD: f64 = 1e15;
 
 /// Its HAL.
 pub(super) fn hal(play: Play) -> String {

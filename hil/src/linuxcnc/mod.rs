@@ -34,6 +34,9 @@ use std::time::Duration;
 
 /// Of the radius error, the out-of-roundness and the contour error so many percent have to go.
 pub const BARS_PERCENT: [f64; 3] = [98.0, 70.0, 90.0];
+/// The same of the short scenario: from a dozen circles in one plane the fourth cumulant is not told from a lag's, and play not
+/// from friction; both show in corners.
+pub const SHORT_BARS_PERCENT: [f64; 3] = [98.0, 70.0, 70.0];
 /// What the function may take, µs: the median.
 pub const UPDATE_BAR_US: f64 = 20.0;
 
@@ -85,8 +88,8 @@ pub struct Report {
     pub before: Left,
     /// See `before`.
     pub component: Left,
-    /// See `before`.
-    pub compensated: Left,
+    /// See `before`; not in the short scenario.
+    pub compensated: Option<Left>,
     /// What was found.
     pub findings: Vec<String>,
     /// Runs that were diagnosed.
@@ -95,6 +98,8 @@ pub struct Report {
     pub touched: [usize; 2],
     /// The part's contour error while the correction was switched off by `bypass on`, µm.
     pub bypassed_um: f64,
+    /// Largest acceleration of the set-points that a drive got on the part: without correction, and with it, mm/s².
+    pub hardest_mm_s2: [f64; 2],
     /// Commands of `giotto` that did what they say.
     pub commands: Vec<String>,
     /// Time of the function: the median of looks, and the longest, µs.
@@ -102,15 +107,23 @@ pub struct Report {
 }
 
 impl Report {
+    fn bars_percent(&self) -> [f64; 3] {
+        match self.compensated {
+            Some(_) => BARS_PERCENT,
+            None => SHORT_BARS_PERCENT,
+        }
+    }
+
     /// Whether all bars are met.
     pub fn meets_bars(&self) -> bool {
         let gains = self.component.gains_percent(&self.before);
         gains
             .iter()
-            .zip(BARS_PERCENT)
+            .zip(self.bars_percent())
             .all(|(gain, bar)| *gain >= bar)
             && self.update_us[0] <= UPDATE_BAR_US
             && self.touched == [0; 2]
+            && self.hardest_mm_s2[1] <= machine::DRIVE
             && (self.bypassed_um / self.before.contour_um - 1.0).abs() < BYPASSED
     }
 
@@ -125,9 +138,10 @@ impl Report {
             })
         };
         json!({
-            "before": left(&self.before), "component": left(&self.component), "compensate": left(&self.compensated),
+            "before": left(&self.before), "component": left(&self.component), "compensate": self.compensated.as_ref().map(left),
             "findings": self.findings, "runs": self.runs, "touched_ticks": self.touched,
-            "bypassed_contour_um": self.bypassed_um, "commands": self.commands, "update_us": self.update_us, "bars_percent": BARS_PERCENT,
+            "bypassed_contour_um": self.bypassed_um, "commands": self.commands, "update_us": self.update_us,
+            "hardest_mm_s2": self.hardest_mm_s2, "drive_mm_s2": machine::DRIVE, "bars_percent": self.bars_percent(),
             "met": self.meets_bars(),
         })
     }
@@ -143,41 +157,63 @@ const fn circle(radius_mm: f64, feed_mm_s: f64, ccw: bool, plane: Plane) -> Circ
     }
 }
 
-/// With what the first look is taken, each both ways: slow circles, which show play and scale sharply, and fast ones in all planes.
+/// With what the first look is taken, each both ways: slow circles, which show play and scale sharply, and fast ones in all
+/// planes, a small one among them: the fourth cumulant shows by the turns a second.
 const FIRST: [(f64, f64, Plane); 12] = [
     (60.0, 20.0, Plane::Xy),
     (30.0, 50.0, Plane::Xy),
     (100.0, 200.0, Plane::Xy),
-    (60.0, 400.0, Plane::Xy),
+    (60.0, 370.0, Plane::Xy),
     (30.0, 20.0, Plane::Yz),
     (60.0, 50.0, Plane::Yz),
-    (20.0, 300.0, Plane::Yz),
+    (10.0, 150.0, Plane::Yz),
     (30.0, 100.0, Plane::Yz),
     (100.0, 20.0, Plane::Zx),
     (30.0, 50.0, Plane::Zx),
     (60.0, 100.0, Plane::Zx),
-    (30.0, 300.0, Plane::Zx),
+    (30.0, 260.0, Plane::Zx),
 ];
 
-fn first() -> Vec<Circle> {
-    FIRST
-        .into_iter()
+/// The same of the short scenario, in one plane.
+const FIRST_SHORT: [(f64, f64, Plane); 6] = [
+    (20.0, 20.0, Plane::Xy),
+    (30.0, 50.0, Plane::Xy),
+    (30.0, 120.0, Plane::Xy),
+    (60.0, 200.0, Plane::Xy),
+    (10.0, 150.0, Plane::Xy),
+    (60.0, 370.0, Plane::Xy),
+];
+
+fn first(short: bool) -> Vec<Circle> {
+    let list: &[_] = if short { &FIRST_SHORT } else { &FIRST };
+    list.iter()
+        .copied()
         .flat_map(|(radius_mm, feed_mm_s, plane)| {
             [true, false].map(|ccw| circle(radius_mm, feed_mm_s, ccw, plane))
         })
         .collect()
 }
 
-/// With what it is proven.
+/// With what it is proven. LinuxCNC gives 0.87 of an axis' acceleration to a curve: 228 mm/s on R 20 mm.
 const PROOF: [Circle; 7] = [
     circle(20.0, 20.0, true, Plane::Xy),
     circle(20.0, 100.0, true, Plane::Xy),
-    circle(20.0, 280.0, false, Plane::Yz),
+    circle(20.0, 210.0, false, Plane::Yz),
     circle(50.0, 200.0, true, Plane::Zx),
     circle(80.0, 300.0, false, Plane::Xy),
     circle(150.0, 400.0, true, Plane::Yz),
     circle(200.0, 400.0, false, Plane::Zx),
 ];
+
+const PROOF_SHORT: [Circle; 3] = [
+    circle(20.0, 100.0, true, Plane::Xy),
+    circle(50.0, 300.0, false, Plane::Xy),
+    circle(80.0, 350.0, true, Plane::Xy),
+];
+
+const fn proof(short: bool) -> &'static [Circle] {
+    if short { &PROOF_SHORT } else { &PROOF }
+}
 
 fn failed(what: impl std::fmt::Display) -> LinuxCncError {
     LinuxCncError::failed(what)
@@ -240,13 +276,20 @@ struct Proof {
     left: Left,
     /// Ticks in which the component changed anything.
     touched: usize,
+    /// On the part, mm/s².
+    hardest: f64,
 }
 
 /// Runs the proof; `programs`: circles and part, as they are or compensated.
-fn prove(session: &mut Session, name: &str, programs: [&[u8]; 2]) -> Result<Proof, LinuxCncError> {
+fn prove(
+    session: &mut Session,
+    name: &str,
+    proof: &[Circle],
+    programs: [&[u8]; 2],
+) -> Result<Proof, LinuxCncError> {
     let [circles, part] = programs;
     let folder = session.place(format!("{name}-campaign"));
-    let touched = measure(session, name, circles, &listed(&PROOF), &folder)?;
+    let touched = measure(session, name, circles, &listed(proof), &folder)?;
     let campaign = read(&folder).map_err(failed)?;
     let report = of_campaign(&campaign)
         .map_err(|(run, error)| failed(format!("{name}, run {run}: {error}")))?;
@@ -262,6 +305,7 @@ fn prove(session: &mut Session, name: &str, programs: [&[u8]; 2]) -> Result<Proo
             contour_um: samples::contour(&recording.rows) * 1e3,
         },
         touched: touched + recording.touched(),
+        hardest: samples::hardest(&recording.rows),
     })
 }
 
@@ -325,21 +369,41 @@ pub struct Setup {
     pub giotto: PathBuf,
     /// Where the play lies.
     pub play: Play,
+    /// What LinuxCNC may ask of an axis, mm/s².
+    pub acceleration: f64,
+    /// Fewer circles, one plane, no rewritten programs: some minutes.
+    pub short: bool,
     /// Programs, samples and campaigns stay here.
     pub keep: Option<PathBuf>,
 }
+
+/// What LinuxCNC may ask of an axis unless something else is said, mm/s².
+pub const ACCELERATION: f64 = machine::ACCELERATION;
 
 /// Runs the scenario.
 ///
 /// # Errors
 /// [`LinuxCncError::Skipped`] where there is no LinuxCNC.
 pub fn run(setup: &Setup, note: &mut dyn FnMut(&str)) -> Result<Report, LinuxCncError> {
+    if let Some(folder) = &setup.keep
+        && folder.join("campaign").exists()
+    {
+        let folder = folder.display();
+        return Err(failed(format!(
+            "{folder} holds an earlier run: its circles would count as well"
+        )));
+    }
     let mut commands = Commands::new(&setup.giotto)?;
-    let mut session = Session::start(&setup.component, setup.play, setup.keep.as_deref())?;
+    let mut session = Session::start(
+        &setup.component,
+        setup.play,
+        setup.acceleration,
+        setup.keep.as_deref(),
+    )?;
     session.order(&json!({ "do": "up" }))?;
     note("LinuxCNC runs; first circles");
     let campaign = session.place("campaign");
-    let circles = first();
+    let circles = first(setup.short);
     measure(
         &mut session,
         "first",
@@ -347,22 +411,31 @@ pub fn run(setup: &Setup, note: &mut dyn FnMut(&str)) -> Result<Report, LinuxCnc
         &listed(&circles),
         &campaign,
     )?;
-    planned(&mut session, &campaign, note)?;
+    if !setup.short {
+        planned(&mut session, &campaign, note)?;
+    }
     let (model, findings, runs) = model_of(&campaign, note)?;
 
-    let (circles, part) = (programs::circles(&PROOF), programs::PART);
+    let proof = proof(setup.short);
+    let (circles, part) = (programs::circles(proof), programs::PART);
     let plain = [circles.as_bytes(), part.as_bytes()];
     note("the proof without correction");
-    let before = prove(&mut session, "before", plain)?;
-    note("the same programs, compensated");
-    let compensated = compensated(&mut session, &model, plain, note)?;
+    let before = prove(&mut session, "before", proof, plain)?;
+    let compensated = if setup.short {
+        None
+    } else {
+        note("the same programs, compensated");
+        let rewritten = compensated(&model, setup.acceleration, plain, note);
+        let [circles, part] = &rewritten;
+        Some(prove(&mut session, "compensated", proof, [circles, part])?)
+    };
 
     note("flashed into the running component; the proof with it");
     let file = session.place("model.toml");
     model.save(&file).map_err(failed)?;
     commands.flash(&file)?;
     session.set("giotto.enable", "1")?;
-    let component = prove(&mut session, "component", plain)?;
+    let component = prove(&mut session, "component", proof, plain)?;
     let update_us = update_us(&mut session)?;
     note("the other commands");
     commands.there_and_back(&campaign)?;
@@ -375,11 +448,12 @@ pub fn run(setup: &Setup, note: &mut dyn FnMut(&str)) -> Result<Report, LinuxCnc
     std::thread::sleep(Duration::from_secs(1));
     let after = samples::run(&mut session, "after", part.as_bytes(), 60)?;
     Ok(Report {
-        circles: PROOF.to_vec(),
+        circles: proof.to_vec(),
         touched: [before.touched, after.touched()],
         before: before.left,
         component: component.left,
-        compensated: compensated.left,
+        compensated: compensated.map(|proof| proof.left),
+        hardest_mm_s2: [before.hardest, component.hardest],
         findings,
         runs,
         bypassed_um: samples::contour(&bypassed.rows) * 1e3,
@@ -395,20 +469,20 @@ fn listed(circles: &[Circle]) -> Vec<(f64, f64, Direction)> {
         .collect()
 }
 
-/// The proof with rewritten programs.
+/// Programs rewritten for a model.
 fn compensated(
-    session: &mut Session,
     model: &ModelFile,
+    acceleration: f64,
     plain: [&[u8]; 2],
     note: &mut dyn FnMut(&str),
-) -> Result<Proof, LinuxCncError> {
+) -> [Vec<u8>; 2] {
     let options = giotto_nc::Options {
-        acceleration_mm_s2: 8000.0,
+        acceleration_mm_s2: 0.8 * acceleration,
         max_offset_mm: 5.0,
         all_planes: true,
         ..giotto_nc::Options::default()
     };
-    let rewritten = plain.map(|program| {
+    plain.map(|program| {
         let done = giotto_nc::compensate(program, model, &options);
         let corrected =
             |arc: &&giotto_nc::Report| matches!(arc.fate, giotto_nc::Fate::Corrected { .. });
@@ -418,8 +492,7 @@ fn compensated(
             done.arcs.len()
         ));
         done.program
-    });
-    prove(session, "compensated", [&rewritten[0], &rewritten[1]])
+    })
 }
 
 /// Runs the program of `giotto plan`.
@@ -435,7 +508,7 @@ fn planned(
             radii_m: vec![0.03, 0.06],
             largest_radius_m: Some(0.06),
             highest_feed_m_s: Some(0.4),
-            highest_acceleration_m_s2: Some(5.0),
+            highest_acceleration_m_s2: Some(2.4),
         },
         most_runs: 1,
         seed: 1,

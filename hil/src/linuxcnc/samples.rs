@@ -1,5 +1,5 @@
 //! What halsampler has written: the planner's set-points and the measured places, a row a tick.
-use super::machine::AXES;
+use super::machine::{AXES, LOUD, TICK_S};
 use super::session::{LinuxCncError, Session};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -14,8 +14,8 @@ pub(super) struct Row {
     /// mm.
     pub(super) commanded: [f64; AXES],
     pub(super) measured: [f64; AXES],
-    /// What was sent to the drives is not what the planner said, in any bit.
-    pub(super) touched: bool,
+    /// What was sent to the drives beside what the planner said, mm; 0 only where it is the same to the last bit.
+    pub(super) added: [f64; AXES],
     /// The planner is on an arc.
     arc: bool,
 }
@@ -38,7 +38,7 @@ fn row(line: &str) -> Option<Row> {
         tick,
         commanded,
         measured,
-        touched: added != [0.0; AXES],
+        added: added.map(|loud| loud / LOUD),
         arc,
     })
 }
@@ -77,7 +77,10 @@ const MARGIN_TICKS: usize = 100;
 impl Recording {
     /// Ticks in which the component changed anything.
     pub(super) fn touched(&self) -> usize {
-        self.rows.iter().filter(|row| row.touched).count()
+        self.rows
+            .iter()
+            .filter(|row| row.added != [0.0; AXES])
+            .count()
     }
 
     /// The rows of each run. A program stands still before and after each, and between two positions itself, without arcs;
@@ -114,6 +117,20 @@ pub(super) fn write(rows: &[Row], folder: &Path, name: &str) -> Result<PathBuf, 
     }
     std::fs::write(&file, text).map_err(LinuxCncError::failed)?;
     Ok(file)
+}
+
+/// Largest acceleration of what was sent to a drive, mm/s².
+pub(super) fn hardest(rows: &[Row]) -> f64 {
+    let sent = |row: &Row, axis: usize| row.commanded[axis] + row.added[axis];
+    let mut hardest = 0.0f64;
+    for three in rows.windows(3) {
+        for axis in 0..AXES {
+            let change =
+                sent(&three[2], axis) - 2.0 * sent(&three[1], axis) + sent(&three[0], axis);
+            hardest = hardest.max(change.abs() / (TICK_S * TICK_S));
+        }
+    }
+    hardest
 }
 
 /// Largest distance of a measured place from the commanded path, mm.

@@ -81,11 +81,21 @@ fn install(component: &Path) -> Result<(), LinuxCncError> {
     Ok(())
 }
 
+fn driver() -> String {
+    let parts = [
+        "#!/usr/bin/env python3\n",
+        giotto_link::linuxcnc::drive::COMPLAINT,
+        include_str!("driver.py"),
+    ];
+    parts.concat()
+}
+
 impl Session {
     /// Starts the machine.
     pub(super) fn start(
         component: &Path,
         play: Play,
+        acceleration: f64,
         keep: Option<&Path>,
     ) -> Result<Self, LinuxCncError> {
         install(component)?;
@@ -105,9 +115,9 @@ impl Session {
                 .unwrap_or_default(),
         };
         let files = [
-            ("machine.ini", machine::ini()),
+            ("machine.ini", machine::ini(acceleration)),
             ("machine.hal", machine::hal(play)),
-            ("driver.py", include_str!("driver.py").to_owned()),
+            ("driver.py", driver()),
         ];
         let mut places: Vec<PathBuf> = vec![folder.clone()];
         for (name, text) in files {

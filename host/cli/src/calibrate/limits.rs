@@ -8,6 +8,8 @@ use std::f64::consts::TAU;
 
 /// Radius if nothing else is said, mm.
 const USUAL_RADIUS_MM: f64 = 150.0;
+/// The least of them, mm, however slow a machine is.
+const LEAST_USUAL_MM: f64 = 10.0;
 /// Of the controller's room and feed so much is used: the correction needs some of them.
 const SHARE: f64 = 0.8;
 /// Of its acceleration so much is asked for across the path. Nearer to what the axes can do a machine turns so fast that its
@@ -19,15 +21,23 @@ const RADII: [f64; 3] = [1.0, 0.6, 0.4];
 const FEEDS: [f64; 4] = [0.1, 0.4, 0.7, 1.0];
 /// Those of the circles that prove it: none of them is in the plan.
 const PROOF: [[f64; 2]; 3] = [[0.9, 0.85], [0.7, 0.95], [0.5, 0.6]];
-/// Turns and ramps of one circle, turns; way to it and rest, s.
+/// Turns and ramps of one circle on a controller of giotto and in LinuxCNC, turns; way to it and rest, s.
 const TURNS: f64 = 3.0;
+const LINUXCNC_TURNS: f64 = 1.75;
 const REST_S: f64 = 1.0;
+/// No circle of a machine that is there takes longer, s: with feeds of hobby machines a tenth of the highest one would be
+/// minutes.
+const LONGEST_S: f64 = 16.0;
 /// How far and how fast the plan may go.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
     pub(super) radius_mm: f64,
     pub(super) feed_mm_s: f64,
     pub(super) acceleration_mm_s2: f64,
+    /// Turns and ramps of one circle.
+    turns: f64,
+    /// Longest circle, s.
+    longest_s: f64,
 }
 
 /// To a tenth, as a person programs it.
@@ -59,13 +69,22 @@ impl Limits {
             (of.room_mm, of.feed_mm_s, of.acceleration_mm_s2)
         };
         let least = |given: Option<f64>, limit: f64| given.unwrap_or(limit).min(limit);
+        let feed_mm_s = least(args.max_feed, SHARE * feed_mm_s);
+        let acceleration_mm_s2 = least(args.max_acceleration, CENTRIPETAL * acceleration_mm_s2);
+        // On a larger one the highest feed turns slower: it takes longer and shows less.
+        let useful_mm = feed_mm_s * feed_mm_s / acceleration_mm_s2;
+        let usual_mm = USUAL_RADIUS_MM.min(useful_mm.max(LEAST_USUAL_MM));
+        let (turns, longest_s) = if machine.is_simulated() {
+            (TURNS, f64::INFINITY)
+        } else {
+            (LINUXCNC_TURNS, LONGEST_S)
+        };
         let limits = Self {
-            radius_mm: args
-                .max_radius
-                .unwrap_or(USUAL_RADIUS_MM)
-                .min(SHARE * room_mm),
-            feed_mm_s: least(args.max_feed, SHARE * feed_mm_s),
-            acceleration_mm_s2: least(args.max_acceleration, CENTRIPETAL * acceleration_mm_s2),
+            radius_mm: args.max_radius.unwrap_or(usual_mm).min(SHARE * room_mm),
+            feed_mm_s,
+            acceleration_mm_s2,
+            turns,
+            longest_s,
         };
         if limits.radius_mm < 1.0 {
             return Err(Failure::controller(format_args!(
@@ -73,6 +92,13 @@ impl Limits {
             )));
         }
         Ok(limits)
+    }
+
+    /// How long circles take both ways, s.
+    pub(super) fn duration_s(&self, circles: &[(f64, f64)]) -> f64 {
+        let both_ways =
+            |(radius, feed): &(f64, f64)| 2.0 * (self.turns * TAU * radius / feed + REST_S);
+        circles.iter().map(both_ways).sum()
     }
 
     /// Smallest radius of the plan, mm.
@@ -88,7 +114,9 @@ impl Limits {
 
     fn at(&self, [radius, feed]: [f64; 2]) -> (f64, f64) {
         let radius_mm = tenths(radius * self.radius_mm);
-        (radius_mm, tenths(feed * self.highest(radius_mm)))
+        let highest = self.highest(radius_mm);
+        let slowest = (self.turns * TAU * radius_mm / self.longest_s).min(highest);
+        (radius_mm, tenths((feed * highest).max(slowest)))
     }
 
     /// Radius, mm, and feed, mm/s, of the circles to be measured, each both ways.
@@ -100,12 +128,6 @@ impl Limits {
     pub(super) fn proof(&self) -> [(f64, f64); 3] {
         PROOF.map(|pair| self.at(pair))
     }
-}
-
-/// How long the circles take, s.
-pub(super) fn duration_s(circles: &[(f64, f64)]) -> f64 {
-    let both_ways = |(radius, feed): &(f64, f64)| 2.0 * (TURNS * TAU * radius / feed + REST_S);
-    circles.iter().map(both_ways).sum()
 }
 
 #[cfg(test)]
@@ -123,6 +145,8 @@ mod tests {
             radius_mm: 150.0,
             feed_mm_s: 800.0,
             acceleration_mm_s2: 4000.0,
+            turns: TURNS,
+            longest_s: f64::INFINITY,
         };
         let circles = limits.circles();
         assert_eq!(circles.len(), 12);
@@ -133,6 +157,26 @@ mod tests {
             assert!(circles.iter().all(|(r, f)| *r != radius && *f != feed));
         }
         let [slow, ..] = circles[..] else { panic!() };
-        assert!((duration_s(&[slow]) - 2.0 * (3.0 * TAU * slow.0 / slow.1 + 1.0)).abs() < 1e-9);
+        assert!(
+            (limits.duration_s(&[slow]) - 2.0 * (3.0 * TAU * slow.0 / slow.1 + 1.0)).abs() < 1e-9
+        );
+    }
+
+    /// LinuxCNC's own simulated machine: 53 mm/s and 508 mm/s², both of a hobby mill.
+    #[test]
+    fn a_slow_machine_is_done_in_five_minutes() {
+        let limits = Limits {
+            radius_mm: 18.0,
+            feed_mm_s: 42.7,
+            acceleration_mm_s2: 101.6,
+            turns: LINUXCNC_TURNS,
+            longest_s: LONGEST_S,
+        };
+        let whole_s =
+            limits.duration_s(&limits.circles()) + 2.0 * limits.duration_s(&limits.proof());
+        assert!(whole_s < 300.0, "{whole_s}");
+        for (radius, feed) in limits.circles() {
+            assert!(LINUXCNC_TURNS * TAU * radius / feed < LONGEST_S + 1.0);
+        }
     }
 }

@@ -94,41 +94,119 @@ fn cut<'a>(samples: &'a [Sample], circles: &[Circle], period_s: f64) -> Vec<&'a 
     found
 }
 
-/// Runs circles in LinuxCNC; the campaign is kept in `folder`.
+/// Whether set-points have kept the feed of a circle. On a busy computer LinuxCNC's planner waits for the next block, and what
+/// the machine then does is no circle at that feed.
+fn kept_feed(samples: &[Sample], (radius_mm, feed_mm_s, _): &Circle, period_s: f64) -> bool {
+    let on_circle = |sample: &Sample| {
+        let [x, y, _] = sample.commanded_mm;
+        (x.hypot(y) - radius_mm).abs() < ON_CIRCLE_MM
+    };
+    let angle = |sample: &Sample| sample.commanded_mm[1].atan2(sample.commanded_mm[0]);
+    let mut quarters = [0.0f64; 4];
+    let mut turned = 0.0;
+    for pair in samples.windows(2).filter(|pair| pair.iter().all(on_circle)) {
+        let step = angle(&pair[1]) - angle(&pair[0]);
+        let step = (step - TAU * (step / TAU).round()).abs();
+        turned += step;
+        // The quarters between 1/4 and 5/4 of a turn: away from both ends.
+        let quarter = (turned / (0.25 * TAU)) as usize;
+        if let Some(time_s) = quarter.checked_sub(1).and_then(|k| quarters.get_mut(k)) {
+            *time_s += period_s;
+        }
+    }
+    let meant_s = 0.25 * TAU * radius_mm / feed_mm_s;
+    let slack_s = FEED_SLACK * meant_s + 2.0 * period_s;
+    quarters
+        .iter()
+        .all(|time_s| (time_s - meant_s).abs() < slack_s)
+}
+
+/// Set-points that lie so near to a circle are on it, mm.
+const ON_CIRCLE_MM: f64 = 0.05;
+/// So much may a quarter of a circle take longer, or less long, than its feed says.
+const FEED_SLACK: f64 = 0.02;
+/// So often circles are run again whose feed was not kept.
+const AGAIN: usize = 2;
+
+/// Runs circles in LinuxCNC, those again that were not run as they should; the campaign is kept in `folder`.
 pub(super) fn measure(
     circles: &[(f64, f64)],
     folder: &Path,
     wish: &AtomicBool,
 ) -> Result<Campaign, Failure> {
+    let failed =
+        |what: &dyn std::fmt::Display| Failure::input(format_args!("{}: {what}", folder.display()));
+    let period_s = drive::period_s()?;
     let circles = both_ways(circles);
+    let mut kept: Vec<Option<Vec<Sample>>> = vec![None; circles.len()];
+    for _ in 0..=AGAIN {
+        let open: Vec<usize> = (0..circles.len()).filter(|k| kept[*k].is_none()).collect();
+        if open.is_empty() {
+            break;
+        }
+        let list: Vec<Circle> = open.iter().map(|k| circles[*k]).collect();
+        let samples = ran(&list, wish)?;
+        let runs = cut(&samples, &list, period_s);
+        if runs.len() != list.len() {
+            return Err(Failure::controller(format_args!(
+                "{} circles were seen of {}: did LinuxCNC wait on its way?",
+                runs.len(),
+                list.len()
+            )));
+        }
+        for (k, rows) in open.into_iter().zip(runs) {
+            if kept_feed(rows, &circles[k], period_s) {
+                kept[k] = Some(rows.to_vec());
+            }
+        }
+    }
+    for (rows, circle) in kept.iter().zip(&circles) {
+        let (radius_mm, feed_mm_s, _) = circle;
+        let rows = rows.as_ref().ok_or_else(|| {
+            Failure::controller(format_args!(
+                "LinuxCNC did not keep its feed on R {radius_mm} mm at {feed_mm_s} mm/s"
+            ))
+            .help("give this computer less to do beside it, or lower --max-feed and --max-acceleration")
+        })?;
+        add_circle(rows, circle, period_s, folder)?;
+    }
+    read(folder).map_err(|error| failed(&error))
+}
+
+/// Has LinuxCNC run circles.
+fn ran(circles: &[Circle], wish: &AtomicBool) -> Result<Vec<Sample>, Failure> {
+    let failed = |error: std::io::Error| Failure::input(format_args!("the program: {error}"));
+    let work = tempfile::tempdir().map_err(failed)?;
+    let file = work.path().join("circles.ngc");
+    std::fs::write(&file, program(circles)).map_err(failed)?;
+    let motion_s = |(r, f, _): &Circle| (TURNS * TAU * r + 4.0 * r) / f + 10.0;
+    let whole_s: f64 = circles.iter().map(motion_s).sum();
+    Ok(drive::run(
+        &file,
+        Duration::from_secs_f64(2.0 * whole_s),
+        wish,
+    )?)
+}
+
+/// Adds a circle to the campaign.
+fn add_circle(
+    rows: &[Sample],
+    circle: &Circle,
+    period_s: f64,
+    folder: &Path,
+) -> Result<(), Failure> {
     let failed =
         |what: &dyn std::fmt::Display| Failure::input(format_args!("{}: {what}", folder.display()));
     let work = tempfile::tempdir().map_err(|error| failed(&error))?;
-    let file = work.path().join("circles.ngc");
-    std::fs::write(&file, program(&circles)).map_err(|error| failed(&error))?;
-    let period_s = drive::period_s()?;
-    let motion_s = |(r, f, _): &Circle| (TURNS * TAU * r + 4.0 * r) / f + 10.0;
-    let whole_s: f64 = circles.iter().map(motion_s).sum();
-    let samples = drive::run(&file, Duration::from_secs_f64(2.0 * whole_s), wish)?;
-    let runs = cut(&samples, &circles, period_s);
-    if runs.len() != circles.len() {
-        return Err(Failure::controller(format_args!(
-            "{} circles were seen of {}: did LinuxCNC wait on its way?",
-            runs.len(),
-            circles.len()
-        )));
+    let file = work.path().join("circle.csv");
+    let mut text = String::from("time_s,x_mm,y_mm,z_mm\n");
+    for (row, sample) in rows.iter().enumerate() {
+        let [x, y, z] = sample.measured_mm;
+        let _ = writeln!(text, "{:.6},{x:.6},{y:.6},{z:.6}", row as f64 * period_s);
     }
-    for (k, (rows, circle)) in runs.into_iter().zip(&circles).enumerate() {
-        let file = work.path().join(format!("circle{k:02}.csv"));
-        let mut text = String::from("time_s,x_mm,y_mm,z_mm\n");
-        for (row, sample) in rows.iter().enumerate() {
-            let [x, y, z] = sample.measured_mm;
-            let _ = writeln!(text, "{:.6},{x:.6},{y:.6},{z:.6}", row as f64 * period_s);
-        }
-        std::fs::write(&file, text).map_err(|error| failed(&error))?;
-        add(&[file], folder, &options(circle), &|_, _| ()).map_err(|error| failed(&error))?;
-    }
-    read(folder).map_err(|error| failed(&error))
+    std::fs::write(&file, text).map_err(|error| failed(&error))?;
+    add(&[file], folder, &options(circle), &|_, _| ()).map_err(|error| failed(&error))?;
+    Ok(())
 }
 
 fn options((radius_mm, feed_mm_s, direction): &Circle) -> Options {
@@ -231,6 +309,26 @@ mod tests {
         // One that LinuxCNC did not run to its end is missed.
         let half = &samples[..samples.len() - 5000];
         assert_eq!(cut(half, &circles, 1e-3).len(), 3);
+    }
+
+    #[test]
+    fn a_circle_on_which_the_planner_waited_is_run_again() {
+        let circles = both_ways(&[(150.0, 300.0), (60.0, 100.0)]);
+        let samples = walked(&circles);
+        for (rows, circle) in cut(&samples, &circles, 1e-3).into_iter().zip(&circles) {
+            assert!(kept_feed(rows, circle, 1e-3));
+            // A tenth of a second at one place, in the middle of it.
+            let middle = rows.len() / 2;
+            let waited: Vec<Sample> = rows[..middle]
+                .iter()
+                .chain(std::iter::repeat_n(&rows[middle], 100))
+                .chain(&rows[middle..])
+                .copied()
+                .collect();
+            assert!(!kept_feed(&waited, circle, 1e-3));
+            let (r, f, way) = *circle;
+            assert!(!kept_feed(rows, &(r, 1.05 * f, way), 1e-3));
+        }
     }
 
     #[test]

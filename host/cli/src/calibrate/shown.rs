@@ -1,5 +1,5 @@
 //! What is said of a calibration.
-use super::limits::{Limits, duration_s};
+use super::limits::Limits;
 use super::{Args, Eyes};
 use crate::Output;
 use crate::grid::width;
@@ -31,7 +31,7 @@ pub(super) fn propose(limits: &Limits, controller: &Controller, simulated: bool,
         limits.radius_mm,
         limits.feed_mm_s,
         limits.acceleration_mm_s2,
-        duration_s(&circles)
+        limits.duration_s(&circles)
     ));
 }
 
@@ -82,7 +82,7 @@ pub(super) fn document(
         "simulated": simulated,
         "measured_by": if eyes { "encoders" } else { "ballbar" },
         "plan": circles.iter().map(pair).collect::<Vec<_>>(),
-        "motion_s": duration_s(&circles),
+        "motion_s": limits.duration_s(&circles),
         "findings": found.findings,
         "expected": { "heldout_rms_um": found.extended.heldout_rms_um, "without_um": found.baseline.heldout_rms_um },
         "flashed": { "slot": proof.flashed.slot, "generation": proof.flashed.generation },

@@ -1,6 +1,6 @@
 """Asks LinuxCNC for its limits, or has it run a program: LinuxCNC's own interface is Python.
 
-Arguments: `limits`, or `run FILE SECONDS`. One JSON document on stdout.
+Arguments: `limits`, or `run FILE SECONDS`. One JSON document on stdout. `complaint.py` goes before it.
 """
 import json
 import os
@@ -8,19 +8,7 @@ import select
 import sys
 import time
 
-import linuxcnc
-
-command, stat, errors = linuxcnc.command(), linuxcnc.stat(), linuxcnc.error_channel()
-
-
-def complaint():
-    while True:
-        said = errors.poll()
-        if not said:
-            return None
-        kind, text = said
-        if kind in (linuxcnc.NML_ERROR, linuxcnc.OPERATOR_ERROR) and "realtime delay" not in text:
-            return text
+command, stat = linuxcnc.command(), linuxcnc.stat()
 
 
 def ready():

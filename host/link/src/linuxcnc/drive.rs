@@ -7,8 +7,10 @@ use std::process::{Child, Command, Output, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
-/// LinuxCNC's own interface.
-const DRIVER: &str = include_str!("drive.py");
+/// LinuxCNC's own interface, in Python.
+const DRIVER: &str = concat!(include_str!("complaint.py"), include_str!("drive.py"));
+/// Python's `complaint()`: what LinuxCNC has said of an error since the last call. For whoever else drives a LinuxCNC.
+pub const COMPLAINT: &str = include_str!("complaint.py");
 /// The machine is watched for so long before and after a program.
 const MARGIN: Duration = Duration::from_millis(500);
 /// How often the page is read: it keeps some seconds.
