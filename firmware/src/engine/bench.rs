@@ -124,7 +124,6 @@ pub const OF_JOINTS: [Term<f32>; 8] = [
         actuator: Actuator::Joint1,
         peak_rad: 1e-5,
         decay_s: 0.05,
-        loop_s: 0.007,
         rise_s: 0.002,
         presliding_rad: 1e-5,
     },

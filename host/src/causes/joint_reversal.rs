@@ -209,7 +209,7 @@ impl CauseModel for JointReversal {
         joint.friction = Some(friction);
     }
 
-    fn joint_term(&self, effect: &Effect, arm: &ArmChain) -> Option<Term<f64>> {
+    fn joint_term(&self, effect: &Effect, _arm: &ArmChain) -> Option<Term<f64>> {
         let Site::One(actuator) = effect.site() else {
             return None;
         };
@@ -217,7 +217,6 @@ impl CauseModel for JointReversal {
             actuator,
             peak_rad: effect.value() * 1e-6 / (effect.get(&ARM_MM) * 1e-3),
             decay_s: effect.get(&DECAY_S),
-            loop_s: arm.lag_s,
             rise_s: effect.get(&RISE_S),
             presliding_rad: effect.get(&PRESLIDING_MRAD) * 1e-3,
         })

@@ -44,7 +44,7 @@ pub struct JointErrors<T> {
     pub rise_s: T,
     /// Travel over which the friction changes over, rad.
     pub presliding_rad: T,
-    /// Time constant of the loop that what takes up play and friction goes through, s; 0: none.
+    /// Time constant of the loop that what takes up play goes through, s; 0: none. Friction is behind the loop that all have in common.
     pub loop_s: T,
     /// Periodic errors.
     pub gear: [Gear<T>; MAX_GEAR],
@@ -213,6 +213,8 @@ pub struct ArmLaw<T> {
     turn_ticks: T,
     ticks_per_s: T,
     lead_s: T,
+    /// Time constant of the loop that all joints have in common, s.
+    loop_s: T,
     /// Offset of zeros and lengths where they are counted from, m.
     still_m: [T; 3],
     lengths: bool,
@@ -257,6 +259,8 @@ impl<T: Real> ArmLaw<T> {
             turn_ticks: (pace.turn_s / pace.tick_s).max(T::one()),
             // A reversal is noticed half a tick late on average, and the turn begins in that tick.
             lead_s: half * pace.turn_s,
+            // κ3 of a lag is 2τ³.
+            loop_s: (number::<T>(3.0) * common.third_s3).max(T::zero()).cbrt(),
             still_m: [T::zero(); 3],
             lengths: errors.longer_m.iter().any(|longer| *longer != T::zero()),
         };
@@ -318,16 +322,17 @@ impl<T: Real> ArmLaw<T> {
             if errors.play_rad != T::zero() || errors.peak_rad != T::zero() {
                 // The loop makes up for its own delay, and the joint turns that much later; friction changes over after that.
                 let play_s = self.lead_s - errors.loop_s;
-                let friction_s = play_s - errors.changes_over_s(second);
+                let friction_s = self.lead_s - self.loop_s - errors.changes_over_s(second);
                 let ahead = [play_s, friction_s].map(|ahead_s| rate + ahead_s * second);
                 side.tick(ahead, errors, fade, self.turn_ticks);
             }
             // Through the lag of a loop a change has to come as itself and its rate.
-            let ticks = errors.loop_s * self.ticks_per_s;
+            let of_play = errors.loop_s * self.ticks_per_s;
+            let of_friction = self.loop_s * self.ticks_per_s;
             let mut wanted = self.common.offset(along) + errors.lag_s * rate
                 - errors.second_s2 * second
-                + half * errors.play_rad * (side.play.now + ticks * side.play.changed)
-                + (side.pulse_rad + ticks * side.pulsed_rad);
+                + half * errors.play_rad * (side.play.now + of_play * side.play.changed)
+                + (side.pulse_rad + of_friction * side.pulsed_rad);
             for gear in &errors.gear {
                 if gear.amplitude_rad != T::zero() {
                     let (sine, _) = (gear.waves * angle + gear.phase_rad).sine_cosine();

@@ -43,9 +43,9 @@ pub const SIGNATURE_BYTES: usize = 64;
 /// Changes when the body's meaning does.
 pub const SCHEMA_HASH: u32 = crc32(include_bytes!("schema.txt"));
 
-/// Longest body: every string, vector and option full, every term the longest (tag, actuator, five numbers).
+/// Longest body: every string, vector and option full, every term the longest (tag, actuator, four numbers).
 const MAX_BODY_BYTES: usize = {
-    let term = 1 + 1 + 5 * 4;
+    let term = 1 + 1 + 4 * 4;
     let zone = (1 + 24) + 8 + 8 + 1 + 8 + (1 + MAX_TERMS * term);
     let arm = (1 + (1 + (7 + 3 + 4) * 4 + 1)) + (1 + 12);
     (1 + 32) + (1 + MAX_ZONES * zone) + 8 + arm

@@ -156,8 +156,6 @@ pub enum Term<T> {
         peak_rad: T,
         /// Time constant of the decay, s.
         decay_s: T,
-        /// Time constant of the loop before it, s; 0: none.
-        loop_s: T,
         /// How long it takes to rise, s.
         rise_s: T,
         /// Travel over which the friction changes over, rad.
@@ -228,7 +226,7 @@ macro_rules! with_kind {
             Straightness straightness { actuator, across, curvature_per_m },
             JointLag joint_lag { actuator, delta_tau_s, delta_kappa2_s2 },
             JointBacklash joint_backlash { actuator, play_rad, loop_s },
-            JointReversal joint_reversal { actuator, peak_rad, decay_s, loop_s, rise_s, presliding_rad },
+            JointReversal joint_reversal { actuator, peak_rad, decay_s, rise_s, presliding_rad },
             JointCyclic joint_cyclic { actuator, amplitude_rad, waves, phase_rad },
             JointZero joint_zero { actuator, offset_rad },
             LinkLength link_length { actuator, longer_m },

@@ -17,7 +17,7 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
-const SLOT: usize = 4096;
+const SLOT: usize = 2048;
 const ERASE: usize = 512;
 /// Bytes of the flash.
 pub const FLASH: usize = 2 * SLOT + ERASE;

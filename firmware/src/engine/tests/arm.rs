@@ -73,7 +73,7 @@ fn arm_table(terms: &[Term<f32>]) -> Table {
 fn engine(rate_hz: u32, table: Option<&Table>) -> Engine {
     let mut config = Config::robot(rate_hz);
     config.motion.acceleration_m_s2 = 8.0;
-    (config.offset_m, config.slew_m_s) = (0.05, 1.0);
+    (config.offset_m, config.slew_m_s) = (0.05, [1.0; 3]);
     let mut engine = Engine::new(config).unwrap();
     engine.load(table).unwrap();
     engine

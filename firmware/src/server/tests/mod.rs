@@ -16,7 +16,7 @@ use std::boxed::Box;
 use std::string::{String, ToString};
 use std::vec::Vec;
 
-const SLOT: usize = 4096;
+const SLOT: usize = 2048;
 const ERASE: usize = 512;
 const CELLS: usize = 2 * SLOT + 3 * ERASE;
 const KEY: u32 = 2 * SLOT as u32;
