@@ -163,7 +163,7 @@ const FIRST: [(f64, f64, Plane); 12] = [
     (60.0, 20.0, Plane::Xy),
     (30.0, 50.0, Plane::Xy),
     (100.0, 200.0, Plane::Xy),
-    (60.0, 370.0, Plane::Xy),
+    (70.0, 400.0, Plane::Xy),
     (30.0, 20.0, Plane::Yz),
     (60.0, 50.0, Plane::Yz),
     (10.0, 150.0, Plane::Yz),
