@@ -229,7 +229,7 @@ mod tests {
                 let mut counted = whole(cells.clone());
                 counted.keep_owner(next).unwrap();
                 let steps = counted.flash_mut().steps();
-                erased += u32::from(steps % 4 != 0);
+                erased += u32::from(!steps.is_multiple_of(4));
                 for after in 1..=steps {
                     let mut store = open(cells.clone(), Some(after), tear);
                     let kept = store.keep_owner(next).is_ok();

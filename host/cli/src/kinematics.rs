@@ -72,7 +72,7 @@ pub fn run(args: Args, out: Output) -> Result<(), Failure> {
                 .iter()
                 .map(|q| format!("{:.1}°", q.to_degrees()))
                 .collect();
-            out.note(&format!(
+            out.note(format!(
                 "it reaches that place with the joints at {}",
                 degrees.join(", ")
             ));

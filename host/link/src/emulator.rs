@@ -141,20 +141,7 @@ impl Emulator {
             let block = format!("loader,file={},addr={address},force-raw=on", file.display());
             command.args(["-device", &block]);
         }
-        for port in board.serial_ports() {
-            match port {
-                SerialPort::Link => command.args(["-serial", "pty"]),
-                SerialPort::Nowhere => command.args(["-serial", "null"]),
-                SerialPort::Socket(name) => {
-                    let path = folder.path().join(name);
-                    let socket = format!(
-                        "socket,id={name},path={},server=on,wait=off",
-                        path.display()
-                    );
-                    command.args(["-chardev", &socket, "-serial", &format!("chardev:{name}")])
-                }
-            };
-        }
+        serial_ports(&mut command, board, folder.path());
         if setup.held {
             let socket = format!("unix:{},server=on,wait=off", qmp(&folder).display());
             command.args(["-S", "-qmp", &socket]);
@@ -284,6 +271,24 @@ impl Drop for Emulator {
 fn failed(error: &io::Error) -> ControllerError {
     ControllerError::Emulator {
         reason: error.to_string(),
+    }
+}
+
+/// The ports of a board: its link as a terminal, the others as sockets in a folder.
+fn serial_ports(command: &mut Command, board: Board, folder: &Path) {
+    for port in board.serial_ports() {
+        match port {
+            SerialPort::Link => command.args(["-serial", "pty"]),
+            SerialPort::Nowhere => command.args(["-serial", "null"]),
+            SerialPort::Socket(name) => {
+                let path = folder.join(name);
+                let socket = format!(
+                    "socket,id={name},path={},server=on,wait=off",
+                    path.display()
+                );
+                command.args(["-chardev", &socket, "-serial", &format!("chardev:{name}")])
+            }
+        };
     }
 }
 

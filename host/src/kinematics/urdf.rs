@@ -139,11 +139,9 @@ fn joints(text: &str) -> Result<Vec<Written>, UrdfError> {
                     _ => {}
                 }
             }
-            Event::End(element) => {
-                if element.name().as_ref() == "joint" {
-                    // A transmission names joints as well: those have no links.
-                    joints.extend(open.take().filter(|joint| !joint.child.is_empty()));
-                }
+            Event::End(element) if element.name().as_ref() == "joint" => {
+                // A transmission names joints as well: those have no links.
+                joints.extend(open.take().filter(|joint| !joint.child.is_empty()));
             }
             Event::Eof => return Ok(joints),
             _ => {}
