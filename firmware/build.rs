@@ -48,7 +48,7 @@ const BOARDS: [Memory; 3] = [
 const ROOM: [u32; 2] = [256 * 1024, 48 * 1024];
 /// Of that RAM, the stack of a controller. It lies below the variables, where memory begins: one that grows too long leaves memory,
 /// which is a fault, and never writes into variables. Variables that do not fit above it do not link.
-const STACK: u32 = 10 * 1024;
+const STACK: u32 = 16 * 1024;
 
 /// Version of the package and, in a git work tree, the commit: what an image says of itself.
 fn build() -> String {

@@ -48,6 +48,7 @@ const SPEAKERS: &[&str] = &[
     "campaign list campaign",
     "run circle --radius 50 --feed 100 --direction ccw --port sim",
     "demo",
+    "kinematics robot.urdf",
     "completions bash",
     "man -o new",
 ];
@@ -135,10 +136,31 @@ const OTHERS: &[&str] = &[
     "help",
 ];
 
+/// An ABB IRB 1600 by its joints.
+fn urdf() -> String {
+    let joints = [
+        ("0 0 0.4865", "0 0 1"),
+        ("0.15 0 0", "0 1 0"),
+        ("0 0 0.7", "0 1 0"),
+        ("0.314 0 0", "1 0 0"),
+        ("0.286 0 0", "0 1 0"),
+        ("0.065 0 0", "1 0 0"),
+    ];
+    let mut text = String::from("<robot name='irb1600'>");
+    for (n, (place, axis)) in joints.iter().enumerate() {
+        text += &format!(
+            "<joint name='j{n}' type='revolute'><parent link='l{n}'/><child link='l{}'/><origin xyz='{place}'/><axis xyz='{axis}'/></joint>\n",
+            n + 1
+        );
+    }
+    text + "</robot>"
+}
+
 fn lay_out(folder: &Path) {
     let at = |name: &str| folder.join(name);
     fs::write(at("plan.toml"), PLAN).unwrap();
     fs::write(at("model.toml"), MODEL).unwrap();
+    fs::write(at("robot.urdf"), urdf()).unwrap();
     let key = format!("giotto-key-1 {}\n", "5a".repeat(32));
     fs::write(at("owner.key"), key).unwrap();
     std::os::unix::fs::symlink(at("model.toml"), at("link.toml")).unwrap();

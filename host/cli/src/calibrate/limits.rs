@@ -27,7 +27,7 @@ const LINUXCNC_TURNS: f64 = 1.75;
 const REST_S: f64 = 1.0;
 /// No circle of a machine that is there takes longer, s: with feeds of hobby machines a tenth of the highest one would be
 /// minutes.
-const LONGEST_S: f64 = 16.0;
+const LONGEST_S: f64 = 15.5;
 /// How far and how fast the plan may go.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
