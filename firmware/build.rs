@@ -38,8 +38,8 @@ const BOARDS: [Memory; 3] = [
         flash: 0x0000_0000,
         ram: 0x2000_0000,
         code: 0,
-        // It makes everything on its stack.
-        stack: 32 * 1024,
+        // It makes everything on its stack, and is for no F405: its variables have all the room.
+        stack: 96 * 1024,
     },
 ];
 
@@ -88,9 +88,14 @@ fn main() {
     let region =
         |name, (origin, length)| format!("  {name} : ORIGIN = {origin:#010x}, LENGTH = {length}\n");
     let [text, ram] = ROOM;
+    let variables = if board.stack < ram {
+        ram - board.stack
+    } else {
+        ram
+    };
     let (flash, ram) = (
         region("FLASH", (board.flash, text)),
-        region("RAM", (board.ram + board.stack, ram - board.stack)),
+        region("RAM", (board.ram + board.stack, variables)),
     );
     let stack = format!(
         "_stack_start = {:#010x};\n_stack_end = {:#010x};\n",

@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 /// Profile terms of the extended case, reversal pulses among them.
 pub const TERMS: usize = 8;
 /// How long the emulator may take, by the clock: a guard against a hang, not a measurement.
-const PATIENCE: Duration = Duration::from_secs(600);
+const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Smallest and largest count of each case.
 pub type Counts = BTreeMap<String, (u32, u32)>;

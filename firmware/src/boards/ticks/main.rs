@@ -146,7 +146,7 @@ mod image {
     }
 
     /// Of so many ticks in a ramp one has a run that is stopped in it.
-    const STOP_EVERY: u32 = 5;
+    const STOP_EVERY: u32 = 3;
 
     /// Ticks of runs from rest to rest, each set-point recorded.
     struct Interrupts {

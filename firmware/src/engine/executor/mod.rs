@@ -14,9 +14,9 @@
 //! | arc with eight profile terms, two slides with play and friction pulses (`arc`) | 350 | 444, in a ramp in which they turn | 450 |
 //! | arc with the dearest eight (`arc`) | | 576 | |
 //! | helix (`curve`), the same with eight terms | | 292, 619 | |
-//! | set-point of a stream ([`super::Stream`]) | 148 | 148 | 250 |
-//! | arc of a six-joint arm, eight dear terms of its joints (`engine/arm`), at 1 kHz | 26,302 | 26,435 | 33,600: a fifth of the F405's clock |
-//! | whole interrupt, helix with the dearest eight, each set-point recorded | | 982, in a ramp in which two slides turn at once | 1000 |
+//! | set-point of a stream ([`super::Stream`]) | 149 | 149 | 250 |
+//! | arc of a six-joint arm, eight dear terms of its joints (`engine/arm`), at 1 kHz | 26,617 | 26,748 | 33,600: a fifth of the F405's clock |
+//! | whole interrupt, helix with the dearest eight, each set-point recorded | | 992, in a ramp in which two slides turn at once | 1000 |
 //!
 //! | the same tick, a stop beginning in its ramp: once a run | | 2026 | 3125, what there is at 8 kHz on 25 MHz |
 //! | the same, on its way to rest after that | | 1050 | 3125 |
