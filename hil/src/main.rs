@@ -76,7 +76,7 @@ enum Command {
         /// The play of the machine lies behind its servo instead of ahead of it.
         #[arg(long)]
         play_behind: bool,
-        /// What LinuxCNC may ask of an axis, mm/s²; its drive can do 10000.
+        /// What LinuxCNC may ask of an axis, mm/s²; its drive can do 30000.
         #[arg(long, value_name = "MM_S2", default_value_t = linuxcnc::ACCELERATION)]
         max_acceleration: f64,
         /// Fewer circles, in one plane, and no rewritten programs: three minutes instead of twelve.

@@ -4,7 +4,7 @@
 //! first tick with [`flag::MOVING`](super::flag::MOVING) begins what counts, ticks without it (rest, settling) do not.
 use super::planner::Planner;
 use super::{Config, Executor, Output, Planned, Stream, StreamSample};
-use giotto_shared::kinematics::{Branch, Kinematics, Opw};
+use giotto_shared::kinematics::{IRB1600, Kinematics, PAPER_CENTRE_M};
 use giotto_shared::model::Cumulants;
 use giotto_shared::path::{Segment, smoothstep};
 use giotto_shared::table::{Arm, Limits, Table, Travel, Zone};
@@ -150,21 +150,6 @@ const fn gear(actuator: Actuator) -> Term<f32> {
     }
 }
 
-/// Where the source paper drew its circles, m, and the robot that drew them.
-const PAPER_CENTRE_M: [f64; 3] = [-0.29, 0.987, 0.615];
-const IRB1600: Kinematics<f32> = Kinematics::Opw(Opw {
-    a1_m: 0.15,
-    a2_m: 0.0,
-    b_m: 0.0,
-    c1_m: 0.4865,
-    c2_m: 0.7,
-    c3_m: 0.6,
-    c4_m: 0.065,
-    tool_m: [0.0, 0.065, 0.149],
-    orientation: [0.0, 0.0, 1.0, 0.0],
-    branch: Branch::ElbowUp,
-});
-
 /// Where the arc of [`Arc`] starts, and its plan.
 pub(crate) fn planned(terms: &[Term<f32>], rise_m: f64) -> ([i32; 3], Option<Planned>) {
     plan(CENTRE_M, &table(terms), rise_m)
@@ -214,7 +199,7 @@ impl Arc {
     pub fn of_arm() -> Self {
         let mut table = table(&OF_JOINTS);
         table.arm = Some(Arm {
-            kinematics: IRB1600,
+            kinematics: Kinematics::Opw(IRB1600).map(|value| value as f32),
             home_m: Some(PAPER_CENTRE_M.map(|m| m as f32)),
         });
         Self::of(plan(PAPER_CENTRE_M, &table, 0.0))

@@ -22,11 +22,11 @@ const PLAY_MM: f64 = 0.020;
 const SCALE_X: f64 = 1.5e-4;
 /// Highest feed of each axis, mm/s.
 const FEED: f64 = 800.0;
-/// What each drive can do, mm/s².
-pub(super) const DRIVE: f64 = 10_000.0;
-/// What LinuxCNC may ask of each axis, mm/s². A correction pulls harder than the path where a line meets an arc, and harder
-/// still in a corner: the drive has to have that to give.
-pub(super) const ACCELERATION: f64 = 3000.0;
+/// What each drive can do, mm/s². A correction pulls harder than the path where a line meets an arc, and harder still in a
+/// corner: the drive has to have that to give.
+pub(super) const DRIVE: f64 = 30_000.0;
+/// What LinuxCNC may ask of each axis, mm/s².
+pub(super) const ACCELERATION: f64 = 10_000.0;
 /// Soft limits, mm.
 const LIMIT: f64 = 500.0;
 

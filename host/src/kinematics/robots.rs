@@ -37,7 +37,12 @@ impl Robot {
     }
 }
 
-const IRB1600: [f64; 7] = [0.150, 0.0, 0.0, 0.4865, 0.700, 0.600, 0.065];
+const IRB1600: [f64; 7] = {
+    let arm = giotto_shared::kinematics::IRB1600;
+    [
+        arm.a1_m, arm.a2_m, arm.b_m, arm.c1_m, arm.c2_m, arm.c3_m, arm.c4_m,
+    ]
+};
 
 /// All robots that are known by name.
 pub const ROBOTS: [Robot; 9] = [

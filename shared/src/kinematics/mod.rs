@@ -3,6 +3,7 @@
 //! | file | holds |
 //! |---|---|
 //! | `opw` | six joints with a spherical wrist |
+//! | `paper` | the robot of the source paper |
 //! | `scara` | two links in a plane, then the height as a slide |
 //! | `scalar`, `jet` | what the closed forms are computed with: numbers, or numbers with their derivatives along a path |
 //! | `rotation` | matrices and vectors |
@@ -11,12 +12,14 @@
 //! the same closed form gives angles, rates, accelerations and so on of all joints, without a Jacobian to be solved.
 mod jet;
 mod opw;
+mod paper;
 mod rotation;
 mod scalar;
 mod scara;
 
 pub use jet::{Jet, path};
 pub use opw::{Branch, Opw};
+pub use paper::{IRB1600, PAPER_CENTRE_M};
 pub use scalar::{Real, Scalar};
 pub use scara::{Elbow, Scara};
 

@@ -3,18 +3,7 @@ use super::*;
 use core::f64::consts::TAU;
 
 fn irb1600() -> Kinematics<f64> {
-    Kinematics::Opw(Opw {
-        a1_m: 0.15,
-        a2_m: 0.0,
-        b_m: 0.0,
-        c1_m: 0.4865,
-        c2_m: 0.7,
-        c3_m: 0.6,
-        c4_m: 0.065,
-        tool_m: [0.0, 0.065, 0.149],
-        orientation: [0.0, 0.0, 1.0, 0.0],
-        branch: Branch::ElbowUp,
-    })
+    Kinematics::Opw(IRB1600)
 }
 
 const OMEGA: f64 = 7.0;
@@ -24,11 +13,7 @@ fn circle(time_s: f64) -> [[f64; 3]; 5] {
     core::array::from_fn(|order| {
         let angle = OMEGA * time_s + TAU / 4.0 * order as f64;
         let size = 0.1 * OMEGA.powi(order as i32);
-        let centre = if order == 0 {
-            [-0.29, 0.987, 0.615]
-        } else {
-            [0.0; 3]
-        };
+        let centre = if order == 0 { PAPER_CENTRE_M } else { [0.0; 3] };
         [
             centre[0] + size * angle.cos(),
             centre[1] + size * angle.sin(),
@@ -119,12 +104,9 @@ fn no_place_beyond_reach_gives_numbers() {
 #[test]
 fn angles_lead_to_their_place_and_levers_are_differences() {
     for branch in Branch::ALL {
-        let Kinematics::Opw(opw) = irb1600() else {
-            unreachable!()
-        };
         let arm = Kinematics::Opw(Opw {
             branch: branch.0,
-            ..opw
+            ..IRB1600
         });
         for step in 0..20 {
             let [p, ..] = circle(0.045 * f64::from(step));

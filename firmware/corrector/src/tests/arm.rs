@@ -1,28 +1,16 @@
 //! A robot behind the corrector: its joints lag by themselves, and what they draw is measured at the tool.
 use super::*;
-use giotto_shared::kinematics::{Branch, Kinematics, Opw};
+use giotto_shared::circle;
+use giotto_shared::kinematics::{IRB1600, Kinematics, PAPER_CENTRE_M as CENTRE_M};
 use giotto_shared::table::Arm;
 use std::f64::consts::TAU;
 
-const CENTRE_M: [f64; 3] = [-0.29, 0.987, 0.615];
 const TICK_S: f64 = 0.004;
 const LAP_S: f64 = 1.6;
 const REST_TICKS: f64 = 200.0;
 
-/// The robot of the source paper with its tool.
 fn irb1600() -> Kinematics<f64> {
-    Kinematics::Opw(Opw {
-        a1_m: 0.15,
-        a2_m: 0.0,
-        b_m: 0.0,
-        c1_m: 0.4865,
-        c2_m: 0.7,
-        c3_m: 0.6,
-        c4_m: 0.065,
-        tool_m: [0.0, 0.065, 0.149],
-        orientation: [0.0, 0.0, 1.0, 0.0],
-        branch: Branch::ElbowUp,
-    })
+    Kinematics::Opw(IRB1600)
 }
 
 /// A table whose arm it is told, or not.
@@ -107,14 +95,13 @@ fn measured(image: Option<&[u8]>, late_ticks: usize, lead_s: Option<f64>) -> [f6
             drawn.push([x, y]);
         }
     }
-    let n = drawn.len() as f64;
-    let mean = |axis: usize| drawn.iter().map(|p| p[axis]).sum::<f64>() / n;
-    let (cx, cy) = (mean(0), mean(1));
+    let fit = circle::fit(drawn.as_slice()).unwrap().circle;
+    let [cx, cy] = fit.centre;
     let radii = drawn.iter().map(|p| (p[0] - cx).hypot(p[1] - cy));
-    let (low, high, sum) = radii.fold((f64::MAX, f64::MIN, 0.0), |(low, high, sum), r| {
-        (r.min(low), r.max(high), sum + r)
+    let (low, high) = radii.fold((f64::MAX, f64::MIN), |(low, high), r| {
+        (r.min(low), r.max(high))
     });
-    [0.5 * (high - low), sum / n - 0.1]
+    [0.5 * (high - low), fit.radius - 0.1]
 }
 
 #[test]

@@ -1,28 +1,16 @@
 //! Set-points of an arm against joints in the time domain: each lags, plays and waves by itself and knows nothing of the engine.
 use super::*;
 use core::f64::consts::TAU;
-use giotto_shared::kinematics::{Branch, Kinematics, Opw};
+use giotto_shared::circle;
+use giotto_shared::kinematics::{IRB1600, Kinematics, PAPER_CENTRE_M as CENTRE};
 use giotto_shared::table::Arm;
 use giotto_shared::term::Term;
 use giotto_shared::{Actuator, Plane};
 
 const KV: f64 = 50.0;
-const CENTRE: [f64; 3] = [-0.29, 0.987, 0.615];
 
-/// The robot of the source paper with its tool.
 fn irb1600() -> Kinematics<f64> {
-    Kinematics::Opw(Opw {
-        a1_m: 0.15,
-        a2_m: 0.0,
-        b_m: 0.0,
-        c1_m: 0.4865,
-        c2_m: 0.7,
-        c3_m: 0.6,
-        c4_m: 0.065,
-        tool_m: [0.0, 0.065, 0.149],
-        orientation: [0.0, 0.0, 1.0, 0.0],
-        branch: Branch::ElbowUp,
-    })
+    Kinematics::Opw(IRB1600)
 }
 
 /// What is wrong with the simulated arm.
@@ -82,7 +70,7 @@ fn engine(rate_hz: u32, table: Option<&Table>) -> Engine {
     engine
 }
 
-/// A lap takes so many seconds, a whole number of ticks, so that its mean place is its centre.
+/// A lap takes so many seconds.
 fn run(radius_m: f64, lap_s: f64, plane: Plane, direction: Direction) -> CircleRun {
     CircleRun {
         centre_m: CENTRE,
@@ -112,15 +100,13 @@ fn measured(wrong: &Wrong, out: &[Output], run: &CircleRun, tick_s: f64) -> [f64
         .iter()
         .map(|p| [p[first], p[second]])
         .collect();
-    let n = lap.len() as f64;
-    let centre = [0, 1].map(|k| lap.iter().map(|p| p[k]).sum::<f64>() / n);
-    let radii = lap
-        .iter()
-        .map(|p| (p[0] - centre[0]).hypot(p[1] - centre[1]));
-    let (low, high, sum) = radii.fold((f64::MAX, f64::MIN, 0.0), |(low, high, sum), r| {
-        (r.min(low), r.max(high), sum + r)
+    let fit = circle::fit(lap.as_slice()).unwrap().circle;
+    let [cx, cy] = fit.centre;
+    let radii = lap.iter().map(|p| (p[0] - cx).hypot(p[1] - cy));
+    let (low, high) = radii.fold((f64::MAX, f64::MIN), |(low, high), r| {
+        (r.min(low), r.max(high))
     });
-    [0.5 * (high - low), sum / n - run.radius_m]
+    [0.5 * (high - low), fit.radius - run.radius_m]
 }
 
 /// Machines with the table that knows what is wrong with them.
@@ -281,34 +267,38 @@ fn a_place_out_of_reach_is_not_corrected() {
     assert!(out.iter().all(|o| o.corrected_nm == o.nominal_nm));
 }
 
+/// A circle's programmed set-points, and the stream of an arm after all of them.
+fn streamed(terms: &[Term<f32>], run: &CircleRun) -> (Vec<Output>, Stream<PLACES>, Vec<Output>) {
+    let mut plain = engine(1000, None);
+    plain.run_circle(run).unwrap();
+    let programmed = run_out(&mut plain);
+    let start_nm = programmed[0].nominal_nm;
+    let mut planner = Planner::new(&Config::robot(1000), start_nm);
+    let mut table = arm_table(terms);
+    (table.limits.offset_m, table.limits.slew_m_s) = (4e-3, 0.09);
+    planner.set_table(Some(&table)).unwrap();
+    let plan = planner.stream(0.5, PLACES).unwrap();
+    let mut stream = Stream::new(&plan, start_nm, 0, false);
+    let late = plan.latency() as usize;
+    let out = (0..programmed.len()).map(|sequence| {
+        let mut got = stream.tick(Some(StreamSample {
+            sequence: sequence as u16,
+            position_nm: programmed[sequence].nominal_nm,
+        }));
+        let then = sequence.checked_sub(late);
+        got.flags = then.map_or(0, |then| programmed[then].flags);
+        got
+    });
+    let out = out.collect();
+    (programmed, stream, out)
+}
+
 /// Set-points of a stream go the same way.
 #[test]
 fn a_stream_of_an_arm_becomes_round() {
     let (_, wrong, terms) = machines()[1].clone();
     let run = run(0.1, 1.5, Plane::Xy, Direction::Ccw);
-    let mut plain = engine(1000, None);
-    plain.run_circle(&run).unwrap();
-    let programmed = run_out(&mut plain);
-    let plan = {
-        let mut planner = Planner::new(&Config::robot(1000), programmed[0].nominal_nm);
-        let mut table = arm_table(&terms);
-        (table.limits.offset_m, table.limits.slew_m_s) = (4e-3, 0.09);
-        planner.set_table(Some(&table)).unwrap();
-        planner.stream(0.5, PLACES).unwrap()
-    };
-    let mut stream: Stream<PLACES> = Stream::new(&plan, programmed[0].nominal_nm, 0, false);
-    let mut out: Vec<Output> = Vec::new();
-    for (sequence, set_point) in programmed.iter().enumerate() {
-        let mut got = stream.tick(Some(StreamSample {
-            sequence: sequence as u16,
-            position_nm: set_point.nominal_nm,
-        }));
-        let late = plan.latency() as usize;
-        got.flags = sequence
-            .checked_sub(late)
-            .map_or(0, |k| programmed[k].flags);
-        out.push(got);
-    }
+    let (programmed, _, out) = streamed(&terms, &run);
     let [round, _] = measured(&wrong, &programmed, &run, 1e-3);
     let [round_after, size] = measured(&wrong, &out, &run, 1e-3);
     std::println!("stream {round:e} -> {round_after:e} {size:e}");
@@ -316,11 +306,47 @@ fn a_stream_of_an_arm_becomes_round() {
         round_after < 0.1 * round && size.abs() < 2e-6,
         "{round_after} {size}"
     );
-    stream.finish();
-    while !stream.over() {
-        out.push(stream.tick(None));
+}
+
+/// Zeros and play hold an offset at rest. What comes after a stream knows nothing of it: it goes before the stream is over, whether its
+/// sender ends it or falls silent, and not at once.
+#[test]
+fn where_a_stream_of_an_arm_ends_nothing_is_left_of_it() {
+    let play = Term::JointBacklash {
+        actuator: Actuator::Joint1,
+        play_rad: 5e-5,
+        loop_s: 0.0,
+    };
+    let zero = Term::JointZero {
+        actuator: Actuator::Joint3,
+        offset_rad: 1e-3,
+    };
+    let run = run(0.1, 1.5, Plane::Xy, Direction::Ccw);
+    for silent in [false, true] {
+        let (programmed, mut stream, mut out) = streamed(&[play, zero], &run);
+        // At rest for as long as the filter needs.
+        for tick in 0..100 {
+            out.push(stream.tick(Some(StreamSample {
+                sequence: (programmed.len() + tick) as u16,
+                position_nm: programmed[programmed.len() - 1].nominal_nm,
+            })));
+        }
+        let offset = |o: &Output| [0, 1, 2].map(|k| o.corrected_nm[k] - o.nominal_nm[k]);
+        let held = out.last().map(offset).unwrap();
+        assert!(held.iter().any(|nm| nm.abs() > 20_000), "{held:?}");
+        if !silent {
+            stream.finish();
+        }
+        let first = out.len() - 1;
+        while !stream.over() {
+            out.push(stream.tick(None));
+        }
+        let offsets: Vec<_> = out[first..].iter().map(offset).collect();
+        assert_eq!(offsets.last(), Some(&[0; 3]), "silent: {silent}");
+        let steps = offsets
+            .windows(2)
+            .flat_map(|w| [0, 1, 2].map(|k| w[1][k] - w[0][k]));
+        let most = steps.map(i32::abs).max().unwrap();
+        assert!(most < 2_000, "{most} nm in a tick, silent: {silent}");
     }
-    no_jump(&out, 0.5e-3);
-    let end = out.last().unwrap();
-    assert_eq!(end.corrected_nm, end.nominal_nm);
 }

@@ -1,7 +1,8 @@
 //! The law against a machine in the time domain: joints that lag, with play, gears and wrong lengths, stepped in small steps.
 use super::*;
 use crate::Actuator;
-use crate::kinematics::{Branch, Opw, path};
+use crate::circle;
+use crate::kinematics::{IRB1600, PAPER_CENTRE_M as CENTRE, path};
 use crate::model::{Cumulants, Element};
 use crate::term::{Term, merged};
 use core::f64::consts::TAU;
@@ -12,25 +13,12 @@ const PACE: Pace<f64> = Pace {
     tick_s: TICK_S,
     turn_s: 8e-3,
 };
-const CENTRE: [f64; 3] = [-0.29, 0.987, 0.615];
 const KV: f64 = 50.0;
-/// A whole number, so that the mean of a turn is its centre.
 const TURN_TICKS: usize = 1570;
 const OMEGA: f64 = TAU / (TURN_TICKS as f64 * TICK_S);
 
 fn arm() -> Kinematics<f64> {
-    Kinematics::Opw(Opw {
-        a1_m: 0.15,
-        a2_m: 0.0,
-        b_m: 0.0,
-        c1_m: 0.4865,
-        c2_m: 0.7,
-        c3_m: 0.6,
-        c4_m: 0.065,
-        tool_m: [0.0, 0.065, 0.149],
-        orientation: [0.0, 0.0, 1.0, 0.0],
-        branch: Branch::ElbowUp,
-    })
+    Kinematics::Opw(IRB1600)
 }
 
 /// R 100 mm from +X on, with its derivatives; a negative rate is clockwise.
@@ -102,14 +90,13 @@ fn run(errors: &ArmErrors<f64>, law: Option<&ArmLaw<f64>>, omega: f64) -> [f64; 
             places.push([x, y]);
         }
     }
-    let n = places.len() as f64;
-    let mean = |axis: usize| places.iter().map(|p| p[axis]).sum::<f64>() / n;
-    let (cx, cy) = (mean(0), mean(1));
+    let fit = circle::fit(places.as_slice()).unwrap().circle;
+    let [cx, cy] = fit.centre;
     let radii = places.iter().map(|p| (p[0] - cx).hypot(p[1] - cy));
-    let (low, high, sum) = radii.fold((f64::MAX, f64::MIN, 0.0), |(low, high, sum), r| {
-        (r.min(low), r.max(high), sum + r)
+    let (low, high) = radii.fold((f64::MAX, f64::MIN), |(low, high), r| {
+        (r.min(low), r.max(high))
     });
-    [0.5 * (high - low), sum / n - 0.1]
+    [0.5 * (high - low), fit.radius - 0.1]
 }
 
 fn law(errors: &ArmErrors<f64>) -> ArmLaw<f64> {

@@ -1,6 +1,6 @@
 //! The bytes of a table are a promise: pinned here, and every way to break them tried.
 use super::*;
-use crate::kinematics::{Branch, Kinematics, Opw};
+use crate::kinematics::{IRB1600, Kinematics, Opw, PAPER_CENTRE_M};
 use crate::model::Cumulants;
 use crate::table::{Arm, Field, Limits, Travel, Zone, bounds, validate::Where};
 use crate::term::Term;
@@ -36,19 +36,8 @@ fn table() -> Table {
 
 fn arm() -> Arm {
     Arm {
-        kinematics: Kinematics::Opw(Opw {
-            a1_m: 0.15,
-            a2_m: 0.0,
-            b_m: 0.0,
-            c1_m: 0.4865,
-            c2_m: 0.7,
-            c3_m: 0.6,
-            c4_m: 0.065,
-            tool_m: [0.0, 0.065, 0.149],
-            orientation: [0.0, 0.0, 1.0, 0.0],
-            branch: Branch::ElbowUp,
-        }),
-        home_m: Some([-0.29, 0.987, 0.615]),
+        kinematics: Kinematics::Opw(IRB1600).map(|value| value as f32),
+        home_m: Some(PAPER_CENTRE_M.map(|value| value as f32)),
     }
 }
 
